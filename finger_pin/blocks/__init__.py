@@ -1,0 +1,1 @@
+"""The boxes of Fig. 5, one file each."""

@@ -1,0 +1,76 @@
+"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range, which never pull."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from finger_pin.parameters import FingerDescription
+from finger_pin.routing import Array
+from finger_pin.validation import expand
+
+
+def penetration(position: Any, lower: Any, upper: Any) -> Any:
+    """Return how far a joint is beyond its range, positive above the upper limit, negative below the lower one."""
+    return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
+
+
+def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> Any:
+    """Return tau^r = max(0, k d (1 + c d')) with the sign of the penetration, N m.
+
+    It enters (18) as -tau^r, so a positive torque acts against positive rotation.
+
+    Args:
+        depth: Signed penetration, rad; d is its magnitude.
+        velocity: theta', rad/s.
+        stiffness: k, N m/rad.
+        damping: c, s/rad.
+    """
+    return stiffness * depth * np.maximum(0.0, 1.0 + damping * velocity * np.sign(depth))
+
+
+def limiter_energy(depth: Any, stiffness: Any) -> Any:
+    """Return the elastic energy k d^2 / 2, J."""
+    return 0.5 * stiffness * depth * depth
+
+
+def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
+    """Return the power that the contact does not store, (tau^r - k d) theta', W; never negative."""
+    return (torque - stiffness * depth) * velocity
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeLimiter:
+    """Stroke limiters of all joints.
+
+    Attributes:
+        lower: Shape (n,), rad.
+        upper: Shape (n,), rad.
+        stiffness: k, shape (n,), N m/rad.
+        damping: c, shape (n,), s/rad.
+    """
+
+    lower: Array
+    upper: Array
+    stiffness: Array
+    damping: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription) -> StrokeLimiter:
+        """Read the ranges and the contact's stiffness and damping."""
+        ranges = np.array([joint.range for joint in description.joints.values()])
+        settings = description.stroke_limiter
+        size = len(ranges)
+        return cls(ranges[:, 0], ranges[:, 1], expand(settings.stiffness, size), expand(settings.damping, size))
+
+    def depth(self, position: Array) -> Array:
+        """Return the signed penetration, shape (..., n), rad."""
+        depth: Array = penetration(position, self.lower, self.upper)
+        return depth
+
+    def torque(self, depth: Array, velocity: Array) -> Array:
+        """Return tau^r, shape (..., n), N m."""
+        torque: Array = limiter_torque(depth, velocity, self.stiffness, self.damping)
+        return torque
