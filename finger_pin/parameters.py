@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from finger_pin.validation import (
     Description,
     Name,
     Numbers,
     check_size,
+    choice,
     problem,
     quantity,
     real,
@@ -23,15 +24,6 @@ from finger_pin.validation import (
 )
 
 _MILLIMETRES = " m (is it in millimetres?)"
-
-
-def _choice(*allowed: str) -> BeforeValidator:
-    def validate(value: object) -> object:
-        if value not in allowed:
-            raise problem("", f"must be one of {', '.join(allowed)}", value)
-        return value
-
-    return BeforeValidator(validate)
 
 
 class Link(Description):
@@ -43,7 +35,7 @@ class Link(Description):
     twist: Annotated[float, real(-math.pi, math.pi)] = quantity(
         0.0, unit="rad", source="Table I", doc="alpha, rotation about x from this joint's axis to the next."
     )
-    section: Annotated[Literal["round", "square"], _choice("round", "square")] = quantity(
+    section: Annotated[Literal["round", "square"], choice("round", "square")] = quantity(
         "round", unit="1", source="design", doc="Cross-section: a cylinder or a square box."
     )
     width: Annotated[float, real(0.0, 1.0, above=True, hint=_MILLIMETRES)] = quantity(
@@ -118,7 +110,7 @@ class Crossing(Description):
 class Tendon(Description):
     """A tendon: the joints that it crosses, in order from its actuator or proximal anchor."""
 
-    kind: Annotated[Literal["actuated", "passive"], _choice("actuated", "passive")] = quantity(
+    kind: Annotated[Literal["actuated", "passive"], choice("actuated", "passive")] = quantity(
         "actuated", unit="1", source="Sec. III", doc="Pulled by an actuator, or anchored at both ends."
     )
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(

@@ -6,8 +6,9 @@ its source beside the bounds, so that a schema printed from the models documents
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -82,6 +83,26 @@ def vector(size: int, low: float = -math.inf, high: float = math.inf) -> BeforeV
         return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
 
     return BeforeValidator(validate)
+
+
+def choice(*allowed: str) -> BeforeValidator:
+    """Return a validator for one of a few names; a near miss is told the nearest one."""
+
+    def validate(value: Any) -> Any:
+        if value not in allowed:
+            near = nearest(value, allowed)
+            hint = f"; did you mean {near}?" if near else ""
+            raise problem("", f"must be one of {', '.join(allowed)}{hint}", value)
+        return value
+
+    return BeforeValidator(validate)
+
+
+def nearest(name: Any, names: Iterable[str]) -> str | None:
+    """Return the name that a misspelt one most likely means, or None."""
+    folded = {candidate.casefold(): candidate for candidate in names}
+    found = difflib.get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.6)
+    return folded[found[0]] if found else None
 
 
 def expand(value: Numbers, size: int) -> NDArray[np.float64]:

@@ -1,0 +1,74 @@
+"""Joint position control through the tendons: (19), (21), (22)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from finger_pin.blocks.reference import ReferenceSignals
+from finger_pin.routing import Array, Routing
+
+
+def proportional_torque(gain: Any, reference: Any, position: Any) -> Any:
+    """Return tau^d = K_P (theta^d - theta), N m, equation (19)."""
+    return gain * (reference - position)
+
+
+def internal_level(minimum: Any, minimal: Any, internal: Any) -> Any:
+    """Return (f0 - f^m) / f^k, whose largest entry is lambda of (22)."""
+    return (minimum - minimal) / internal
+
+
+@dataclass(frozen=True, eq=False)
+class ControlSignals:
+    """What a controller asks for.
+
+    Attributes:
+        torque: tau^d, shape (..., n), N m.
+        tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
+    """
+
+    torque: Array
+    tension: Array
+
+
+class Controller(Protocol):
+    """Anything that turns references and measured motion into tendon tensions."""
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return the commands for shapes (..., n)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProportionalController:
+    """The paper's controller: proportional torque, distributed over the tendons by the pseudo-inverse.
+
+    Attributes:
+        gain: K_P, shape (n,), N m/rad.
+        minimum: f0, shape (t,), N.
+        inverse: Pseudo-inverse of H_c^T, shape (t, n), 1/m.
+        internal: f^k, shape (t,), internal tensions with the largest entry 1.
+    """
+
+    gain: Array
+    minimum: Array
+    inverse: Array
+    internal: Array
+
+    @classmethod
+    def from_routing(cls, routing: Routing, gain: Array, minimum: Array) -> ProportionalController:
+        """Prepare (21) for a routing with force closure."""
+        return cls(gain, minimum, np.asarray(np.linalg.pinv(routing.coupling.T)), routing.force_closure().tension)
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return tau^d of (19) and f_hat of (21) with lambda of (22)."""
+        torque = proportional_torque(self.gain, reference.position, position)
+        minimal = torque @ self.inverse.T
+        level = np.max(internal_level(self.minimum, minimal, self.internal), axis=-1, keepdims=True)
+        return ControlSignals(torque, minimal + level * self.internal)

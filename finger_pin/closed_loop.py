@@ -1,0 +1,76 @@
+"""A finger under control: reference, controller, fingertip force and finger as one system x' = f(t, x)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from finger_pin.blocks.controller import Controller, ControlSignals
+from finger_pin.blocks.reference import ReferenceSignals
+from finger_pin.finger import Finger, FingerSignals
+from finger_pin.routing import Array
+from finger_pin.scenario import Scenario
+
+
+class Reference(Protocol):
+    """Anything that gives a desired motion."""
+
+    def at(self, time: Array | float) -> ReferenceSignals:
+        """Return theta^d and its rate at one time, or at times of shape (m,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSignals:
+    """Everything at one instant or at many: what was desired, what was commanded, what the finger does."""
+
+    reference: ReferenceSignals
+    control: ControlSignals
+    finger: FingerSignals
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """A finger with its controller and reference. `rhs` is a pure function of time and state.
+
+    Attributes:
+        finger: The finger.
+        controller: Turns reference and motion into tensions.
+        reference: The desired motion.
+        fingertip_force: F, shape (3,), N, base frame.
+    """
+
+    finger: Finger
+    controller: Controller
+    reference: Reference
+    fingertip_force: Array
+
+    @classmethod
+    def from_scenario(
+        cls, scenario: Scenario, controller: Controller | None = None, reference: Reference | None = None
+    ) -> ClosedLoop:
+        """Build the loop that a scenario describes, with a controller or reference of one's own if given."""
+        finger = Finger(scenario.finger)
+        return cls(
+            finger=finger,
+            controller=controller or scenario.build_controller(finger.routing),
+            reference=reference or scenario.build_reference(finger.routing),
+            fingertip_force=np.array(scenario.environment.fingertip_force),
+        )
+
+    def initial_state(self) -> Array:
+        """Return the packed state at rest on the reference, shape (size,)."""
+        return self.finger.rest_state(self.reference.at(0.0).position)
+
+    def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
+        """Return all signals at one time and state, or at times (m,) and states (m, size)."""
+        state = self.finger.layout.unpack(x)
+        reference = self.reference.at(time)
+        control = self.controller.command(time, reference, state.position, state.velocity)
+        command = control.tension[..., : self.finger.routing.actuated]
+        return LoopSignals(reference, control, self.finger.evaluate(x, command, self.fingertip_force))
+
+    def rhs(self, time: float, x: Array) -> Array:
+        """Return x', shape (size,)."""
+        return self.evaluate(time, x).finger.rate
