@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict
 from importlib import metadata
@@ -15,6 +13,7 @@ import xarray as xr
 
 from finger_pin.account import Account, account
 from finger_pin.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.files import replacing
 from finger_pin.integration import Trajectory
 from finger_pin.loading import to_toml
 from finger_pin.routing import Array
@@ -77,25 +76,6 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
 def load_result(path: str | Path) -> xr.Dataset:
     """Read a result that `save` wrote into memory."""
     return xr.load_dataset(path, engine="netcdf4")
-
-
-class replacing:
-    """Context that gives a temporary path beside a file and moves it into place only if all went well."""
-
-    def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
-
-    def __enter__(self) -> str:
-        suffix = self._path.suffix
-        handle, self._temporary = tempfile.mkstemp(dir=self._path.parent, prefix=f".{self._path.stem}-", suffix=suffix)
-        os.close(handle)
-        return self._temporary
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            os.replace(self._temporary, self._path)
-        else:
-            Path(self._temporary).unlink(missing_ok=True)
 
 
 def _signals(loop: ClosedLoop, signals: LoopSignals) -> dict[str, tuple[Any, Array, dict[str, str]]]:

@@ -1,4 +1,4 @@
-"""The tendon layer: friction along the canals (14), (16), delivered tension (12) and the massive passive tendon (13)."""
+"""The tendon layer: friction in the canals (14), (16), delivered tension (12), the massive passive tendon (13)."""
 
 from __future__ import annotations
 
