@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -26,8 +29,8 @@ class InputError(FingerPinError, ValueError):
         self.entry = entry
         self.allowed = allowed
         self.value = value
-        text = "" if value is None else f" = {_short(value)}"
-        super().__init__(f"{entry}{text}: {allowed}")
+        text = "" if value is None else f" = {toml_like(value)}"
+        super().__init__(_one_line(f"{_shorten(entry, 200)}{text}: {allowed}"))
 
 
 class IntegrationError(FingerPinError, RuntimeError):
@@ -64,6 +67,31 @@ class Interrupted(FingerPinError):
         super().__init__(f"interrupted at t = {time:.6g} s")
 
 
-def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
+def toml_like(value: Any) -> str:
+    """Return a value as a person would write it in a TOML file, cut where it is long."""
+    return _shorten(_toml_like(value, 4), 80)
+
+
+def _toml_like(value: Any, depth: int) -> str:
+    if isinstance(value, Mapping):
+        return "{ ... }" if value else "{}"
+    if isinstance(value, list | tuple):
+        if depth == 0:
+            return "[...]"
+        return f"[{', '.join(_toml_like(item, depth - 1) for item in value[:20])}{', ...' if len(value) > 20 else ''}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and value.bit_length() > 256:
+        return f"an integer of {math.ceil(value.bit_length() * math.log10(2.0))} digits"
+    if isinstance(value, str):
+        return json.dumps(value[:200], ensure_ascii=False)
+    return str(value)
+
+
+def _shorten(text: str, size: int) -> str:
+    return text if len(text) <= size else f"{text[: size - 3]}..."
+
+
+def _one_line(text: str) -> str:
+    """Return text with line breaks and other characters that would disturb a terminal spelt out."""
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)

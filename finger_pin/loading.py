@@ -5,21 +5,21 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar, get_args
+from typing import Any
 
 import tomli_w
-from pydantic import BaseModel, ValidationError
 
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
 from finger_pin.scenario import Scenario
-from finger_pin.validation import Description, nearest
+from finger_pin.validation import Description, nearest, validate
 
-_Model = TypeVar("_Model", bound=Description)
 Table = dict[str, Any]
+_LARGEST = 10_000_000
 
 
 def list_fingers() -> dict[str, str]:
@@ -42,9 +42,11 @@ def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) ->
     Raises:
         InputError: Naming the entry that is wrong.
     """
+    overrides = _from_here(overrides or {}, {"finger"})
     table: Table = {"finger": str(name)}
-    _apply({key: value for key, value in (overrides or {}).items() if _root(key, {"finger"})}, table)
-    return _validate(FingerDescription, _resolve_finger(table["finger"], Path()), ("finger",))
+    with _depth_limited("finger"):
+        _apply(overrides, table)
+        return validate(FingerDescription, _resolve_finger(table["finger"], Path()), ("finger",))
 
 
 def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -55,21 +57,23 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
 
     Args:
         name: Such as ``fig6`` or ``my_scenario.toml``.
-        overrides: Values by dotted key, such as ``{"controller.gain": 2.0}``; they win over the file.
+        overrides: Values by dotted key, such as ``{"controller.gain": 2.0}``; they win over the file. Paths among them
+            are relative to the working directory, paths in a file to the file.
 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    table, folder = _read_scenario(str(name), Path(), [])
-    table.setdefault("name", _as_name(Path(str(name)).stem))
-    overrides = dict(overrides or {})
-    # Another finger replaces the old one before entries on top of either are applied.
-    _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
-    if "finger" not in table:
-        raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
-    table["finger"] = _resolve_finger(table["finger"], folder)
-    _apply({key: value for key, value in overrides.items() if _root(key, set(Scenario.model_fields))}, table)
-    return _validate(Scenario, table, ())
+    overrides = _from_here(overrides or {}, set(Scenario.model_fields))
+    with _depth_limited("scenario"):
+        table, folder = _read_scenario(str(name), Path())
+        table.setdefault("name", _as_name(Path(str(name)).stem))
+        # Another finger replaces the old one before entries on top of either are applied.
+        _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
+        if "finger" not in table:
+            raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+        table["finger"] = _resolve_finger(table["finger"], folder)
+        _apply(overrides, table)
+        return validate(Scenario, table, ())
 
 
 def to_toml(description: Description) -> str:
@@ -86,44 +90,65 @@ def _shipped(kind: str) -> dict[str, str]:
 
 
 def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
-    """Return the table of a shipped item or of a file relative to a folder, and the file's folder."""
-    if name.endswith(".toml") or "/" in name or "\\" in name:
-        path = folder / Path(name).expanduser()
-        try:
-            text = path.read_bytes().decode("utf-8")
-        except FileNotFoundError:
-            raise InputError(f"{kind} file {name}", "there is no such file") from None
-        except UnicodeDecodeError:
-            raise InputError(f"{kind} file {name}", "is not a text file in UTF-8") from None
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"{kind} file {name}", f"cannot be read: {reason}") from None
-        folder = path.parent
+    """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
+    if _is_path(name):
+        what, path = f"{kind} file {name}", folder / _expand(name)
+        data = _read_bytes(what, path)
     else:
-        entry = resources.files("finger_pin").joinpath(f"{kind}s/{name}.toml")
-        if not re.fullmatch(r"[A-Za-z0-9_]+", name) or not entry.is_file():
-            names = _shipped(f"{kind}s")
-            near = nearest(name, names)
-            hint = f"; did you mean {near}?" if near else ""
-            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{hint}"
+        what, path = f"{kind} {name}", Path(name)
+        names = _shipped(f"{kind}s")
+        if name not in names:
+            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{_hint(name, names)}"
             raise InputError(kind, allowed, name)
-        text = entry.read_text("utf-8")
+        data = resources.files("finger_pin").joinpath(f"{kind}s/{name}.toml").read_bytes()
     try:
-        return tomllib.loads(text), folder
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{kind} file {name}", f"is not valid TOML: {' '.join(str(error).split())}") from None
+        return tomllib.loads(data.decode("utf-8-sig")), path
+    except UnicodeDecodeError:
+        raise InputError(what, "is not a text file in UTF-8") from None
     except RecursionError:
-        raise InputError(f"{kind} file {name}", "is nested too deeply") from None
+        raise InputError(what, "is nested too deeply") from None
+    except ValueError as error:
+        raise InputError(what, f"is not valid TOML: {error}") from None
 
 
-def _read_scenario(name: str, folder: Path, seen: list[str]) -> tuple[Table, Path]:
-    table, folder = _read("scenario", name, folder)
+def _is_path(name: str) -> bool:
+    return name.endswith(".toml") or "/" in name or "\\" in name
+
+
+def _expand(name: str) -> Path:
+    """Return a path with the home folder in place of ~, or as it is where there is no such home."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def _read_bytes(what: str, path: Path) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            data = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(what, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > _LARGEST:
+        raise InputError(what, f"is larger than {_LARGEST} bytes")
+    return data
+
+
+def _read_scenario(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
+    """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in."""
+    table, path = _read("scenario", name, folder)
+    identity = path.resolve()
+    if identity in seen:
+        raise InputError("extends", "a scenario cannot start from itself", name)
+    folder = path.parent
     if "extends" not in table:
         return table, folder
     base = table.pop("extends")
-    if not isinstance(base, str) or base in seen:
-        raise InputError("extends", "must be the name or path of another scenario, without a circle", base)
-    parent, parent_folder = _read_scenario(base, folder, [*seen, base])
+    if not isinstance(base, str):
+        raise InputError("extends", "must be the name or path of another scenario", base)
+    parent, parent_folder = _read_scenario(base, folder, (*seen, identity))
     parent.pop("name", None)
     if "finger" in parent:
         parent["finger"] = _resolve_finger(parent["finger"], parent_folder)
@@ -132,20 +157,23 @@ def _read_scenario(name: str, folder: Path, seen: list[str]) -> tuple[Table, Pat
     return _merge(parent, table), folder
 
 
-def _resolve_finger(finger: Any, folder: Path, seen: tuple[str, ...] = ()) -> Any:
+def _resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
     """Return the table of a finger given by name, by path, or as a table that may start from a base."""
     if isinstance(finger, str):
-        if finger in seen or len(seen) > 20:
+        table, path = _read("finger", finger, folder)
+        identity = path.resolve()
+        if identity in seen:
             raise InputError("finger.base", "a finger cannot start from itself", finger)
-        table, folder = _read("finger", finger, folder)
         table.setdefault("name", _as_name(Path(finger).stem))
-        return _resolve_finger(table, folder, (*seen, finger))
+        return _resolve_finger(table, path.parent, (*seen, identity))
     if isinstance(finger, dict) and "base" in finger:
         rest = dict(finger)
         base = rest.pop("base")
         if not isinstance(base, str):
             raise InputError("finger.base", "must be the name or path of a finger", base)
         return _merge(_resolve_finger(base, folder, seen), rest)
+    if not isinstance(finger, dict):
+        raise InputError("finger", "must be the name of a finger, the path of a .toml file, or a table", finger)
     return finger
 
 
@@ -171,84 +199,38 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
         inner[last] = copy.deepcopy(value)
 
 
-def _root(key: str, allowed: set[str]) -> bool:
-    first = key.split(".")[0]
-    if first in allowed:
-        return True
-    near = nearest(first, allowed)
-    hint = f"; did you mean {'.'.join([near, *key.split('.')[1:]])}?" if near else ""
-    raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
+def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
+    """Return overrides whose keys begin with an allowed one, with the path of a finger's file made absolute."""
+    checked: Table = {}
+    for key, value in overrides.items():
+        first, *rest = key.split(".")
+        if first not in allowed:
+            near = nearest(first, allowed)
+            hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
+            raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
+        if key in ("finger", "finger.base"):
+            value = _absolute(value)
+        if key == "finger" and isinstance(value, dict) and "base" in value:
+            value = {**value, "base": _absolute(value["base"])}
+        checked[key] = value
+    return checked
 
 
-def _validate(model: type[_Model], table: Any, prefix: tuple[str, ...]) -> _Model:
+def _absolute(finger: Any) -> Any:
+    return str(_expand(finger).absolute()) if isinstance(finger, str) and _is_path(finger) else finger
+
+
+@contextmanager
+def _depth_limited(what: str) -> Iterator[None]:
     try:
-        return model.model_validate(table)
-    except ValidationError as error:
-        _translate(model, error, prefix)
+        yield
+    except RecursionError:
+        raise InputError(what, "is nested too deeply") from None
 
 
-def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str, ...]) -> NoReturn:
-    # A misspelt key also makes the right one missing: the cause comes first.
-    found = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
-    location = [str(part) for part in found["loc"] if part != "[key]"]
-    entry = ".".join([*prefix, *location])
-    given = found["input"]
-    value = None if isinstance(given, dict) else given
-    if found["type"] == "entry":
-        context = found["ctx"]
-        below = str(context["entry"])
-        entry = f"{entry}{'' if below.startswith('[') or not below or not entry else '.'}{below}"
-        raise InputError(entry, context["allowed"], context["value"]) from None
-    if found["type"] == "extra_forbidden":
-        names = sorted(_fields(model, location[:-1]))
-        near = nearest(location[-1], names)
-        hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
-        raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
-    if found["type"] == "missing":
-        raise InputError(entry, f"is missing: {_document(model, location)}") from None
-    message = found["msg"]
-    raise InputError(entry, _MESSAGES.get(found["type"], message[:1].lower() + message[1:]), value) from None
-
-
-_MESSAGES = {
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
-    "dict_type": "must be a table",
-    "string_type": "must be a string",
-    "bool_type": "must be true or false",
-    "int_type": "must be a whole number",
-    "string_pattern_mismatch": "names are letters, digits and underscores, and begin with a letter",
-    "string_too_long": "is too long",
-    "too_short": "must have at least one entry",
-    "greater_than_equal": "must be at least 0",
-}
-
-
-def _fields(model: type[BaseModel], location: Iterable[str]) -> list[str]:
-    """Return the field names of the model found by following a location through nested models and tables."""
-    current: Any = model
-    for part in location:
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            current = _inner(current.model_fields[part].annotation)
-        elif isinstance(current, dict):
-            current = current["values"]
-    return list(current.model_fields) if isinstance(current, type) and issubclass(current, BaseModel) else []
-
-
-def _inner(annotation: Any) -> Any:
-    """Return the model behind an annotation; for a table of models, a dictionary that says so."""
-    arguments = get_args(annotation)
-    if getattr(annotation, "__origin__", None) is dict:
-        return {"values": _inner(arguments[1])}
-    models = [each for each in (annotation, *arguments) if isinstance(each, type) and issubclass(each, BaseModel)]
-    return models[0] if models else annotation
-
-
-def _document(model: type[BaseModel], location: list[str]) -> str:
-    owner: Any = model
-    for part in location[:-1]:
-        owner = _inner(owner.model_fields[part].annotation) if not isinstance(owner, dict) else owner["values"]
-    return str(owner.model_fields[location[-1]].description or "a table")
+def _hint(name: Any, names: Iterable[str]) -> str:
+    near = nearest(name, names)
+    return f"; did you mean {near}?" if near else ""
 
 
 def _as_table(value: Any) -> Table:

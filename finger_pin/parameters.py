@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.exceptions import toml_like
 from finger_pin.validation import (
     Description,
     Name,
@@ -194,7 +195,8 @@ class JointFriction(Description):
         low = self.coulomb if isinstance(self.coulomb, tuple) else (self.coulomb,) * size
         high = self.stiction if isinstance(self.stiction, tuple) else (self.stiction,) * size
         if any(kinetic > static for kinetic, static in zip(low, high, strict=True)):
-            raise problem("stiction", f"must be at least the Coulomb coefficient {self.coulomb}", self.stiction)
+            allowed = f"must be at least the Coulomb coefficient {toml_like(self.coulomb)}"
+            raise problem("stiction", allowed, self.stiction)
         return self
 
 
@@ -223,6 +225,8 @@ class FingerDescription(Description):
 
     Lists of numbers follow the order of the joints, of all tendons, or of the passive tendons.
     """
+
+    file_keys = ("base",)
 
     name: Name = Field(description="Also the name of the robot in the URDF.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")

@@ -97,6 +97,8 @@ class SimulationSettings(Description):
 class Scenario(Description):
     """Everything that determines a simulation."""
 
+    file_keys = ("extends",)
+
     name: Name = Field(description="Names the folder of results.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     finger: FingerDescription

@@ -9,21 +9,29 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, NoReturn, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
 from pydantic_core import PydanticCustomError
+
+from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 Numbers = float | tuple[float, ...]
+_Model = TypeVar("_Model", bound="Description")
 
 
 class Description(BaseModel):
-    """Base of all descriptions: frozen, no unknown entries, finite numbers only."""
+    """Base of all descriptions: frozen, no unknown entries, finite numbers only.
+
+    Attributes:
+        file_keys: Further keys of its table in a file, which loading resolves.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    file_keys: ClassVar[tuple[str, ...]] = ()
 
 
 def problem(entry: str, allowed: str, value: Any = None) -> PydanticCustomError:
@@ -34,7 +42,14 @@ def problem(entry: str, allowed: str, value: Any = None) -> PydanticCustomError:
         allowed: What would be accepted.
         value: What was given.
     """
-    return PydanticCustomError("entry", "{allowed}", {"entry": entry, "allowed": allowed, "value": value})
+    return PydanticCustomError("entry", "{allowed}", {"entry": entry, "allowed": allowed, "value": _Opaque(value)})
+
+
+class _Opaque:
+    """Holds a value that pydantic shall not format: it cannot write integers of thousands of digits."""
+
+    def __init__(self, content: Any) -> None:
+        self.content = content
 
 
 def quantity(default: Any, *, unit: str, source: str, doc: str) -> Any:
@@ -113,8 +128,91 @@ def expand(value: Numbers, size: int) -> NDArray[np.float64]:
 def check_size(value: Numbers, names: Sequence[str], entry: str, what: str) -> None:
     """Raise the error of an entry whose list does not have one number per name."""
     if isinstance(value, tuple) and len(value) != len(names):
-        listed = ", ".join(names) if names else "none"
-        raise problem(entry, f"must be one number or one per {what}, {len(names)} numbers ({listed})", value)
+        listed = f"a list of {len(names)}, one per {what} ({', '.join(names)})" if names else f"left out: no {what}"
+        raise problem(entry, f"must be one number, or {listed}", value)
+
+
+def validate(model: type[_Model], table: Any, prefix: tuple[str, ...]) -> _Model:
+    """Return the description that a table holds.
+
+    Args:
+        model: Which description.
+        table: Keys and values as TOML has them.
+        prefix: Where the table lies in the whole input, for messages.
+
+    Raises:
+        InputError: Naming the first entry that is wrong.
+    """
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        _translate(model, error, prefix)
+
+
+def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str, ...]) -> NoReturn:
+    # A misspelt key also makes the right one missing: the cause comes first.
+    found = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+    location = [str(part) for part in found["loc"] if part != "[key]"]
+    entry = ".".join([*prefix, *location])
+    given = found["input"]
+    value = None if isinstance(given, dict) else given
+    if found["type"] == "entry":
+        context = found["ctx"]
+        below = str(context["entry"])
+        entry = f"{entry}{'' if below.startswith('[') or not below or not entry else '.'}{below}"
+        raise InputError(entry, context["allowed"], context["value"].content) from None
+    if found["type"] == "extra_forbidden":
+        names = sorted(_fields(model, location[:-1]))
+        near = nearest(location[-1], names)
+        hint = f"; did you mean {'.'.join([*prefix, *location[:-1], near])}?" if near else ""
+        raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
+    if found["type"] == "missing":
+        raise InputError(entry, f"is missing: {_document(model, location)}") from None
+    message = found["msg"]
+    raise InputError(entry, _MESSAGES.get(found["type"], message[:1].lower() + message[1:]), value) from None
+
+
+_MESSAGES = {
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "dict_type": "must be a table",
+    "string_type": "must be a string",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+    "string_pattern_mismatch": "names are letters, digits and underscores, and begin with a letter",
+    "string_too_long": "is too long",
+    "too_short": "must have at least one entry",
+    "greater_than_equal": "must be at least 0",
+}
+
+
+def _fields(model: type[BaseModel], location: Iterable[str]) -> list[str]:
+    """Return the field names of the model found by following a location through nested models and tables."""
+    current: Any = model
+    for part in location:
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            current = _inner(current.model_fields[part].annotation)
+        elif isinstance(current, dict):
+            current = current["values"]
+    if isinstance(current, type) and issubclass(current, Description):
+        return [*current.model_fields, *current.file_keys]
+    return []
+
+
+def _inner(annotation: Any) -> Any:
+    """Return the model behind an annotation; for a table of models, a dictionary that says so."""
+    arguments = get_args(annotation)
+    if getattr(annotation, "__origin__", None) is dict:
+        return {"values": _inner(arguments[1])}
+    models = [each for each in (annotation, *arguments) if isinstance(each, type) and issubclass(each, BaseModel)]
+    return models[0] if models else annotation
+
+
+def _document(model: type[BaseModel], location: list[str]) -> str:
+    owner: Any = model
+    for part in location[:-1]:
+        owner = _inner(owner.model_fields[part].annotation) if not isinstance(owner, dict) else owner["values"]
+    return str(owner.model_fields[location[-1]].description or "a table")
 
 
 def _checker(low: float, high: float, above: bool, hint: str) -> Callable[[Any, str], float]:
