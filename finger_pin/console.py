@@ -1,0 +1,72 @@
+"""A simulation at a terminal: signals that ask it to stop, a progress bar, and output that may have lost its reader."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Self
+
+
+class Interrupts:
+    """SIGINT and SIGTERM, while entered.
+
+    In a patient phase the first of them sets `requested`. Every other one raises KeyboardInterrupt.
+
+    Attributes:
+        requested: Whether an end has been asked for; to be looked at in patient phases.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a request."""
+        self.requested = False
+        self._patient = False
+
+    @contextmanager
+    def patient(self) -> Iterator[None]:
+        """Enter a patient phase."""
+        self._patient = True
+        try:
+            yield
+        finally:
+            self._patient = False
+
+    def __enter__(self) -> Self:
+        """Catch the signals."""
+        self._former = {number: signal.signal(number, self._catch) for number in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Leave the signals as they were."""
+        for number, handler in self._former.items():
+            signal.signal(number, handler)
+
+    def _catch(self, number: int, frame: FrameType | None) -> None:
+        if self.requested or not self._patient:
+            raise KeyboardInterrupt
+        self.requested = True
+
+
+@contextmanager
+def progress_bar(duration: float) -> Iterator[Callable[[float], None]]:
+    """Show a bar on standard error, and give a function that takes the simulated time, s, out of a duration, s."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    text = TextColumn("{task.completed:.3f} of {task.total:g} s simulated")
+    with Progress(BarColumn(), text, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=duration)
+        yield lambda time: bar.update(task, completed=time)
+
+
+def print_text(text: str) -> None:
+    """Print to standard output, whose reader may have gone and whose encoding may lack characters."""
+    encoding = sys.stdout.encoding or "utf-8"
+    try:
+        print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
+    except BrokenPipeError:
+        # Python flushes standard output once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,199 @@
+"""Simulate a scenario, write its results, and print a summary."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tomllib
+from collections.abc import Callable
+from contextlib import nullcontext
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.console import Interrupts
+    from finger_pin.results import ResultFolder
+    from finger_pin.scenario import Scenario
+
+DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+# A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
+BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and exit."""
+        complain(message)
+        self.exit(WRONG_INPUT)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Do what a command line says; return the exit code."""
+    options = parse(arguments)
+    try:
+        # Importing the package takes a second or two: what is wrong with the options is told before.
+        from finger_pin import console
+
+        if options.list:
+            console.print_text(listing())
+            return DONE
+        with console.Interrupts() as interrupts:
+            return run(options, interrupts)
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return INTERRUPTED
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Parse a command line, or exit."""
+    parser = Parser(prog="simulate.py", description=__doc__, allow_abbrev=False)
+    add: Callable[..., Any] = parser.add_argument
+    flag = argparse.BooleanOptionalAction
+    add("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path of a .toml file; default fig6")
+    add("--set", action="append", default=[], type=override, metavar="KEY=VALUE", help="override an entry; repeatable")
+    for name, key, metavar in (("--duration", "simulation.duration", "S"), ("--method", "simulation.method", "NAME")):
+        add(name, action="append", dest="set", type=shorthand(key), metavar=metavar, help=f"override {key}")
+    add("--output", type=Path, metavar="DIR", help="where results go; default results/<scenario>")
+    add("--view", action=flag, default=False, help="open the viewer and play the result")
+    add("--figures", action=flag, default=True, help="draw the figures")
+    add("--quiet", action="store_true", help="print errors only")
+    add("--list", action="store_true", help="list scenarios, fingers and methods, and exit")
+    options, surplus = parser.parse_known_args(arguments)
+    if surplus:
+        wrong = next((each for each in surplus if each.startswith("-")), surplus[0])
+        known = [name for action in parser._actions for name in action.option_strings]
+        near = get_close_matches(wrong.split("=")[0], known, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        parser.error(f"{wrong}: no such argument; there are one SCENARIO, {', '.join(known)}{hint}")
+    return options
+
+
+def override(text: str) -> tuple[str, Any]:
+    """Parse KEY=VALUE."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise argparse.ArgumentTypeError(f"{text}: must be KEY=VALUE, such as controller.gain=2")
+    return shorthand(key.strip())(value)
+
+
+def shorthand(key: str) -> Callable[[str], tuple[str, Any]]:
+    """Return a parser of the VALUE of a key: TOML, or a string without quotes."""
+
+    def parse_value(text: str) -> tuple[str, Any]:
+        text = text.strip()
+        try:
+            table = tomllib.loads(f"value = {text}")
+            if table.keys() == {"value"}:
+                return key, table["value"]
+        except (ValueError, RecursionError):
+            if BARE_STRING.fullmatch(text):
+                return key, text
+        raise argparse.ArgumentTypeError(f"{key} = {text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
+
+    return parse_value
+
+
+def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
+    """Load, simulate, write, show; return the exit code."""
+    from finger_pin.console import print_text
+    from finger_pin.exceptions import InputError
+    from finger_pin.loading import load_scenario
+    from finger_pin.results import ResultFolder
+    from finger_pin.summary import summarize
+
+    try:
+        scenario = load_scenario(options.scenario, dict(options.set))
+        output = options.output or Path("results", scenario.name)
+        with ResultFolder(output) as folder:
+            code, result, problem = simulate(scenario, interrupts, options.quiet)
+            if result is None:
+                complain(f"{problem}; nothing was computed")
+                return code
+            with interrupts.patient():
+                folder.write(result)
+            if interrupts.requested:
+                # Who interrupts wants an end soon: the data are kept, the views are not drawn.
+                code, problem = INTERRUPTED, problem or "interrupted"
+            else:
+                drawn, trouble = draw(result, folder, options.figures)
+                code, problem = code or drawn, "; ".join(filter(None, (problem, trouble)))
+            with interrupts.patient():
+                folder.publish()
+    except InputError as error:
+        complain(str(error))
+        return WRONG_INPUT
+    except OSError as error:
+        complain(f"the results cannot be written, earlier ones are as they were: {error}")
+        return NOT_WRITTEN
+    if problem:
+        complain(f"{problem}; what was computed is in {output}")
+    if not options.quiet:
+        print_text(f"{summarize(result)}\n\nResults are in {output}")
+    if options.view and code == DONE:
+        from finger_pin.viewer import view
+
+        view(result)
+    return code
+
+
+def simulate(scenario: Scenario, interrupts: Interrupts, quiet: bool) -> tuple[int, xr.Dataset | None, str]:
+    """Return the exit code, the result as far as it goes, and what went wrong if anything did."""
+    from finger_pin.console import progress_bar
+    from finger_pin.exceptions import IntegrationError, Interrupted
+    from finger_pin.simulation import simulate
+
+    bar = progress_bar(scenario.simulation.duration) if sys.stderr.isatty() and not quiet else nullcontext()
+    with bar as progress, interrupts.patient():
+        try:
+            return DONE, simulate(scenario, progress=progress, stop=lambda: interrupts.requested), ""
+        except IntegrationError as error:
+            return FAILED, error.result, str(error)
+        except Interrupted as error:
+            return INTERRUPTED, error.result, str(error)
+
+
+def draw(result: xr.Dataset, folder: ResultFolder, figures: bool) -> tuple[int, str]:
+    """Draw animation and figures, all or none; return an exit code and what went wrong if anything did."""
+    try:
+        from finger_pin.viewer import write_animation
+
+        write_animation(result, folder.stage / "animation.html")
+        if figures:
+            from finger_pin.plots import draw_all
+
+            draw_all(result, folder.stage / "figures")
+    except KeyboardInterrupt:
+        folder.discard_views()
+        return INTERRUPTED, "interrupted"
+    except OSError:
+        raise
+    except Exception as error:
+        # A result is worth more than its pictures.
+        folder.discard_views()
+        return NOT_WRITTEN, f"animation and figures cannot be drawn: {type(error).__name__}: {error}"
+    return DONE, ""
+
+
+def listing() -> str:
+    """Return the names that the command line takes, with a line about each."""
+    from finger_pin.loading import list_fingers, list_scenarios
+    from finger_pin.scenario import METHODS
+
+    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Methods": dict.fromkeys(METHODS, "")}
+    rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}
+    return "\n\n".join("\n".join([title, *lines]) for title, lines in rows.items())
+
+
+def complain(message: str) -> None:
+    """Print one line on standard error."""
+    print("simulate.py:", "".join(c if c.isprintable() else repr(c)[1:-1] for c in message), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
