@@ -511,6 +511,15 @@ def test_a_reader_that_has_gone_is_no_error(here):
     process.stderr.close()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_output_that_cannot_be_printed_is_told_in_one_line_and_results_are_kept(run, here, quick, monkeypatch):
+    with open("/dev/full", "w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        code, _, lines = run("s.toml", "--output", "out")
+    assert (code, lines) == (0, ["standard output cannot be written: No space left on device"])
+    assert set(contents(here / "out")) >= ALL
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_ctrl_c_in_a_real_run_ends_it_with_a_trajectory(here):
     with subprocess_of("s.toml", "--duration", "1000", "--set", "simulation.sample_rate=100", folder=here) as process:
