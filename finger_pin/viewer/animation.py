@@ -1,0 +1,105 @@
+"""A result as a page that plays it."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from finger_pin.exceptions import InputError
+from finger_pin.files import replacing
+from finger_pin.parameters import FingerDescription
+from finger_pin.routing import Array
+from finger_pin.viewer.page import render
+from finger_pin.viewer.scene import Scene
+
+Indices = NDArray[np.intp]
+
+#: Frames per second of motion, and most frames of one page: a longer motion gets fewer per second.
+FRAME_RATE, MOST_FRAMES = 60.0, 3000
+#: Positions out of which the camera's view is found.
+_POSITIONS_IN_VIEW = 40
+
+
+def write_animation(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a result as one HTML file that plays it, without a network.
+
+    The file appears whole or not at all; an earlier one is replaced.
+
+    Args:
+        result: What `simulate` returned or saved.
+        path: Of the file.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        InputError: If the result lacks something that is shown.
+    """
+    target, text = Path(path), animation_page(result)
+    with replacing(target) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8", newline="\n")
+    return target
+
+
+def animation_page(result: xr.Dataset) -> str:
+    """Return the page that plays a result."""
+    scenario = _scenario(result)
+    scene = Scene(FingerDescription.model_validate(scenario["finger"]))
+    time = _variable(result, "time")
+    if len(time) == 0:
+        raise InputError("result.time", "must have at least one sample")
+    frames = _frame_indices(time)
+    time = time[frames]
+    position = _variable(result, "joint_position")[frames]
+    tension = strand_tensions(scene, result, frames)
+    for name, values in (("joint_position", position), ("tendon_tension", tension)):
+        if not np.isfinite(values).all():
+            raise InputError(f"result.{name}", "must be finite")
+    in_view = position[:: max(1, len(position) // _POSITIONS_IN_VIEW)]
+    title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
+    header = scene.header(title, in_view, float(tension.max()), live=False)
+    return render({**header, "chunks": [scene.chunk(time, position, tension)]})
+
+
+def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
+    """Return the tension of every strand at some samples of a result, shape (m, s), N.
+
+    The proximal half of a passive tendon has the result's ``passive_tension_proximal``.
+    """
+    description = scene.geometry.description
+    tension = _variable(result, "tendon_tension")[frames]
+    actuated, passive = len(description.actuated_names), len(description.passive_names)
+    if not passive:
+        return tension
+    distal = tension[:, actuated:]
+    proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
+    halves = np.stack([proximal, distal], axis=-1).reshape(len(frames), 2 * passive)
+    return np.concatenate([tension[:, :actuated], halves], axis=1)
+
+
+def _frame_indices(time: Array) -> Indices:
+    # Samples as they are, none between them: a frame shows what was computed.
+    wanted = int(np.clip(round((time[-1] - time[0]) * FRAME_RATE) + 1, 1, MOST_FRAMES))
+    return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
+
+
+def _variable(result: xr.Dataset, name: str) -> Array:
+    if name not in result.variables:
+        raise InputError(f"result.{name}", "is missing; the viewer shows what simulate returned")
+    return np.asarray(result[name].values, dtype=float)
+
+
+def _scenario(result: xr.Dataset) -> dict[str, Any]:
+    try:
+        scenario = tomllib.loads(result.attrs["scenario"])
+    except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
+        raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
+    if not isinstance(scenario.get("finger"), dict):
+        raise InputError("result.attrs.scenario", "must hold the resolved table [finger]")
+    return scenario

@@ -1,0 +1,208 @@
+"use strict";
+
+// Time, buttons and read-outs. Also the page's interface to scripts: `fingerPlayer`.
+class Player {
+  constructor(config) {
+    this.config = config;
+    this.frames = new Frames(config);
+    this.viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+    this.scene = new FingerScene(this.viewer, config, this.frames);
+    this.scale = config.tensionScale;
+    this.time = 0;
+    this.speed = 1;
+    this.playing = false;
+    this.following = config.live;
+    this.sharpness = 1;
+    this.due = this.started = 0;
+    this.build();
+    for (const chunk of config.chunks) this.append(chunk);
+    this.scene.frame("oblique");
+    this.seek(this.frames.start);
+    if (config.live) this.listen(); else this.play();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  append(chunk) {
+    const tensions = this.frames.columns.tension;
+    const known = tensions.count;
+    this.frames.append(chunk);
+    for (const tension of tensions.data.subarray(known * tensions.width, tensions.count * tensions.width)) {
+      while (tension > this.scale) this.scale = nextScale(this.scale);
+    }
+    if (this.drawnScale !== this.scale) this.drawLegend();
+    this.scene.trace.rebuild();
+    this.element.scrub.min = this.frames.start;
+    this.element.scrub.max = this.frames.end;
+  }
+
+  // A simulation in progress sends its frames; the newest is shown until somebody scrubs or pauses.
+  listen() {
+    this.element.live.hidden = false;
+    const source = new EventSource("frames");
+    source.onmessage = (message) => {
+      this.append(JSON.parse(message.data));
+      this.seek(this.following ? this.frames.end : this.time);
+    };
+    source.addEventListener("end", () => {
+      source.close();
+      this.following = false;
+      this.element.live.hidden = true;
+    });
+  }
+
+  tick(now) {
+    this.advance(now);
+    this.scene.placeLabels();
+    requestAnimationFrame((later) => this.tick(later));
+  }
+
+  // `now` in ms, of the browser's clock.
+  advance(now) {
+    if (this.started) this.pace(now, now - this.started);
+    this.started = 0;
+    if (!this.playing || now < this.due) return;
+    const next = this.time + (this.speed * (now - this.shown)) / 1000;
+    this.shown = this.started = now;
+    if (next <= this.frames.end) this.seek(next);
+    else if (this.element.loop.checked) this.seek(this.frames.start);
+    else { this.seek(this.frames.end); this.pause(); }
+  }
+
+  // Without a graphics processor a picture takes long. Then rest after each, so that buttons react, and draw coarser
+  // pictures while playing.
+  pace(now, cost) {
+    this.due = cost > 50 ? now + cost : 0;
+    if (cost > 80 && this.playing && this.sharpness > 0.5) this.sharpen(0.8 * this.sharpness);
+  }
+
+  sharpen(part) {
+    if (part === this.sharpness) return;
+    this.sharpness = part;
+    this.viewer.renderer.setPixelRatio(part * window.devicePixelRatio);
+    this.viewer.set_3d_pane_size();
+  }
+
+  play() {
+    this.following = false;
+    if (this.time >= this.frames.end) this.seek(this.frames.start);
+    this.shown = performance.now();
+    this.playing = true;
+    this.refresh();
+  }
+
+  pause() {
+    this.following = this.playing = false;
+    this.sharpen(1);
+    this.refresh();
+  }
+
+  follow() {
+    this.pause();
+    this.following = true;
+    this.seek(this.frames.end);
+  }
+
+  seek(time) {
+    if (!this.frames.count) return;
+    this.time = Math.min(Math.max(time, this.frames.start), this.frames.end);
+    const place = this.frames.locate(this.time);
+    const tensions = this.frames.mix("tension", place);
+    const colours = Array.from(tensions, (tension) => {
+      const loose = looseness(tension, this.config.slackTension);
+      return tensionColour(tension, this.scale).map((value, i) => value + loose * (LOOSE[i] - value));
+    });
+    this.scene.show(place, colours);
+    this.readOut(tensions, colours, this.frames.mix("joint", place));
+    this.refresh();
+  }
+
+  readOut(tensions, colours, angles) {
+    this.rows.forEach(({ bar, value }, i) => {
+      const slack = looseness(tensions[i], this.config.slackTension) > 0.5;
+      bar.style.width = `${Math.min(100, (100 * tensions[i]) / this.scale)}%`;
+      bar.style.background = css(colours[i]);
+      value.textContent = slack ? "slack" : `${tensions[i].toFixed(2)} N`;
+      value.classList.toggle("slack", slack);
+    });
+    this.angles.forEach((cell, i) => { cell.textContent = `${((180 / Math.PI) * angles[i]).toFixed(1)}°`; });
+  }
+
+  refresh() {
+    const { play, scrub, clock, live } = this.element;
+    play.classList.toggle("playing", this.playing);
+    play.setAttribute("aria-label", this.playing ? "Pause" : "Play");
+    scrub.value = this.time;
+    clock.textContent = `${this.time.toFixed(2)} / ${this.frames.end.toFixed(2)} s`;
+    live.classList.toggle("on", this.following);
+  }
+
+  build() {
+    const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
+    this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
+    document.getElementById("title").textContent = this.config.title;
+    document.querySelector(".grid-note").textContent = ` · grid ${1000 * this.config.grid} mm`;
+    this.rows = this.config.strands.map((name) => {
+      const row = document.getElementById("tensions").insertRow();
+      Object.assign(row.insertCell(), { className: "name", textContent: name, title: name });
+      const gauge = Object.assign(row.insertCell(), { className: "gauge", innerHTML: "<div><div></div></div>" });
+      return { bar: gauge.firstChild.firstChild, value: Object.assign(row.insertCell(), { className: "value" }) };
+    });
+    this.angles = this.config.joints.map((name) => {
+      const row = document.getElementById("joints").insertRow();
+      Object.assign(row.insertCell(), { className: "name", textContent: name, title: name });
+      return Object.assign(row.insertCell(), { className: "value" });
+    });
+    const { play, restart, scrub, speed, live } = this.element;
+    play.onclick = () => (this.playing ? this.pause() : this.play());
+    restart.onclick = () => { this.following = false; this.seek(this.frames.start); };
+    scrub.oninput = () => {
+      const wanted = Number(scrub.value);
+      this.pause();
+      this.seek(wanted);
+    };
+    speed.onchange = () => { this.speed = Number(speed.value); };
+    live.onclick = () => this.follow();
+    for (const button of document.querySelectorAll("[data-view]")) {
+      button.onclick = () => this.scene.frame(button.dataset.view);
+    }
+    window.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  key(event) {
+    if (event.target.matches("select, input") || event.ctrlKey || event.metaKey || event.altKey) return;
+    const step = { ArrowLeft: -0.05, ArrowRight: 0.05 }[event.key];
+    const view = { 1: "oblique", 2: "side", 3: "top" }[event.key];
+    if (event.key === " ") this.element.play.onclick();
+    else if (event.key === "Home") this.element.restart.onclick();
+    else if (step) { this.pause(); this.seek(this.time + step); }
+    else if (view) this.scene.frame(view);
+    else return;
+    event.preventDefault();
+  }
+
+  drawLegend() {
+    const { legend, ticks } = this.element;
+    const pen = legend.getContext("2d");
+    for (let x = 0; x < legend.width; x++) {
+      pen.fillStyle = css(tensionColour((x / (legend.width - 1)) * this.scale, this.scale));
+      pen.fillRect(x, 0, 1, 1);
+    }
+    ticks.replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((part) => {
+      const tick = document.createElement("span");
+      tick.style.left = `${100 * part}%`;
+      tick.textContent = `${Number((part * this.scale).toPrecision(3))}${part === 1 ? " N" : ""}`;
+      return tick;
+    }));
+    this.drawnScale = this.scale;
+  }
+}
+
+const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(",")})`;
+
+// The upper end of the legend goes in steps whose quarters are short numbers.
+function nextScale(scale) {
+  const decade = 10 ** Math.floor(Math.log10(scale * 1.0001));
+  return decade * [2, 4, 6, 8, 10].find((step) => step * decade > scale * 1.0001);
+}
+
+window.fingerPlayer = new Player(JSON.parse(document.getElementById("animation").textContent));
