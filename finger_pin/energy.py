@@ -40,7 +40,7 @@ class Energies:
 class Powers:
     """What enters (actuators, fingertip force) and what is lost (the rest), shape (...,), W.
 
-    Slack is the difference that cutting a tension at zero makes: (f^a - f^f - f) v.
+    Slack is the difference that cutting a tension at zero makes: (f^a - f^f) v where f = 0.
     """
 
     actuators: Array
@@ -91,5 +91,6 @@ def powers(finger: Finger, signals: FingerSignals) -> Powers:
         limiter=np.sum(
             limiter_loss(signals.limiter_torque, signals.limiter_depth, state.velocity, limiter.stiffness), axis=-1
         ),
-        slack=np.sum((signals.command - loss - delivered) * pulled, axis=-1),
+        # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
+        slack=np.sum(np.where(delivered > 0.0, 0.0, (signals.command - loss) * pulled), axis=-1),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,7 @@ class Finger:
         joints: Mapping[str, str],
         tip_frame: str,
         configuration: Array | None = None,
+        base_axis: Sequence[float] = (1.0, 0.0, 0.0),
     ) -> Finger:
         """Route tendons on some joints of any Pinocchio model; its other joints are locked.
 
@@ -101,9 +102,11 @@ class Finger:
             joints: For every joint of the description, in the model's order, the name of the model's joint.
             tip_frame: Frame of the fingertip in the model.
             configuration: Where the other joints are locked, shape (nq,); neutral by default.
+            base_axis: e_1 of (17), the unit vector along which the tendons run at the base; model's base frame.
 
         Raises:
-            InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates.
+            InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates,
+                or the configuration has the wrong size.
         """
         for name in description.joints:
             if name not in joints:
@@ -116,10 +119,12 @@ class Finger:
         if indices != sorted(set(indices)):
             raise InputError("joints", "must follow the model's order, each joint once", chosen)
         locked = [index for index in range(1, model.njoints) if index not in indices]
-        neutral = pin.neutral(model) if configuration is None else configuration
-        reduced = pin.buildReducedModel(model, locked, neutral)
+        posture = pin.neutral(model) if configuration is None else np.asarray(configuration, dtype=float)
+        if posture.shape != (model.nq,):
+            raise InputError("configuration", f"must be {model.nq} numbers, one per coordinate of the model", posture)
+        reduced = pin.buildReducedModel(model, locked, posture)
         reduced.gravity.linear[:] = description.gravity
-        return cls(description, RigidBody(reduced, tip_frame))
+        return cls(description, RigidBody(reduced, tip_frame, base_axis))
 
     @property
     def coupling(self) -> Array:

@@ -46,28 +46,7 @@ class Trajectory:
     interrupted: bool = False
 
 
-class _Monitor:
-    """Sees every accepted step: reports progress, and ends the integration inside a step when asked to.
-
-    It is given to solve_ivp as an event function, the only place where solve_ivp calls back once a step.
-    """
-
-    terminal = True
-
-    def __init__(self, progress: Progress | None, stop: Stop | None) -> None:
-        self.progress = progress
-        self.stop = stop
-        self.reached = 0.0
-        self.stop_time = np.inf
-
-    def __call__(self, instant: float, x: Array) -> float:
-        if instant > self.reached and self.stop_time == np.inf:
-            if self.stop is not None and self.stop():
-                self.stop_time = 0.5 * (self.reached + instant)
-            self.reached = instant
-            if self.progress is not None:
-                self.progress(instant)
-        return 1.0 if self.stop_time == np.inf else self.stop_time - instant
+_SOLVERS = {"Radau": scipy.integrate.Radau, "BDF": scipy.integrate.BDF, "LSODA": scipy.integrate.LSODA}
 
 
 def integrate(
@@ -94,51 +73,61 @@ def integrate(
         stop: Asked after every step; true ends the integration there.
     """
     began = time.perf_counter()
-    monitor = _Monitor(progress, stop)
-    reason = ""
-    try:
-        solution = _solve(rhs, start, duration, method, rtol, atol, monitor)
-    except (ValueError, scipy.linalg.LinAlgError) as error:
-        # Non-finite numbers in scipy's linear algebra: repeat up to the last good step to keep what was computed.
-        reason = f"the state or its Jacobian is not finite ({error})"
-        solution = _solve(rhs, start, monitor.reached, method, rtol, atol, _Monitor(None, None))
-    if solution.status == -1:
-        reason = str(solution.message)
-    statistics = Statistics(
-        steps=len(solution.t) - 1,
-        evaluations=int(solution.nfev),
-        jacobians=int(solution.njev),
-        factorisations=int(solution.nlu),
-        wall_time=time.perf_counter() - began,
-    )
-    dense = solution.sol
-    return Trajectory(
-        breakpoints=solution.t,
-        interpolate=lambda times: np.asarray(dense(times).T),
-        statistics=statistics,
-        failure=reason,
-        interrupted=solution.status == 1,
-    )
-
-
-def _solve(
-    rhs: Callable[[float, Array], Array],
-    start: Array,
-    duration: float,
-    method: str,
-    rtol: float,
-    atol: Array,
-    monitor: _Monitor,
-) -> scipy.integrate._ivp.ivp.OdeResult:
+    system = _System(rhs)
+    times, pieces, reason, interrupted = [0.0], [], "", False
+    solver = None
     # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
     with np.errstate(over="ignore", invalid="ignore"):
-        return scipy.integrate.solve_ivp(
-            rhs,
-            (0.0, duration),
-            start,
-            method=method,
-            rtol=rtol,
-            atol=atol,
-            dense_output=True,
-            events=monitor,
-        )
+        try:
+            solver = _SOLVERS[method](system, 0.0, start, duration, rtol=rtol, atol=atol)
+            while solver.status == "running" and not (reason or interrupted):
+                message = solver.step()
+                if solver.status == "failed":
+                    reason = str(message)
+                elif not np.all(np.isfinite(solver.y)):
+                    reason = "the state is not finite"
+                elif solver.t <= times[-1]:
+                    reason = "the step size is less than the spacing between numbers"
+                else:
+                    times.append(float(solver.t))
+                    pieces.append(solver.dense_output())
+                    if progress is not None:
+                        progress(times[-1])
+                    interrupted = stop is not None and stop()
+        except (ValueError, scipy.linalg.LinAlgError) as error:
+            if error is system.error:
+                raise
+            # Non-finite numbers in scipy's linear algebra.
+            reason = f"the state or its Jacobian is not finite ({error})"
+    statistics = Statistics(
+        steps=len(pieces),
+        evaluations=system.evaluations,
+        jacobians=int(solver.njev) if solver else 0,
+        factorisations=int(solver.nlu) if solver else 0,
+        wall_time=time.perf_counter() - began,
+    )
+    dense = scipy.integrate.OdeSolution(times, pieces, alt_segment=method != "Radau") if pieces else None
+    return Trajectory(
+        breakpoints=np.array(times),
+        interpolate=lambda at: np.asarray(dense(at).T) if dense else np.tile(start, (len(at), 1)),
+        statistics=statistics,
+        failure=reason,
+        interrupted=interrupted,
+    )
+
+
+class _System:
+    """The right-hand side, counted; keeps an exception that it raises, to tell it from one of the solver's."""
+
+    def __init__(self, rhs: Callable[[float, Array], Array]) -> None:
+        self.rhs = rhs
+        self.evaluations = 0
+        self.error: BaseException | None = None
+
+    def __call__(self, instant: float, x: Array) -> Array:
+        self.evaluations += 1
+        try:
+            return self.rhs(instant, x)
+        except BaseException as error:
+            self.error = error
+            raise

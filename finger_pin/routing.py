@@ -128,17 +128,7 @@ class ForceClosure:
             vector = null_space[:, 0]
             tension = vector / vector[np.argmax(np.abs(vector))]
         elif count > 1:
-            # Largest least entry e of N y subject to N y <= 1: a linear programme in (y, e).
-            ones = np.ones((len(tendons), 1))
-            solution = scipy.optimize.linprog(
-                np.append(np.zeros(count), -1.0),
-                A_ub=np.block([[-null_space, ones], [null_space, 0.0 * ones]]),
-                b_ub=np.append(np.zeros(len(tendons)), np.ones(len(tendons))),
-                bounds=[(None, None)] * count + [(None, 1.0)],
-            )
-            tension = null_space @ solution.x[:count]
-            if tension.max() > 0.0:
-                tension = tension / tension.max()
+            tension = _tautest(null_space)
         return cls(null_space, tension, tendons)
 
     @property
@@ -155,3 +145,26 @@ class ForceClosure:
             return "no force closure: no tensions balance each other at zero torque (too few tendons)"
         worst = [n for n, f in zip(self.tendons, self.tension, strict=True) if f <= 1e-9]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
+
+
+def _tautest(null_space: Array) -> Array:
+    """Return the internal tensions N y whose least entry is largest, or that leave the fewest tendons slack."""
+    size, count = null_space.shape
+    # The largest least entry e of N y subject to N y <= 1 is a linear programme in (y, e).
+    ones = np.ones((size, 1))
+    solution = scipy.optimize.linprog(
+        np.append(np.zeros(count), -1.0),
+        A_ub=np.block([[-null_space, ones], [null_space, 0.0 * ones]]),
+        b_ub=np.append(np.zeros(size), np.ones(size)),
+        bounds=[(None, None)] * count + [(None, 1.0)],
+    )
+    if solution.x[-1] <= 1e-9:
+        # Not all can be taut: most entries e_i in [0, 1] with N y >= e; a tendon that can be taut reaches 1.
+        solution = scipy.optimize.linprog(
+            np.append(np.zeros(count), -np.ones(size)),
+            A_ub=np.hstack([-null_space, np.eye(size)]),
+            b_ub=np.zeros(size),
+            bounds=[(None, None)] * count + [(0.0, 1.0)] * size,
+        )
+    tension = np.asarray(null_space @ solution.x[:count])
+    return tension / tension.max() if tension.max() > 1e-9 else np.zeros(size)
