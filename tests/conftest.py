@@ -1,0 +1,62 @@
+"""Shared fixtures: the paper's finger, networks made on the spot, and the few expensive runs."""
+
+import pytest
+
+import finger_pin as fp
+
+
+@pytest.fixture(scope="session")
+def ub():
+    return fp.load_finger("ub")
+
+
+@pytest.fixture(scope="session")
+def finger(ub):
+    return fp.Finger(ub)
+
+
+@pytest.fixture(scope="session")
+def routing(finger):
+    return finger.routing
+
+
+@pytest.fixture(scope="session")
+def network():
+    """Return a maker of descriptions without links.
+
+    Tendons are given as {name: {joint: radius}} in the order along the tendon, radii in millimetres; `passive` names
+    the passive ones and `after` says where their mass is. Further sections are passed on as they are.
+    """
+
+    def make(joints, tendons, passive=(), after=None, **sections):
+        after = after or {}
+        table = {}
+        for name, crossings in tendons.items():
+            entry = {"crossings": {joint: {"radius": radius * 1e-3} for joint, radius in crossings.items()}}
+            if name in passive:
+                entry["kind"] = "passive"
+            if name in after:
+                entry["mass_after"] = after[name]
+            table[name] = entry
+        described = {"name": "network", "joints": {name: {"range": [-3.0, 3.0]} for name in joints}, "tendons": table}
+        return fp.FingerDescription.model_validate(described | sections)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def fig6_runs():
+    """The first 0.15 s of fig6 by every method at the default tolerances."""
+    return {
+        method: fp.simulate(
+            fp.load_scenario("fig6", {"simulation.duration": 0.15, "simulation.method": method})
+        )
+        for method in ("Radau", "BDF", "LSODA")
+    }
+
+
+@pytest.fixture(scope="session")
+def fig6_period():
+    """Five seconds of fig6, the first second and the four-second period after it, at tolerances of 1e-4."""
+    settings = {"duration": 5.0, "method": "BDF", "rtol": 1e-4, "atol_scale": 1e-4, "sample_rate": 500.0}
+    return fp.simulate(fp.load_scenario("fig6", {f"simulation.{key}": value for key, value in settings.items()}))
