@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from finger_pin.blocks.rigid_body import Motion
 from finger_pin.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.energy import Energies, Powers, energies, powers
 from finger_pin.integration import Trajectory
@@ -35,7 +36,9 @@ class Account:
     residual: Array
 
 
-def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: LoopSignals) -> Account:
+def account(
+    loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: LoopSignals, motion: Motion
+) -> Account:
     """Keep the energy account of a trajectory.
 
     Args:
@@ -43,6 +46,7 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         trajectory: Its solution.
         times: Saved times, shape (m,), beginning at the trajectory's start.
         signals: The signals at those times.
+        motion: Fingertip and energies of the rigid body at those times.
     """
     finger = loop.finger
     ends = trajectory.breakpoints
@@ -50,9 +54,7 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     to_step = np.vstack([np.zeros(steps.shape[1]), np.cumsum(steps, axis=0)])
     before = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
     works = Powers(*(to_step[before] + _works(loop, trajectory, ends[before], times)).T)
-    state = signals.finger.state
-    kinematics = finger.rigid_body.kinematics(state.position, state.velocity)
-    stored = energies(finger, signals.finger, kinematics)
+    stored = energies(finger, signals.finger, motion)
     return Account(
         stored=stored,
         powers=powers(finger, signals.finger),

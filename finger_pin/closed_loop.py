@@ -9,6 +9,7 @@ import numpy as np
 
 from finger_pin.blocks.controller import Controller, ControlSignals
 from finger_pin.blocks.reference import ReferenceSignals
+from finger_pin.blocks.rigid_body import Motion
 from finger_pin.finger import Finger, FingerSignals
 from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
@@ -19,6 +20,16 @@ class Reference(Protocol):
 
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""
+
+
+class Dynamics(Protocol):
+    """Anything that evaluates a finger: `Finger`, or the compiled core."""
+
+    def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
+        """Return all signals at packed states under given tensions."""
+
+    def motion(self, position: Array, velocity: Array) -> Motion:
+        """Return fingertip and energies of the rigid body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +50,14 @@ class ClosedLoop:
         controller: Turns reference and motion into tensions.
         reference: The desired motion.
         fingertip_force: F, shape (3,), N, base frame.
+        dynamics: What evaluates the finger.
     """
 
     finger: Finger
     controller: Controller
     reference: Reference
     fingertip_force: Array
+    dynamics: Dynamics
 
     @classmethod
     def from_scenario(
@@ -57,6 +70,7 @@ class ClosedLoop:
             controller=controller or scenario.build_controller(finger.routing),
             reference=reference or scenario.build_reference(finger.routing),
             fingertip_force=np.array(scenario.environment.fingertip_force),
+            dynamics=finger,
         )
 
     def initial_state(self) -> Array:
@@ -69,7 +83,7 @@ class ClosedLoop:
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
         command = control.tension[..., : self.finger.routing.actuated]
-        return LoopSignals(reference, control, self.finger.evaluate(x, command, self.fingertip_force))
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.fingertip_force))
 
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin import friction
-from finger_pin.blocks.rigid_body import Kinematics
+from finger_pin.blocks.rigid_body import Kinematics, Motion
 from finger_pin.blocks.stroke_limiter import limiter_energy, limiter_loss
 from finger_pin.blocks.tendons import half_energy
 from finger_pin.finger import Finger, FingerSignals
@@ -58,13 +58,13 @@ class Powers:
         return np.asarray(2.0 * (self.actuators + self.fingertip) - sum(vars(self).values()))
 
 
-def energies(finger: Finger, signals: FingerSignals, kinematics: Kinematics) -> Energies:
+def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics) -> Energies:
     """Return the stored energies at the given signals."""
     state, tendons, joints = signals.state, finger.tendons, finger.joint_friction
     halves = tendons.stretch(state.position, state.passive_position)
     return Energies(
-        kinetic=kinematics.kinetic_energy + 0.5 * np.sum(tendons.mass * state.passive_velocity**2, axis=-1),
-        gravity=kinematics.potential_energy,
+        kinetic=motion.kinetic_energy + 0.5 * np.sum(tendons.mass * state.passive_velocity**2, axis=-1),
+        gravity=motion.potential_energy,
         passive_tendon=sum((np.sum(half_energy(s, tendons.half_stiffness), axis=-1) for s in halves), np.zeros(())),
         limiter=np.sum(limiter_energy(signals.limiter_depth, finger.stroke_limiter.stiffness), axis=-1),
         tendon_bristles=np.sum(friction.bristle_energy(state.tendon_stiction, tendons.stiffness), axis=-1),

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.blocks.joint_friction import JointForces, JointFriction
-from finger_pin.blocks.rigid_body import RigidBody
+from finger_pin.blocks.rigid_body import Motion, RigidBody
 from finger_pin.blocks.stroke_limiter import StrokeLimiter
 from finger_pin.blocks.tendons import TendonForces, Tendons
 from finger_pin.description import build_rigid_body
@@ -199,6 +199,11 @@ class Finger:
             acceleration=acceleration,
             rate=rate,
         )
+
+    def motion(self, position: Array, velocity: Array) -> Motion:
+        """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n)."""
+        found = self.rigid_body.kinematics(position, velocity)
+        return Motion(found.tip, found.kinetic_energy, found.potential_energy)
 
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""

@@ -23,6 +23,11 @@ def friction_coefficient(velocity: Any, kinetic: Any, static: Any, stribeck: Any
     return kinetic + (static - kinetic) * np.exp(-np.abs(velocity) / stribeck)
 
 
+def friction_coefficient_slope(velocity: Any, kinetic: Any, static: Any, stribeck: Any) -> Any:
+    """Return dM/dv of (9b)."""
+    return -np.sign(velocity) * (static - kinetic) / stribeck * np.exp(-np.abs(velocity) / stribeck)
+
+
 def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
     """Return max(F^n M, g_min), the stiction that steady sliding settles at.
 
@@ -34,6 +39,15 @@ def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
 def stiction_rate(stiction: Any, velocity: Any, level: Any, stiffness: Any) -> Any:
     """Return F^s' = sigma_0 (v - F^s |v| / level), equation (9a)."""
     return stiffness * (velocity - stiction * np.abs(velocity) / level)
+
+
+def stiction_rate_slopes(stiction: Any, velocity: Any, level: Any, stiffness: Any) -> tuple[Any, Any, Any]:
+    """Return the derivatives of (9a) with respect to F^s, v and the level."""
+    speed = np.abs(velocity)
+    by_stiction = -stiffness * speed / level
+    by_velocity = stiffness * (1.0 - stiction * np.sign(velocity) / level)
+    by_level = stiffness * stiction * speed / (level * level)
+    return by_stiction, by_velocity, by_level
 
 
 def friction_force(stiction: Any, velocity: Any, viscous: Any) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.account import Account, account
+from finger_pin.blocks.rigid_body import Motion
 from finger_pin.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.files import replacing
 from finger_pin.integration import Trajectory
@@ -41,7 +42,7 @@ _EXCHANGED = {
 }
 
 
-def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory) -> xr.Dataset:
+def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str) -> xr.Dataset:
     """Return all signals of a trajectory at the scenario's sample times, as far as the trajectory goes.
 
     The signals are recomputed from the states by the evaluation that the dynamics use.
@@ -49,9 +50,11 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory) -> xr.D
     times = scenario.sample_times()
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
     signals = loop.evaluate(times, trajectory.interpolate(times))
-    kept = account(loop, trajectory, times, signals)
+    state = signals.finger.state
+    motion = loop.dynamics.motion(state.position, state.velocity)
+    kept = account(loop, trajectory, times, signals, motion)
     routing = loop.finger.routing
-    variables = _signals(loop, signals) | _energies(kept)
+    variables = _signals(loop, signals, motion) | _energies(kept)
     dataset = xr.Dataset(
         {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
         coords={
@@ -60,7 +63,7 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory) -> xr.D
             "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
             "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
         },
-        attrs=_attributes(scenario, trajectory),
+        attrs=_attributes(scenario, trajectory, method),
     )
     if routing.passive > 1:
         dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
@@ -78,12 +81,11 @@ def load_result(path: str | Path) -> xr.Dataset:
     return xr.load_dataset(path, engine="netcdf4")
 
 
-def _signals(loop: ClosedLoop, signals: LoopSignals) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:
     finger, tendons, joints, state = signals.finger, signals.finger.tendons, signals.finger.joints, signals.finger.state
     actuated, passive = loop.finger.routing.actuated, loop.finger.routing.passive
     halves = tendons.strands[..., actuated:]
     tension = np.concatenate([tendons.strands[..., :actuated], halves[..., 1::2]], axis=-1)
-    tips = np.array([loop.finger.rigid_body.tip_position(q) for q in state.position])
     error = signals.reference.position - state.position
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
@@ -91,7 +93,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals) -> dict[str, tuple[Any, Arr
         "joint_acceleration": _entry(_JOINT, finger.acceleration, "rad/s2", "joint acceleration", "18"),
         "joint_reference": _entry(_JOINT, signals.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": _entry(_JOINT, error, "rad", "desired less actual joint angle"),
-        "fingertip_position": _entry(("time", "axis"), tips, "m", "fingertip position", "1"),
+        "fingertip_position": _entry(("time", "axis"), motion.tip, "m", "fingertip position", "1"),
         "tendon_command": _entry(_TENDON, signals.control.tension, "N", "commanded or planned tension", "21b"),
         "tendon_tension": _entry(_TENDON, tension, "N", "delivered tension; distal half of a passive tendon", "12"),
         "tendon_velocity": _entry(_TENDON, tendons.velocity, "m/s", "sliding velocity", "3"),
@@ -143,13 +145,13 @@ def _entry(
     return dims, np.asarray(values), attributes
 
 
-def _attributes(scenario: Scenario, trajectory: Trajectory) -> dict[str, Any]:
+def _attributes(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
     settings = scenario.simulation
     statistics: Mapping[str, Any] = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,
         "scenario": to_toml(scenario),
-        "method": settings.method,
+        "method": method,
         "rtol": settings.rtol,
         "atol_scale": settings.atol_scale,
         "end_time": float(trajectory.breakpoints[-1]),

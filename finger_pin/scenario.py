@@ -27,7 +27,7 @@ from finger_pin.validation import (
     vector,
 )
 
-METHODS = ("Radau", "BDF", "LSODA")
+METHODS = ("Rodas5P", "Rodas4", "Radau", "BDF", "LSODA")
 MOST_SAMPLES = 5_000_000
 
 
@@ -78,7 +78,7 @@ class SimulationSettings(Description):
     sample_rate: Annotated[float, real(0.0, 1e7, above=True)] = quantity(
         1000.0, unit="Hz", source="chosen", doc="Of the saved signals."
     )
-    method: Annotated[str, choice(*METHODS)] = quantity("Radau", unit="1", source="chosen", doc="Integrator.")
+    method: Annotated[str, choice(*METHODS)] = quantity("Rodas5P", unit="1", source="benchmark", doc="Integrator.")
     rtol: Annotated[float, real(1e-12, 0.1)] = quantity(
         1e-6, unit="1", source="energy account", doc="Relative tolerance."
     )

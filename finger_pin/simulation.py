@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import xarray as xr
 
-from finger_pin.blocks.controller import Controller
+from finger_pin.blocks.controller import Controller, ProportionalController
+from finger_pin.blocks.reference import HarmonicReference
 from finger_pin.closed_loop import ClosedLoop, Reference
-from finger_pin.exceptions import IntegrationError, Interrupted
-from finger_pin.integration import Progress, Stop, integrate
+from finger_pin.core.finger import CompiledFinger
+from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
+from finger_pin.core.plant import Control, build_control, held_control
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.integration import Progress, Stop, Trajectory, integrate
 from finger_pin.recording import record
+from finger_pin.sampling import SampledController
 from finger_pin.scenario import Scenario
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
+_CONTINUOUS = "Radau"
 
 
 def simulate(
@@ -19,41 +27,87 @@ def simulate(
     *,
     controller: Controller | None = None,
     reference: Reference | None = None,
+    control_period: float | None = None,
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario from rest on its reference.
 
+    The compiled methods run without Python inside as long as controller and reference are the scenario's own. A
+    controller or reference of one's own is Python: with a ``control_period`` it is sampled and held, and the compiled
+    core runs between the samples; without one it acts continuously, which calls it at every evaluation of scipy's
+    Radau method and is much slower.
+
     Args:
         scenario: What to simulate, from `load_scenario`.
-        controller: Replaces the scenario's controller; called at every evaluation.
+        controller: Replaces the scenario's controller.
         reference: Replaces the scenario's reference.
-        progress: Called with the simulated time, s, after every step.
-        stop: Asked after every step; when it returns true the simulation ends there.
+        control_period: Sampling period of the controller, s; by default it is continuous. Compiled methods only.
+        progress: Called with the simulated time, s, now and then.
+        stop: Asked now and then; when it returns true the simulation ends there.
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account.
 
     Raises:
+        InputError: If the control period is not positive, or the method cannot sample.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
     """
+    method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
-    settings = scenario.simulation
-    trajectory = integrate(
-        loop.rhs,
-        loop.initial_state(),
-        settings.duration,
-        method=settings.method,
-        rtol=settings.rtol,
-        atol=settings.atol_scale * loop.finger.layout.scales(),
-        progress=progress,
-        stop=stop,
-    )
+    if control_period is not None:
+        if not control_period > 0.0:
+            raise InputError("control_period", "must be above 0", control_period)
+        if method not in TABLEAUS:
+            raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
+        loop = replace(loop, controller=SampledController(loop, control_period))
+    elif method in TABLEAUS and _control(loop) is None:
+        method = _CONTINUOUS
+    if scenario.simulation.method in TABLEAUS:
+        loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
+    trajectory = _integrate(scenario, loop, method, progress, stop)
     reached = float(trajectory.breakpoints[-1])
-    result = record(scenario, loop, trajectory)
+    result = record(scenario, loop, trajectory, method)
     if trajectory.failure:
         raise IntegrationError(reached, trajectory.failure, _ADVICE, result)
     if trajectory.interrupted:
         raise Interrupted(reached, result)
     return result
+
+
+def _control(loop: ClosedLoop) -> Control | None:
+    """Return the loop's controller and reference as arrays, or None if they are Python."""
+    controller, reference = loop.controller, loop.reference
+    if isinstance(controller, ProportionalController) and isinstance(reference, HarmonicReference):
+        return build_control(controller, reference, loop.finger.routing.actuated)
+    return None
+
+
+def _integrate(
+    scenario: Scenario, loop: ClosedLoop, method: str, progress: Progress | None, stop: Stop | None
+) -> Trajectory:
+    settings, controller = scenario.simulation, loop.controller
+    start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
+    if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
+        plant = loop.dynamics.plant
+        sampled = controller if isinstance(controller, SampledController) else None
+        return integrate_compiled(
+            Stepper(plant, _control(loop) or held_control(plant), start, TABLEAUS[method](), settings.rtol, atol),
+            settings.duration,
+            loop.finger.layout.names,
+            period=sampled.period if sampled else None,
+            sample=sampled.sample if sampled else None,
+            progress=progress,
+            stop=stop,
+        )
+    return integrate(
+        loop.rhs,
+        start,
+        settings.duration,
+        method=method,
+        rtol=settings.rtol,
+        atol=atol,
+        progress=progress,
+        stop=stop,
+    )

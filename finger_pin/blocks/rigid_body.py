@@ -33,6 +33,21 @@ class Kinematics:
     potential_energy: Array
 
 
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where the fingertip is and what energy the rigid body has; leading dimensions are kept.
+
+    Attributes:
+        tip: p, shape (..., 3), m.
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+    """
+
+    tip: Array
+    kinetic_energy: Array
+    potential_energy: Array
+
+
 class RigidBody:
     """A Pinocchio model of revolute and prismatic joints, with a fingertip frame.
 
@@ -62,12 +77,12 @@ class RigidBody:
         self.tip_frame = int(model.getFrameId(tip_frame))
         self.joints: tuple[str, ...] = tuple(model.names[1:])
         self._data = model.createData()
-        self._axes = [np.asarray(base_axis, dtype=float)]
+        self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         for index in range(1, model.njoints):
             offset = np.array(model.jointPlacements[index].translation)
             length = float(np.linalg.norm(offset))
             at_base = model.parents[index] == 0
-            self._axes.append(self._axes[0] if at_base or length == 0.0 else offset / length)
+            self.proximal_axes.append(self.proximal_axes[0] if at_base or length == 0.0 else offset / length)
 
     def tip_position(self, q: Array) -> Array:
         """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
@@ -120,5 +135,5 @@ class RigidBody:
 
     def _directions(self) -> Array:
         placements, parents = self._data.oMi, self.model.parents
-        rows = [placements[parents[j]].rotation @ self._axes[j] for j in range(1, self.model.njoints)]
+        rows = [placements[parents[j]].rotation @ self.proximal_axes[j] for j in range(1, self.model.njoints)]
         return np.array(rows)

@@ -31,6 +31,14 @@ def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> A
     return stiffness * depth * np.maximum(0.0, 1.0 + damping * velocity * np.sign(depth))
 
 
+def limiter_slopes(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> tuple[Any, Any]:
+    """Return the derivatives of the limiter torque with respect to theta and theta'; zero inside the range."""
+    sign = np.sign(depth)
+    factor = 1.0 + damping * velocity * sign
+    touching = np.abs(sign) * (factor > 0.0)
+    return stiffness * factor * touching, stiffness * damping * np.abs(depth) * touching
+
+
 def limiter_energy(depth: Any, stiffness: Any) -> Any:
     """Return the elastic energy k d^2 / 2, J."""
     return 0.5 * stiffness * depth * depth

@@ -25,6 +25,11 @@ def capstan_coefficient(surface: Any, curvature: Any) -> Any:
     return np.tanh(0.5 * surface * curvature)
 
 
+def capstan_slope(surface: Any, coefficient: Any) -> Any:
+    """Return d mu^d / d phi of (16), from mu^d itself."""
+    return 0.5 * surface * (1.0 - coefficient * coefficient)
+
+
 def delivered_tension(command: Any, loss: Any) -> Any:
     """Return f = max(0, f^a - f^f), N: a tendon cannot push."""
     return np.maximum(0.0, command - loss)

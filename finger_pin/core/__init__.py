@@ -1,0 +1,1 @@
+"""The compiled core: the laws of the model without Python inside."""

@@ -1,0 +1,81 @@
+"""The compiler: numba, with a cache that survives processes and never serves stale code.
+
+numba notices a change of a function's own file, not of the functions that it calls. The cache folder is therefore
+named after a digest of every source file that is compiled. Where no folder can be written, everything is compiled
+anew in each process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+import platformdirs
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _digest() -> str:
+    package = Path(__file__).parent.parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted([*package.glob("core/*.py"), *package.glob("blocks/*.py"), package / "friction.py"]):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> str | None:
+    root = os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin")
+    folder = Path(root) / _digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError:
+        return None
+    return str(folder)
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def compiled(function: _Function) -> _Function:
+    """Return the function compiled, to be called by compiled code only, where it is inlined."""
+    return _compile(function, cache=False, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def compiled_apart(function: _Function) -> _Function:
+    """Return the function compiled, to be called by compiled code only, as a unit of its own.
+
+    The time that compilation takes grows faster than the size of what is inlined into one function.
+    """
+    return _compile(function, cache=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def entry(function: _Function) -> _Function:
+    """Return the function compiled on first use, to be called from Python."""
+    return _compile(function, cache=CACHE_FOLDER is not None, no_cfunc_wrapper=True)
+
+
+def _compile(function: _Function, **kind: bool) -> _Function:
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "nogil": True,
+        # IEEE arithmetic is kept, so that NaN stays NaN; only a product and a sum may be fused.
+        "fastmath": {"contract"},
+        # Nothing is allocated, so reference counting, which would cost half of the time, is left out; and the
+        # tables of arrays that every function takes are free to pass only when calls are inlined.
+        "_nrt": False,
+        **kind,
+    }
+    earlier = numba.config.CACHE_DIR
+    if CACHE_FOLDER is not None:
+        numba.config.CACHE_DIR = CACHE_FOLDER
+    try:
+        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = earlier

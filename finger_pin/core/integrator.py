@@ -1,0 +1,148 @@
+"""The compiled integrator behind a Python face: from a closed loop to a trajectory that can be evaluated anywhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from finger_pin.core import rosenbrock as core
+from finger_pin.core.linearisation import build_linear
+from finger_pin.core.plant import Control, Plant, build_work
+from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
+from finger_pin.integration import Progress, Statistics, Stop, Trajectory
+from finger_pin.routing import Array
+
+TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
+_CHUNK = 256
+_FIRST_STEP = 1e-6
+
+
+class Stepper:
+    """A state that the compiled integrator carries forward; everything that a continued integration needs.
+
+    Attributes:
+        x: The packed state, shape (size,).
+        memory: Time, step size, error history and counters.
+    """
+
+    def __init__(self, plant: Plant, control: Control, x: Array, tableau: Tableau, rtol: float, atol: Array) -> None:
+        """Start at time zero."""
+        self.plant, self.control, self.tableau = plant, control, tableau
+        self.x = np.array(x, dtype=float)
+        self.rtol, self.atol = rtol, np.asarray(atol, dtype=float)
+        self.memory = np.zeros(core.MEMORY_SIZE)
+        self.memory[core.STEP] = _FIRST_STEP
+        stages, size = len(tableau.nodes), len(self.x)
+        self._work = build_work(plant)
+        self._linear = build_linear(plant)
+        self._k = np.zeros((stages, size))
+        self._scratch = np.zeros((4 + len(plant.parents), size))
+        self._nothing = (np.zeros(0), np.zeros((0, size)), np.zeros((0, len(tableau.dense), size)))
+
+    @property
+    def time(self) -> float:
+        """Time reached, s."""
+        return float(self.memory[core.TIME])
+
+    def advance(self, end: float, record: tuple[Array, Array, Array] | None = None) -> tuple[int, int]:
+        """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
+        status, steps = core.advance(
+            self.plant,
+            self.control,
+            self.tableau,
+            self.x,
+            end,
+            self.rtol,
+            self.atol,
+            self.memory,
+            self._work,
+            self._linear,
+            self._k,
+            self._scratch,
+            *(record or self._nothing),
+        )
+        return int(status), int(steps)
+
+    def failure(self, status: int, names: tuple[str, ...]) -> str:
+        """Say what a status means; empty if nothing failed."""
+        culprit = names[max(int(self.memory[core.CULPRIT]), 0)]
+        if status == core.UNDERFLOW:
+            return f"the step size fell below the resolution of time; the error is largest in {culprit}"
+        if status == core.NOT_FINITE:
+            return f"the rate of {culprit} is not finite"
+        return ""
+
+
+def integrate_compiled(
+    stepper: Stepper,
+    duration: float,
+    names: tuple[str, ...],
+    *,
+    period: float | None = None,
+    sample: Callable[[float, Array], Array] | None = None,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+) -> Trajectory:
+    """Integrate from time zero with the compiled core.
+
+    Args:
+        stepper: Where to start, with which method and tolerances.
+        duration: s.
+        names: Names of the numbers of the state, for messages.
+        period: Sampling period of a controller that holds its tensions in between, s.
+        sample: That controller: maps time and state to tensions, shape (a,).
+        progress: Called with the simulated time now and then.
+        stop: Asked now and then; true ends the integration there.
+    """
+    began = time.perf_counter()
+    start, size = stepper.x.copy(), len(stepper.x)
+    record = (np.zeros(_CHUNK), np.zeros((_CHUNK, size)), np.zeros((_CHUNK, len(stepper.tableau.dense), size)))
+    kept: tuple[list[Array], list[Array], list[Array]] = ([np.zeros(1)], [start[None]], [])
+    reason, interrupted, samples = "", False, 0
+    while stepper.time < duration and not reason and not interrupted:
+        end = duration
+        if period is not None and sample is not None:
+            if stepper.time >= samples * period:
+                stepper.control.tension[:] = sample(samples * period, stepper.x)
+                samples += 1
+            end = min(duration, samples * period)
+        status, steps = stepper.advance(end, record)
+        for store, block in zip(kept, record, strict=True):
+            store.append(block[:steps].copy())
+        reason = stepper.failure(status, names)
+        if progress is not None:
+            progress(stepper.time)
+        interrupted = stop is not None and not reason and stepper.time < duration and stop()
+    times, states = np.concatenate(kept[0]), np.concatenate(kept[1])
+    dense = np.concatenate(kept[2]) if kept[2] else np.zeros((0, len(stepper.tableau.dense), size))
+    memory = stepper.memory
+    return Trajectory(
+        breakpoints=times,
+        interpolate=_interpolant(times, states, dense),
+        statistics=Statistics(
+            steps=len(times) - 1,
+            evaluations=int(memory[core.EVALUATIONS]),
+            jacobians=int(memory[core.JACOBIANS]),
+            factorisations=int(memory[core.FACTORISATIONS]),
+            wall_time=time.perf_counter() - began,
+        ),
+        failure=reason,
+        interrupted=interrupted,
+    )
+
+
+def _interpolant(times: Array, states: Array, dense: Array) -> Callable[[Array], Array]:
+    def interpolate(at: Array) -> Array:
+        if len(times) == 1:
+            return np.repeat(states, len(at), axis=0)
+        step = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+        s = ((at - times[step]) / (times[step + 1] - times[step]))[:, None]
+        bend = dense[step, -1]
+        for row in range(dense.shape[1] - 2, -1, -1):
+            bend = dense[step, row] + s * bend
+        result: Array = (1.0 - s) * states[step] + s * (states[step + 1] + (1.0 - s) * bend)
+        return result
+
+    return interpolate

@@ -1,0 +1,441 @@
+"""The Jacobian of the closed loop, exact and in factors, and the linear systems that an implicit method solves.
+
+A Rosenbrock stage solves (g - J) u = r. Stiction couples to the rest only through velocities and forces, so it is
+eliminated by hand, as are positions: with y = (velocity part, passive velocity part) of u,
+
+    position part = (r + y) / g
+    stiction of a tendon = c + G y
+    strand force = c + F y
+    stiction of a joint = c + Z y
+
+and what is left is a dense system with one row per joint and passive tendon: 5 instead of 19 for the paper's finger.
+The rows of the joints are kept multiplied by the mass matrix.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finger_pin.core import dynamics as at
+from finger_pin.core import laws
+from finger_pin.core.compilation import compiled
+from finger_pin.core.plant import Plant
+from finger_pin.core.rigid_body import (
+    AXIS,
+    BY_POSITION,
+    BY_VELOCITY,
+    inverse_dynamics,
+    inverse_dynamics_derivatives,
+)
+from finger_pin.routing import Array
+
+
+class Linear(NamedTuple):
+    """Partial derivatives at one state, and the factors of g - J.
+
+    Attributes:
+        tendon: One row each: strand force by own stiction, by sliding velocity; stiction rate by stiction, by
+            sliding velocity, by passive position; derivative of the command in time; stiction rate by command.
+        joint: One row each: stiction rate by stiction, by velocity, by load.
+        stiction_by_position: Tendon stiction rates by theta, shape (t, n).
+        strand_by_position: Strand forces by theta, shape (s, n).
+        strand_by_passive: Strand forces by the passive position of their own tendon, shape (s,).
+        joint_by_position: Joint stiction rates by theta at constant strand forces, shape (n, n).
+        torque_by_position: Torques other than the tendons' by theta, shape (n, n).
+        torque_by_velocity: Torques other than the tendons' by theta', shape (n, n).
+        tendon_gain: G, shape (t, n + p).
+        strand_gain: F, shape (s, n + p).
+        joint_gain: Z, shape (n, n + p).
+        matrix: The reduced system, factorised in place, shape (n + p, n + p).
+        pivots: Row exchanges.
+        vector: The reduced right-hand side, shape (n + p,).
+        constant: The constants c of tendons, strands and joints, shape (3, max(t, s, n)).
+        time_derivative: df/dt with the joints' rows multiplied by M, shape (size,).
+    """
+
+    tendon: Array
+    joint: Array
+    stiction_by_position: Array
+    strand_by_position: Array
+    strand_by_passive: Array
+    joint_by_position: Array
+    torque_by_position: Array
+    torque_by_velocity: Array
+    tendon_gain: Array
+    strand_gain: Array
+    joint_gain: Array
+    matrix: Array
+    pivots: Any
+    vector: Array
+    constant: Array
+    time_derivative: Array
+
+
+# Rows of Linear.tendon and Linear.joint.
+BY_STICTION, BY_SPEED, RATE_BY_STICTION, RATE_BY_SPEED, RATE_BY_PASSIVE, COMMAND_RATE, RATE_BY_COMMAND = range(7)
+J_RATE_BY_STICTION, J_RATE_BY_SPEED, J_RATE_BY_LOAD = range(3)
+
+
+def build_linear(plant: Plant) -> Linear:
+    """Allocate the linearisation of a plant."""
+    tendons, joints = plant.coupling.shape
+    strands = plant.strand_coupling.shape[0]
+    passive = tendons - plant.actuated
+    reduced = joints + passive
+    return Linear(
+        tendon=np.zeros((7, tendons)),
+        joint=np.zeros((3, joints)),
+        stiction_by_position=np.zeros((tendons, joints)),
+        strand_by_position=np.zeros((strands, joints)),
+        strand_by_passive=np.zeros(strands),
+        joint_by_position=np.zeros((joints, joints)),
+        torque_by_position=np.zeros((joints, joints)),
+        torque_by_velocity=np.zeros((joints, joints)),
+        tendon_gain=np.zeros((tendons, reduced)),
+        strand_gain=np.zeros((strands, reduced)),
+        joint_gain=np.zeros((joints, reduced)),
+        matrix=np.zeros((reduced, reduced)),
+        pivots=np.zeros(reduced, dtype=np.int64),
+        vector=np.zeros(reduced),
+        constant=np.zeros((3, max(tendons, strands, joints))),
+        time_derivative=np.zeros(3 * joints + 2 * passive + tendons),
+    )
+
+
+@compiled
+def _command_by_position(control: Any, time: float, actuated: int, work: Any, linear: Any) -> None:
+    """Fill d f^a / d theta for the active minimum of (22), and d f^a / dt."""
+    slope, active = work.command_by_position, work.active[0]
+    at.reference_rate(control, time, work)
+    for i in range(actuated):
+        rate = 0.0
+        for j in range(slope.shape[1]):
+            value = 0.0
+            if not control.held:
+                shared = control.inverse[active, j] / control.internal[active]
+                value = -control.gain[j] * (control.inverse[i, j] - control.internal[i] * shared)
+                rate -= value * work.joint[at.REFERENCE_RATE, j]
+            slope[i, j] = value
+        linear.tendon[COMMAND_RATE, i] = rate
+
+
+@compiled
+def _tendon_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
+    tendons, joints = plant.coupling.shape
+    actuated = plant.actuated
+    s_at = 2 * joints + 2 * (tendons - actuated)
+    rows, table, out = work.tendon, plant.tendons, linear.tendon
+    by_position, strand_by_position = linear.stiction_by_position, linear.strand_by_position
+    for i in range(tendons):
+        speed, coefficient, normal = rows[at.SPEED, i], rows[at.COEFFICIENT, i], rows[at.NORMAL, i]
+        level, ratio, stribeck = rows[at.LEVEL, i], table[i, at.RATIO], table[i, at.STRIBECK]
+        own, by_speed, by_level = laws.stiction_rate_slopes(x[s_at + i], speed, level, table[i, at.STIFFNESS])
+        if level <= table[i, at.FLOOR]:
+            by_level = 0.0
+        sliding_slope = laws.friction_coefficient_slope(speed, coefficient, ratio * coefficient, stribeck)
+        by_speed += by_level * normal * sliding_slope
+        by_normal = by_level * rows[at.SLIDING, i]
+        # M is proportional to mu^d, which depends on the posture through the curvature.
+        share = rows[at.SLIDING, i] / coefficient if coefficient > 0.0 else 0.0
+        by_curvature = by_level * normal * share * laws.capstan_slope(table[i, at.SURFACE], coefficient)
+        for j in range(joints):
+            by_position[i, j] = by_curvature * plant.curvature_matrix[i, j] * np.sign(x[j])
+        if i < actuated:
+            taut = 1.0 if work.strand[0, i] > 0.0 else 0.0
+            command_sign = 1.0 if work.planned[i] >= 0.0 else -1.0
+            out[BY_STICTION, i] = -taut
+            out[BY_SPEED, i] = -taut * table[i, at.VISCOUS]
+            own -= by_normal * taut
+            by_speed += by_normal * out[BY_SPEED, i]
+            out[RATE_BY_COMMAND, i] = by_normal * (taut + command_sign)
+            out[RATE_BY_PASSIVE, i] = 0.0
+            for j in range(joints):
+                slope = work.command_by_position[i, j]
+                strand_by_position[i, j] = taut * slope
+                by_position[i, j] += out[RATE_BY_COMMAND, i] * slope
+        else:
+            k = i - actuated
+            row, stiffness = actuated + 2 * k, plant.passive[k, at.HALF_STIFFNESS]
+            near = stiffness if work.strand[0, row] > 0.0 else 0.0
+            far = stiffness if work.strand[0, row + 1] > 0.0 else 0.0
+            linear.strand_by_passive[row] = -near
+            linear.strand_by_passive[row + 1] = far
+            out[RATE_BY_PASSIVE, i] = by_normal * (far - near)
+            for j in range(joints):
+                strand_by_position[row, j] = -near * plant.strand_coupling[row, j]
+                strand_by_position[row + 1, j] = -far * plant.strand_coupling[row + 1, j]
+                by_position[i, j] += by_normal * (strand_by_position[row, j] + strand_by_position[row + 1, j])
+        out[RATE_BY_STICTION, i], out[RATE_BY_SPEED, i] = own, by_speed
+
+
+@compiled
+def _fingertip_slopes(plant: Any, work: Any, linear: Any) -> None:
+    """Add d(J^T F)/d theta to the torques; put d(e . F)/d theta into joint_by_position."""
+    force = plant.fingertip_force
+    joints = plant.parents.size
+    for j in range(joints):
+        for k in range(joints):
+            linear.joint_by_position[j, k] = 0.0
+    if not plant.loaded:
+        return
+    # e_j turns with every joint between it and the base.
+    for j in range(joints):
+        k = plant.parents[j]
+        e = work.direction
+        while k >= 0:
+            a = work.spatial[AXIS]
+            linear.joint_by_position[j, k] = (
+                force[0] * (a[k, 1] * e[j, 2] - a[k, 2] * e[j, 1])
+                + force[1] * (a[k, 2] * e[j, 0] - a[k, 0] * e[j, 2])
+                + force[2] * (a[k, 0] * e[j, 1] - a[k, 1] * e[j, 0])
+            )
+            k = plant.parents[k]
+    # (J^T F)_i = column_i . F; a column turns with the joints below it and moves with the fingertip.
+    i = plant.tip_body
+    while i >= 0:
+        k = plant.tip_body
+        while k >= 0:
+            # The joint nearer to the base turns the other one's column.
+            inner, outer = (k, i) if k <= i else (i, k)
+            a, column = work.spatial[AXIS], work.jacobian
+            linear.torque_by_position[i, k] += (
+                force[0] * (a[inner, 1] * column[2, outer] - a[inner, 2] * column[1, outer])
+                + force[1] * (a[inner, 2] * column[0, outer] - a[inner, 0] * column[2, outer])
+                + force[2] * (a[inner, 0] * column[1, outer] - a[inner, 1] * column[0, outer])
+            )
+            k = plant.parents[k]
+        i = plant.parents[i]
+
+
+@compiled
+def _joint_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
+    tendons, joints = plant.coupling.shape
+    z_at = 2 * joints + 2 * (tendons - plant.actuated) + tendons
+    rows, table, out = work.joint, plant.joints, linear.joint
+    for j in range(joints):
+        speed, level, reaction = x[joints + j], rows[at.J_LEVEL, j], rows[at.REACTION, j]
+        own, by_speed, by_level = laws.stiction_rate_slopes(x[z_at + j], speed, level, table[j, at.J_STIFFNESS])
+        if level <= table[j, at.J_FLOOR]:
+            by_level = 0.0
+        sliding_slope = laws.friction_coefficient_slope(
+            speed, table[j, at.KINETIC], table[j, at.STATIC], table[j, at.J_STRIBECK]
+        )
+        by_reaction = by_level * rows[at.J_SLIDING, j]
+        by_load, by_along = laws.joint_reaction_slopes(rows[at.LOAD, j], rows[at.ALONG, j], reaction)
+        out[J_RATE_BY_STICTION, j] = own
+        out[J_RATE_BY_SPEED, j] = by_speed + by_level * reaction * sliding_slope
+        out[J_RATE_BY_LOAD, j] = by_reaction * by_load
+        limiter_by_position, limiter_by_velocity = laws.limiter_slopes(
+            rows[at.DEPTH, j], speed, table[j, at.L_STIFFNESS], table[j, at.L_DAMPING]
+        )
+        linear.torque_by_position[j, j] -= limiter_by_position
+        linear.torque_by_velocity[j, j] -= limiter_by_velocity + table[j, at.J_VISCOUS]
+        for k in range(joints):
+            linear.joint_by_position[j, k] *= by_reaction * by_along
+
+
+@compiled
+def _time_derivative(plant: Any, linear: Any) -> None:
+    """Fill df/dt, which enters through the command alone; the joints' rows are multiplied by M."""
+    tendons, joints = plant.coupling.shape
+    actuated = plant.actuated
+    s_at = 2 * joints + 2 * (tendons - actuated)
+    z_at = s_at + tendons
+    out = linear.time_derivative
+    out[:] = 0.0
+    for i in range(actuated):
+        rate = linear.tendon[COMMAND_RATE, i]
+        out[s_at + i] = linear.tendon[RATE_BY_COMMAND, i] * rate
+        delivered = -linear.tendon[BY_STICTION, i] * rate
+        for j in range(joints):
+            out[joints + j] += plant.coupling[i, j] * delivered
+            out[z_at + j] += linear.joint[J_RATE_BY_LOAD, j] * plant.loads[j, i] * delivered
+
+
+@compiled
+def linearise(plant: Any, control: Any, time: float, x: Any, work: Any, linear: Any) -> None:
+    """Fill all partial derivatives after `evaluate` at the same time and state."""
+    joints = plant.parents.size
+    velocity = x[joints : 2 * joints]
+    # The derivatives of inverse dynamics are taken at the actual acceleration.
+    inverse_dynamics(plant, velocity, work.joint[at.ACCELERATION], work, work.joint[at.BIAS])
+    inverse_dynamics_derivatives(plant, velocity, work)
+    for i in range(joints):
+        for j in range(joints):
+            linear.torque_by_position[i, j] = -work.square[BY_POSITION, i, j]
+            linear.torque_by_velocity[i, j] = -work.square[BY_VELOCITY, i, j]
+    _command_by_position(control, time, plant.actuated, work, linear)
+    _tendon_slopes(plant, x, work, linear)
+    _fingertip_slopes(plant, work, linear)
+    _joint_slopes(plant, x, work, linear)
+    _time_derivative(plant, linear)
+
+
+@compiled
+def _eliminate(plant: Any, g: float, linear: Any) -> None:
+    """Fill the gains G, F and Z."""
+    tendons, joints = plant.coupling.shape
+    actuated = plant.actuated
+    strands = plant.strand_coupling.shape[0]
+    reduced = linear.matrix.shape[0]
+    tendon, tendon_gain, strand_gain = linear.tendon, linear.tendon_gain, linear.strand_gain
+    for i in range(tendons):
+        factor = 1.0 / (g - tendon[RATE_BY_STICTION, i])
+        speed = tendon[RATE_BY_SPEED, i]
+        for c in range(joints):
+            value = linear.stiction_by_position[i, c] / g
+            if i < actuated:
+                value += speed * plant.coupling[i, c]
+            tendon_gain[i, c] = factor * value
+        for c in range(joints, reduced):
+            tendon_gain[i, c] = 0.0
+        if i >= actuated:
+            tendon_gain[i, joints + i - actuated] = factor * (tendon[RATE_BY_PASSIVE, i] / g + speed)
+    for s in range(strands):
+        for c in range(joints):
+            strand_gain[s, c] = linear.strand_by_position[s, c] / g
+            if s < actuated:
+                strand_gain[s, c] += (
+                    tendon[BY_SPEED, s] * plant.coupling[s, c] + tendon[BY_STICTION, s] * tendon_gain[s, c]
+                )
+        for c in range(joints, reduced):
+            strand_gain[s, c] = 0.0
+        if s >= actuated:
+            strand_gain[s, joints + (s - actuated) // 2] = linear.strand_by_passive[s] / g
+    for j in range(joints):
+        factor = 1.0 / (g - linear.joint[J_RATE_BY_STICTION, j])
+        for c in range(reduced):
+            load = 0.0
+            for s in range(strands):
+                load += plant.loads[j, s] * strand_gain[s, c]
+            value = linear.joint[J_RATE_BY_LOAD, j] * load
+            if c < joints:
+                value += linear.joint_by_position[j, c] / g
+            if c == j:
+                value += linear.joint[J_RATE_BY_SPEED, j]
+            linear.joint_gain[j, c] = factor * value
+
+
+@compiled
+def factorise(plant: Any, g: float, mass: Any, linear: Any) -> bool:
+    """Factorise g - J after `linearise`, with the mass matrix of that state; false if it is singular."""
+    tendons, joints = plant.coupling.shape
+    actuated = plant.actuated
+    strands = plant.strand_coupling.shape[0]
+    _eliminate(plant, g, linear)
+    matrix, strand_gain = linear.matrix, linear.strand_gain
+    reduced = matrix.shape[0]
+    for r in range(joints):
+        for c in range(reduced):
+            value = linear.joint_gain[r, c]
+            if c < joints:
+                value += g * mass[r, c] - linear.torque_by_position[r, c] / g - linear.torque_by_velocity[r, c]
+            for s in range(strands):
+                value -= plant.strand_coupling[s, r] * strand_gain[s, c]
+            matrix[r, c] = value
+    for k in range(tendons - actuated):
+        row, i, s = joints + k, actuated + k, actuated + 2 * k
+        for c in range(reduced):
+            matrix[row, c] = strand_gain[s + 1, c] - strand_gain[s, c] + linear.tendon_gain[i, c]
+        matrix[row, row] += g * plant.passive[k, at.PASSIVE_MASS] + plant.tendons[i, at.VISCOUS]
+    for c in range(reduced):
+        best = c
+        for r in range(c + 1, reduced):
+            if abs(matrix[r, c]) > abs(matrix[best, c]):
+                best = r
+        linear.pivots[c] = best
+        if not abs(matrix[best, c]) > 0.0:
+            return False
+        if best != c:
+            for k in range(reduced):
+                matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
+        for r in range(c + 1, reduced):
+            factor = matrix[r, c] / matrix[c, c]
+            matrix[r, c] = factor
+            for k in range(c + 1, reduced):
+                matrix[r, k] -= factor * matrix[c, k]
+    return True
+
+
+@compiled
+def _substitute(linear: Any) -> None:
+    """Replace the reduced right-hand side by the reduced solution."""
+    matrix, vector = linear.matrix, linear.vector
+    reduced = matrix.shape[0]
+    for c in range(reduced):
+        best = linear.pivots[c]
+        if best != c:
+            vector[c], vector[best] = vector[best], vector[c]
+    for r in range(reduced):
+        value = vector[r]
+        for c in range(r):
+            value -= matrix[r, c] * vector[c]
+        vector[r] = value
+    for r in range(reduced - 1, -1, -1):
+        value = vector[r]
+        for c in range(r + 1, reduced):
+            value -= matrix[r, c] * vector[c]
+        vector[r] = value / matrix[r, r]
+
+
+@compiled
+def solve(plant: Any, g: float, r: Any, linear: Any, u: Any) -> None:
+    """Fill u with the solution of (g - J) u = r, where r has its joints' velocity rows multiplied by M."""
+    tendons, joints = plant.coupling.shape
+    actuated = plant.actuated
+    passive = tendons - actuated
+    strands = plant.strand_coupling.shape[0]
+    p_at, w_at, s_at = 2 * joints, 2 * joints + passive, 2 * joints + 2 * passive
+    z_at = s_at + tendons
+    tendon, y = linear.tendon, linear.vector
+    of_tendon, of_strand, of_joint = linear.constant[0], linear.constant[1], linear.constant[2]
+    for i in range(tendons):
+        value = 0.0
+        for j in range(joints):
+            value += linear.stiction_by_position[i, j] * r[j]
+        if i >= actuated:
+            value += tendon[RATE_BY_PASSIVE, i] * r[p_at + i - actuated]
+        of_tendon[i] = (r[s_at + i] + value / g) / (g - tendon[RATE_BY_STICTION, i])
+    for s in range(strands):
+        value = 0.0
+        for j in range(joints):
+            value += linear.strand_by_position[s, j] * r[j]
+        if s >= actuated:
+            value += linear.strand_by_passive[s] * r[p_at + (s - actuated) // 2]
+        of_strand[s] = value / g
+        if s < actuated:
+            of_strand[s] += tendon[BY_STICTION, s] * of_tendon[s]
+    for j in range(joints):
+        load, turned, torque = 0.0, 0.0, 0.0
+        for s in range(strands):
+            load += plant.loads[j, s] * of_strand[s]
+            torque += plant.strand_coupling[s, j] * of_strand[s]
+        for k in range(joints):
+            turned += linear.joint_by_position[j, k] * r[k]
+            torque += linear.torque_by_position[j, k] * r[k] / g
+        rate = r[z_at + j] + linear.joint[J_RATE_BY_LOAD, j] * load + turned / g
+        of_joint[j] = rate / (g - linear.joint[J_RATE_BY_STICTION, j])
+        y[j] = r[joints + j] + torque - of_joint[j]
+    for k in range(passive):
+        s = actuated + 2 * k
+        y[joints + k] = (
+            plant.passive[k, at.PASSIVE_MASS] * r[w_at + k] + of_strand[s] - of_strand[s + 1] - of_tendon[actuated + k]
+        )
+    _substitute(linear)
+    for j in range(joints):
+        u[joints + j] = y[j]
+        u[j] = (r[j] + y[j]) / g
+        value = of_joint[j]
+        for c in range(y.size):
+            value += linear.joint_gain[j, c] * y[c]
+        u[z_at + j] = value
+    for k in range(passive):
+        u[w_at + k] = y[joints + k]
+        u[p_at + k] = (r[p_at + k] + y[joints + k]) / g
+    for i in range(tendons):
+        value = of_tendon[i]
+        for c in range(y.size):
+            value += linear.tendon_gain[i, c] * y[c]
+        u[s_at + i] = value

@@ -1,0 +1,205 @@
+"""Adaptive Rosenbrock steps with the exact Jacobian, compiled; without Newton iterations, which could fail."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.compilation import compiled, compiled_apart, entry
+from finger_pin.core.dynamics import evaluate
+from finger_pin.core.linearisation import factorise, linearise, solve
+from finger_pin.core.rigid_body import MASS_MATRIX
+
+# Entries of the memory that outlives a call.
+TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
+MEMORY_SIZE = 10
+DONE, FULL, UNDERFLOW, NOT_FINITE = range(4)
+
+_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
+
+
+@compiled_apart
+def _step(
+    plant: Any,
+    control: Any,
+    tableau: Any,
+    time: float,
+    h: float,
+    fresh: bool,
+    x: Any,
+    work: Any,
+    linear: Any,
+    k: Any,
+    scratch: Any,
+) -> int:
+    """Try one step: fill the increments k and, in scratch[1], the state at its end.
+
+    What depends on the start alone, f(t, x) in scratch[0] and M in scratch[4:], is kept for a second try.
+
+    Returns:
+        0 if tried, 1 if g - J is singular, 2 if f(t, x) is not finite.
+    """
+    size, joints = x.size, plant.parents.size
+    state, rate, r = scratch[1], scratch[2], scratch[3]
+    g = 1.0 / (h * tableau.gamma)
+    for i in range(tableau.nodes.size):
+        for c in range(size):
+            r[c], rate[c], state[c] = 0.0, scratch[0, c], x[c]
+        # Whole rows at a time, so that the compiler can use vector instructions.
+        for j in range(i):
+            of_stage, of_coupling = tableau.stage[i, j], tableau.coupling[i, j] / h
+            for c in range(size):
+                state[c] += of_stage * k[j, c]
+                r[c] += of_coupling * k[j, c]
+        if i > 0 or fresh:
+            evaluate(plant, control, time + tableau.nodes[i] * h, state, work, rate)
+        if i == 0:
+            if fresh:
+                for c in range(size):
+                    scratch[0, c] = rate[c]
+                    if not np.isfinite(rate[c]):
+                        return 2
+                linearise(plant, control, time, x, work, linear)
+                for a in range(joints):
+                    for b in range(joints):
+                        scratch[4 + a, b] = work.square[MASS_MATRIX, a, b]
+            if not factorise(plant, g, scratch[4:], linear):
+                return 1
+        for c in range(size):
+            rate[c] += r[c]
+            r[c] = rate[c]
+        for a in range(joints):
+            value = 0.0
+            for b in range(joints):
+                value += scratch[4 + a, b] * rate[joints + b]
+            r[joints + a] = value
+        of_time = h * tableau.time[i]
+        for c in range(size):
+            r[c] += of_time * linear.time_derivative[c]
+        solve(plant, g, r, linear, k[i])
+    for c in range(size):
+        state[c] += k[tableau.nodes.size - 1, c]
+    return 0
+
+
+@compiled
+def _error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
+    """Return the error of a step as a multiple of the tolerance, root mean square over the state."""
+    total = 0.0
+    for c in range(x.size):
+        scale = atol[c] + rtol * max(abs(x[c]), abs(end[c]))
+        total += (difference[c] / scale) ** 2
+    return np.sqrt(total / x.size)
+
+
+@entry
+def advance(
+    plant: Any,
+    control: Any,
+    tableau: Any,
+    x: Any,
+    end: float,
+    rtol: float,
+    atol: Any,
+    memory: Any,
+    work: Any,
+    linear: Any,
+    k: Any,
+    scratch: Any,
+    times: Any,
+    states: Any,
+    dense: Any,
+) -> Any:
+    """Take steps until the end, or until the record is full; return a status and the number of steps recorded.
+
+    Args:
+        plant: The finger.
+        control: The controller.
+        tableau: The method.
+        x: State, changed in place, shape (size,).
+        end: Time to reach, s.
+        rtol: Relative tolerance.
+        atol: Absolute tolerances, shape (size,).
+        memory: Time, step size, error history and counters; kept between calls.
+        work: Scratch of the dynamics.
+        linear: Scratch of the linearisation.
+        k: Scratch for the stages, shape (s, size).
+        scratch: Scratch, shape (4 + n, size).
+        times: Record of the times at which steps end, shape (m,); of length zero to record nothing.
+        states: Record of the states there, shape (m, size).
+        dense: Record of the interpolants of the steps, shape (m, rows of the tableau's dense, size).
+    """
+    size, count = x.size, tableau.nodes.size
+    recorded = 0
+    exponent = 1.0 / tableau.order
+    fresh = True
+    while memory[TIME] < end:
+        if times.size > 0 and recorded == times.size:
+            return FULL, recorded
+        time, h = memory[TIME], memory[STEP]
+        last = time + 1.01 * h >= end
+        if last:
+            h = end - time
+        error = np.inf
+        outcome = _step(plant, control, tableau, time, h, fresh, x, work, linear, k, scratch)
+        if outcome == 2:
+            for c in range(size - 1, -1, -1):
+                if not np.isfinite(scratch[0, c]):
+                    memory[CULPRIT] = c
+            return NOT_FINITE, recorded
+        if fresh:
+            memory[JACOBIANS] += 1
+        memory[FACTORISATIONS] += 1
+        memory[EVALUATIONS] += count if fresh else count - 1
+        if outcome == 0:
+            error = _error(x, scratch[1], k[count - 1], rtol, atol)
+        fresh = False
+        if not error <= 1e30:
+            factor = 0.1
+        else:
+            factor = min(_GROW, max(_SHRINK, _SAFETY * max(error, 1e-10) ** -exponent))
+        if error <= 1.0:
+            if memory[LAST_STEP] > 0.0:
+                # Gustafsson's predictive controller: the error's trend counts too.
+                trend = (memory[LAST_ERROR] / max(error, 1e-10) ** 2) ** exponent
+                predicted = _SAFETY * h / memory[LAST_STEP] * trend
+                factor = min(factor, max(_SHRINK, predicted))
+            if memory[CULPRIT] < 0.0:
+                # Right after a rejection the step does not grow.
+                factor = min(factor, 1.0)
+                memory[CULPRIT] = 0.0
+            if recorded < times.size:
+                for row in range(tableau.dense.shape[0]):
+                    for c in range(size):
+                        value = 0.0
+                        for j in range(count):
+                            value += tableau.dense[row, j] * k[j, c]
+                        dense[recorded, row, c] = value
+            for c in range(size):
+                x[c] = scratch[1, c]
+            memory[TIME] = end if last else time + h
+            memory[LAST_STEP], memory[LAST_ERROR] = h, max(error, 1e-2)
+            memory[ACCEPTED] += 1
+            if not last or factor < 1.0:
+                memory[STEP] = h * factor
+            else:
+                memory[STEP] = max(memory[STEP], h * factor)
+            if recorded < times.size:
+                times[recorded] = memory[TIME]
+                for c in range(size):
+                    states[recorded, c] = x[c]
+                recorded += 1
+            fresh = True
+        else:
+            memory[REJECTED] += 1
+            memory[CULPRIT] = -1.0
+            memory[STEP] = h * min(factor, 0.9)
+            if memory[STEP] < 1e-14 * max(1.0, abs(time)):
+                worst = 0.0
+                for c in range(size):
+                    ratio = abs(k[count - 1, c]) / (atol[c] + rtol * abs(x[c]))
+                    if not ratio <= worst:
+                        worst, memory[CULPRIT] = ratio, float(c)
+                return UNDERFLOW, recorded
+    return DONE, recorded
