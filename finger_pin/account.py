@@ -12,10 +12,10 @@ from finger_pin.energy import Energies, Powers, energies, powers
 from finger_pin.integration import Trajectory
 from finger_pin.routing import Array
 
-# Three-point Radau quadrature on [0, 1]. Its nodes are those of the Radau IIA method, so that over the steps of that
-# method the works are integrated with the method's own order.
-_NODES = np.array([(4.0 - np.sqrt(6.0)) / 10.0, (4.0 + np.sqrt(6.0)) / 10.0, 1.0])
-_WEIGHTS = np.array([(16.0 - np.sqrt(6.0)) / 36.0, (16.0 + np.sqrt(6.0)) / 36.0, 1.0 / 9.0])
+# Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
+# tensions at the ends of steps, where a node would see those of the next one.
+_NODES = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
+_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 _CHUNK = 4096
 
 
