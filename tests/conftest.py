@@ -3,6 +3,7 @@
 import pytest
 
 import finger_pin as fp
+from finger_pin.scenario import METHODS
 
 
 @pytest.fixture(scope="session")
@@ -48,15 +49,12 @@ def network():
 def fig6_runs():
     """The first 0.15 s of fig6 by every method at the default tolerances."""
     return {
-        method: fp.simulate(
-            fp.load_scenario("fig6", {"simulation.duration": 0.15, "simulation.method": method})
-        )
-        for method in ("Radau", "BDF", "LSODA")
+        method: fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.15, "simulation.method": method}))
+        for method in METHODS
     }
 
 
 @pytest.fixture(scope="session")
-def fig6_period():
-    """Five seconds of fig6, the first second and the four-second period after it, at tolerances of 1e-4."""
-    settings = {"duration": 5.0, "method": "BDF", "rtol": 1e-4, "atol_scale": 1e-4, "sample_rate": 500.0}
-    return fp.simulate(fp.load_scenario("fig6", {f"simulation.{key}": value for key, value in settings.items()}))
+def fig6():
+    """The main job, all of it."""
+    return fp.simulate(fp.load_scenario("fig6"))

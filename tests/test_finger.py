@@ -12,6 +12,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.closed_loop import ClosedLoop
+from finger_pin.core.finger import CompiledFinger
 from finger_pin.exceptions import InputError
 
 UB = {
@@ -241,12 +242,13 @@ def close(actual, expected, name):
     np.testing.assert_allclose(actual, expected, rtol=1e-10, atol=1e-10 * np.abs(expected).max(), err_msg=name)
 
 
-def test_evaluation_agrees_with_the_scalar_model_at_random_states(case):
+@pytest.mark.parametrize("evaluator", [lambda finger: finger, CompiledFinger], ids=["Python", "compiled"])
+def test_evaluation_agrees_with_the_scalar_model_at_random_states(case, evaluator):
     numbers, loop = case
-    seen = []
+    evaluated, seen = evaluator(loop.finger), []
     for x, command, force in random_states(numbers):
         rate, expected = scalar_model(numbers, x, command, force)
-        signals = loop.finger.evaluate(x, command, force)
+        signals = evaluated.evaluate(x, command, force)
         actual = {
             "phi": signals.tendons.curvature,
             "slide": signals.tendons.velocity,
