@@ -1,17 +1,45 @@
 """finger_pin: tendon-driven robot fingers whose tendons rub, stretch, go slack and stick.
 
-import finger_pin as fp
-
-result = fp.simulate(fp.load_scenario("fig6"))
+Start with `load_scenario` and `simulate`; `Finger` and `Simulator` serve loops of one's own.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted
-from finger_pin.finger import Finger
 from finger_pin.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
 from finger_pin.parameters import FingerDescription
-from finger_pin.recording import load_result, save
 from finger_pin.scenario import Scenario
-from finger_pin.simulation import simulate
+
+if TYPE_CHECKING:
+    from finger_pin.finger import Finger
+    from finger_pin.many import simulate_many
+    from finger_pin.plots import draw_all, plot_energy, plot_fig6, plot_friction_law, plot_losses, plot_workspace
+    from finger_pin.recording import load_result, save
+    from finger_pin.simulation import simulate
+    from finger_pin.simulator import Simulator
+    from finger_pin.viewer import LiveView, view, write_animation
+
+# What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
+_LATER = {
+    "Finger": "finger",
+    "LiveView": "viewer",
+    "Simulator": "simulator",
+    "draw_all": "plots",
+    "load_result": "recording",
+    "plot_energy": "plots",
+    "plot_fig6": "plots",
+    "plot_friction_law": "plots",
+    "plot_losses": "plots",
+    "plot_workspace": "plots",
+    "save": "recording",
+    "simulate": "simulation",
+    "simulate_many": "many",
+    "view": "viewer",
+    "write_animation": "viewer",
+}
 
 __all__ = [
     "Finger",
@@ -20,13 +48,35 @@ __all__ = [
     "InputError",
     "IntegrationError",
     "Interrupted",
+    "LiveView",
     "Scenario",
+    "Simulator",
+    "draw_all",
     "list_fingers",
     "list_scenarios",
     "load_finger",
     "load_result",
     "load_scenario",
+    "plot_energy",
+    "plot_fig6",
+    "plot_friction_law",
+    "plot_losses",
+    "plot_workspace",
     "save",
     "simulate",
+    "simulate_many",
     "to_toml",
+    "view",
+    "write_animation",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use."""
+    if name in _LATER:
+        return getattr(import_module(f"finger_pin.{_LATER[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

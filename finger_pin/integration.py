@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.integrate
 import scipy.linalg
 
 from finger_pin.routing import Array
+
+_MOST_STALLED = 1000
 
 Progress = Callable[[float], None]
 Stop = Callable[[], bool]
@@ -46,7 +49,42 @@ class Trajectory:
     interrupted: bool = False
 
 
-_SOLVERS = {"Radau": scipy.integrate.Radau, "BDF": scipy.integrate.BDF, "LSODA": scipy.integrate.LSODA}
+class _Broken(Exception):
+    """The integrator produced something that it cannot go on from."""
+
+
+class _Monitor:
+    """Sees every accepted step: reports progress, and ends the integration inside a step when asked to.
+
+    It is given to solve_ivp as an event function, the only place where solve_ivp calls back once a step.
+    """
+
+    terminal = True
+
+    def __init__(self, progress: Progress | None, stop: Stop | None) -> None:
+        self.progress = progress
+        self.stop = stop
+        self.reached = 0.0
+        self.stop_time = np.inf
+        self.calls_here = 0
+
+    def __call__(self, instant: float, x: Array) -> float:
+        if self.stop_time < np.inf:
+            # solve_ivp looks for the root of this function: the time to stop at.
+            return self.stop_time - instant
+        if not np.all(np.isfinite(x)):
+            raise _Broken("the state is not finite")
+        self.calls_here = 0 if instant > self.reached else self.calls_here + 1
+        if self.calls_here > _MOST_STALLED:
+            raise _Broken("the step size is less than the spacing between numbers")
+        if instant > self.reached:
+            if self.progress is not None:
+                self.progress(float(instant))
+            if self.stop is not None and self.stop():
+                self.stop_time = 0.5 * (self.reached + instant)
+                return self.stop_time - instant
+            self.reached = float(instant)
+        return 1.0
 
 
 def integrate(
@@ -73,46 +111,45 @@ def integrate(
         stop: Asked after every step; true ends the integration there.
     """
     began = time.perf_counter()
-    system = _System(rhs)
-    times, pieces, reason, interrupted = [0.0], [], "", False
-    solver = None
-    # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
-    with np.errstate(over="ignore", invalid="ignore"):
-        try:
-            solver = _SOLVERS[method](system, 0.0, start, duration, rtol=rtol, atol=atol)
-            while solver.status == "running" and not (reason or interrupted):
-                message = solver.step()
-                if solver.status == "failed":
-                    reason = str(message)
-                elif not np.all(np.isfinite(solver.y)):
-                    reason = "the state is not finite"
-                elif solver.t <= times[-1]:
-                    reason = "the step size is less than the spacing between numbers"
-                else:
-                    times.append(float(solver.t))
-                    pieces.append(solver.dense_output())
-                    if progress is not None:
-                        progress(times[-1])
-                    interrupted = stop is not None and stop()
-        except (ValueError, scipy.linalg.LinAlgError) as error:
-            if error is system.error:
-                raise
-            # Non-finite numbers in scipy's linear algebra.
+    system, monitor = _System(rhs), _Monitor(progress, stop)
+
+    def solve(end: float, watch: _Monitor) -> Any:
+        # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return scipy.integrate.solve_ivp(
+                system, (0.0, end), start, method=method, rtol=rtol, atol=atol, dense_output=True, events=watch
+            )
+
+    reason = ""
+    try:
+        solution = solve(duration, monitor)
+    except (_Broken, ValueError, scipy.linalg.LinAlgError) as error:
+        if error is system.error:
+            raise
+        if isinstance(error, _Broken):
+            reason = str(error)
+        else:
             reason = f"the state or its Jacobian is not finite ({error})"
-    statistics = Statistics(
-        steps=len(pieces),
-        evaluations=system.evaluations,
-        jacobians=int(solver.njev) if solver else 0,
-        factorisations=int(solver.nlu) if solver else 0,
-        wall_time=time.perf_counter() - began,
-    )
-    dense = scipy.integrate.OdeSolution(times, pieces, alt_segment=method != "Radau") if pieces else None
+        # Repeat up to the last good step, to keep what was computed.
+        solution = solve(monitor.reached, _Monitor(None, None)) if monitor.reached > 0.0 else None
+    if solution is None:
+        nothing = Statistics(0, system.evaluations, 0, 0, time.perf_counter() - began)
+        return Trajectory(np.zeros(1), lambda at: np.tile(start, (len(at), 1)), nothing, failure=reason)
+    if solution.status == -1 and not reason:
+        reason = str(solution.message)
+    dense = solution.sol
     return Trajectory(
-        breakpoints=np.array(times),
-        interpolate=lambda at: np.asarray(dense(at).T) if dense else np.tile(start, (len(at), 1)),
-        statistics=statistics,
+        breakpoints=solution.t,
+        interpolate=lambda at: np.asarray(dense(at).T),
+        statistics=Statistics(
+            steps=len(solution.t) - 1,
+            evaluations=system.evaluations,
+            jacobians=int(solution.njev),
+            factorisations=int(solution.nlu),
+            wall_time=time.perf_counter() - began,
+        ),
         failure=reason,
-        interrupted=interrupted,
+        interrupted=solution.status == 1,
     )
 
 

@@ -9,6 +9,7 @@ n joints, t tendons, p of them passive: 19 numbers for the paper's finger.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,10 +58,15 @@ class Layout:
         n, p, t = len(self.joints), self.passive, len(self.tendons)
         return n, n, p, p, t, n
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of the packed state."""
         return sum(self.sizes)
+
+    @cached_property
+    def _parts(self) -> tuple[slice, ...]:
+        ends = np.cumsum(self.sizes)
+        return tuple(slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,7 +104,7 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        return State(*np.split(x, np.cumsum(self.sizes)[:-1], axis=-1))
+        return State(*[x[..., part] for part in self._parts])
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 
@@ -34,11 +35,18 @@ class Stepper:
         self.rtol, self.atol = rtol, np.asarray(atol, dtype=float)
         self.memory = np.zeros(core.MEMORY_SIZE)
         self.memory[core.STEP] = _FIRST_STEP
+        self._allocate()
+
+    def _allocate(self) -> None:
+        plant, tableau = self.plant, self.tableau
         stages, size = len(tableau.nodes), len(self.x)
-        self._work = build_work(plant)
-        self._linear = build_linear(plant)
-        self._k = np.zeros((stages, size))
-        self._scratch = np.zeros((4 + len(plant.parents), size))
+        self._scratch = (
+            self.memory,
+            build_work(plant),
+            build_linear(plant),
+            np.zeros((stages, size)),
+            np.zeros((4 + len(plant.parents), size)),
+        )
         self._nothing = (np.zeros(0), np.zeros((0, size)), np.zeros((0, len(tableau.dense), size)))
 
     @property
@@ -56,14 +64,31 @@ class Stepper:
             end,
             self.rtol,
             self.atol,
-            self.memory,
-            self._work,
-            self._linear,
-            self._k,
-            self._scratch,
+            *self._scratch,
             *(record or self._nothing),
         )
-        return int(status), int(steps)
+        return status, steps
+
+    def restart(self, x: Array) -> None:
+        """Go on from another state at the same time, with no memory of earlier steps."""
+        self.x[:] = x
+        self.memory[[core.LAST_STEP, core.LAST_ERROR, core.CULPRIT, core.HELD_STEP]] = 0.0
+        self.memory[core.STEP] = _FIRST_STEP
+
+    def load(self, fingertip_force: Array) -> None:
+        """Set the fingertip force, shape (3,), N, base frame."""
+        self.plant.fingertip_force[:] = fingertip_force
+        if np.any(fingertip_force) and not self.plant.loaded:
+            self.plant = self.plant._replace(loaded=True)
+
+    def copy(self) -> Stepper:
+        """Return an independent stepper that goes on bit by bit alike."""
+        twin = copy.copy(self)
+        twin.plant = self.plant._replace(fingertip_force=self.plant.fingertip_force.copy())
+        twin.control = self.control._replace(tension=self.control.tension.copy())
+        twin.x, twin.memory = self.x.copy(), self.memory.copy()
+        twin._allocate()
+        return twin
 
     def failure(self, status: int, names: tuple[str, ...]) -> str:
         """Say what a status means; empty if nothing failed."""

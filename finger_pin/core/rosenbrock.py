@@ -13,7 +13,7 @@ from finger_pin.core.rigid_body import MASS_MATRIX
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
-MEMORY_SIZE = 10
+HELD_STEP, MEMORY_SIZE = range(10, 12)
 DONE, FULL, UNDERFLOW, NOT_FINITE = range(4)
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
@@ -134,6 +134,10 @@ def advance(
     recorded = 0
     exponent = 1.0 / tableau.order
     fresh = True
+    jumped = control.held
+    if jumped and memory[HELD_STEP] > 0.0:
+        # Held tensions have just jumped: what sufficed after the last jump is the best guess.
+        memory[STEP], memory[LAST_STEP] = memory[HELD_STEP], 0.0
     while memory[TIME] < end:
         if times.size > 0 and recorded == times.size:
             return FULL, recorded
@@ -176,6 +180,9 @@ def advance(
                         for j in range(count):
                             value += tableau.dense[row, j] * k[j, c]
                         dense[recorded, row, c] = value
+            if jumped:
+                memory[HELD_STEP] = h * min(factor, 1.5)
+                jumped = False
             for c in range(size):
                 x[c] = scratch[1, c]
             memory[TIME] = end if last else time + h

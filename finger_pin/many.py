@@ -1,0 +1,143 @@
+"""Many runs at once: scenarios over processes, results stacked in one Dataset."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.core.compilation import CACHE_FOLDER
+from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.scenario import Scenario
+from finger_pin.simulation import simulate
+
+_PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time")
+
+
+def simulate_many(
+    scenarios: Iterable[Scenario],
+    *,
+    workers: int | None = None,
+    variables: Sequence[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Simulate scenarios in parallel processes.
+
+    A script that calls this needs the usual guard ``if __name__ == "__main__":``, since the processes import it.
+
+    Args:
+        scenarios: Scenarios whose fingers have the same joints and tendons, with the same sample times.
+        workers: Number of processes; by default one per core that this process may use.
+        variables: Names of the variables to keep; all by default. Fewer need less memory.
+        progress: Called with the numbers of finished and of all runs.
+
+    Returns:
+        The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN from
+        where it stopped; ``failure`` says why, and is empty for the others. ``scenario`` holds every run's TOML.
+
+    Raises:
+        InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
+    """
+    runs = list(scenarios)
+    if not runs:
+        raise InputError("scenarios", "at least one is needed")
+    _check_alike(runs)
+    if workers is not None and workers < 1:
+        raise InputError("workers", "must be at least 1", workers)
+    count = min(workers or len(os.sched_getaffinity(0)), len(runs))
+    keep = None if variables is None else tuple(variables)
+    # The first run comes first and here: it compiles what the other processes then find in the cache.
+    results: list[xr.Dataset | None] = [None] * len(runs)
+    results[0] = _run(runs[0], keep)
+    done = 1
+    if progress is not None:
+        progress(done, len(runs))
+    if count == 1 or len(runs) == 1:
+        for index in range(1, len(runs)):
+            results[index] = _run(runs[index], keep)
+            if progress is not None:
+                progress(index + 1, len(runs))
+        return _stack(runs, results)
+    with ProcessPoolExecutor(count, mp_context=_context()) as pool:
+        pending = {pool.submit(_run, run, keep): index for index, run in enumerate(runs) if index > 0}
+        try:
+            for future in as_completed(pending):
+                results[pending[future]] = future.result()
+                done += 1
+                if progress is not None:
+                    progress(done, len(runs))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return _stack(runs, results)
+
+
+def _context() -> multiprocessing.context.BaseContext:
+    """Return how to start processes: from a clean server where the cache serves them, else as copies of this one."""
+    methods = multiprocessing.get_all_start_methods()
+    if CACHE_FOLDER is None and "fork" in methods:
+        return multiprocessing.get_context("fork")
+    if "forkserver" in methods:
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(["finger_pin.simulation"])
+        return context
+    return multiprocessing.get_context("spawn")
+
+
+def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:
+    failure = ""
+    try:
+        result = simulate(scenario)
+    except IntegrationError as error:
+        assert error.result is not None
+        failure, result = str(error), error.result
+    if keep is not None:
+        for name in keep:
+            if name not in result:
+                raise InputError(
+                    "variables", f"there is no such variable; there are {', '.join(map(str, result))}", name
+                )
+        result = result[list(keep)]
+    return result.assign_attrs(failure=failure)
+
+
+def _check_alike(runs: Sequence[Scenario]) -> None:
+    first = runs[0]
+    for index, run in enumerate(runs):
+        for entry, value, expected in (
+            ("finger.joints", tuple(run.finger.joints), tuple(first.finger.joints)),
+            ("finger.tendons", tuple(run.finger.tendons), tuple(first.finger.tendons)),
+            ("simulation.duration", run.simulation.duration, first.simulation.duration),
+            ("simulation.sample_rate", run.simulation.sample_rate, first.simulation.sample_rate),
+        ):
+            if value != expected:
+                raise InputError(f"scenarios[{index}].{entry}", f"must be {expected}, as in the first scenario", value)
+
+
+def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | None]) -> xr.Dataset:
+    found = [result for result in results if result is not None]
+    longest = max(found, key=lambda result: result.sizes["time"])
+    length = len(runs[0].sample_times())
+    times = runs[0].sample_times()
+    stacked: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}
+    for name, variable in longest.data_vars.items():
+        values = np.full((len(found), length, *variable.shape[1:]), np.nan)
+        for row, result in enumerate(found):
+            values[row, : result.sizes["time"]] = result[name].values
+        stacked[str(name)] = (("run", *map(str, variable.dims)), values, dict(variable.attrs))
+    for name in _PER_RUN:
+        stacked[name] = (("run",), np.array([result.attrs[name] for result in found]), {"long_name": name})
+    stacked["failure"] = (("run",), np.array([result.attrs["failure"] for result in found]), {"long_name": "failure"})
+    scenarios = np.array([result.attrs["scenario"] for result in found])
+    stacked["scenario"] = (("run",), scenarios, {"long_name": "resolved scenario, TOML"})
+    shared = {key: value for key, value in longest.attrs.items() if key.startswith("version_")}
+    coordinates = {name: coordinate for name, coordinate in longest.coords.items() if name != "time"}
+    return xr.Dataset(
+        stacked,
+        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.arange(len(found)), **coordinates},
+        attrs=shared,
+    )
