@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finger_pin.blocks.joint_friction import JointForces
 from finger_pin.blocks.rigid_body import Motion
@@ -37,11 +38,14 @@ class CompiledFinger:
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
-        states = np.ascontiguousarray(np.atleast_2d(x))
+        # Compiled code checks no sizes.
+        state = self.finger.layout.unpack(np.asarray(x))
+        states = _rows(x, np.atleast_2d(x).shape)
         count, size = states.shape
-        commands = np.ascontiguousarray(np.broadcast_to(command, (count, self.plant.actuated)))
+        commands = _rows(command, (count, self.plant.actuated))
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        plant = self.plant._replace(fingertip_force=force, loaded=bool(np.any(force)))
+        forces = _rows(force, (count, 3))
+        plant = self.plant._replace(fingertip_force=np.zeros(3), loaded=bool(np.any(force)))
         tendons, joints = plant.coupling.shape
         rates = np.zeros((count, size))
         strands = np.zeros((count, plant.strand_coupling.shape[0]))
@@ -49,13 +53,13 @@ class CompiledFinger:
         of_joints = np.zeros((JOINT_ROWS, count, joints))
         # An earlier evaluation with a fingertip force leaves its rows behind.
         self._work.joint[[at.ALONG, at.EXTERNAL]] = 0.0
-        evaluate_many(plant, self._control, commands, states, self._work, rates, strands, of_tendons, of_joints)
+        evaluate_many(plant, self._control, commands, forces, states, self._work, rates, strands, of_tendons, of_joints)
         if np.ndim(x) == 1:
             rates, strands, commands = rates[0], strands[0], commands[0]
             of_tendons, of_joints = of_tendons[:, 0], of_joints[:, 0]
         rate = self.finger.layout.unpack(rates)
         return FingerSignals(
-            state=self.finger.layout.unpack(np.asarray(x)),
+            state=state,
             command=commands,
             fingertip_force=force,
             tendons=TendonForces(
@@ -84,9 +88,15 @@ class CompiledFinger:
         )
 
     def motion(self, position: Array, velocity: Array) -> Motion:
-        """Return fingertip and energies of the rigid body at positions and velocities, shape (m, n)."""
-        count = len(position)
-        tips, kinetic, potential = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
-        positions, velocities = np.ascontiguousarray(position), np.ascontiguousarray(velocity)
-        motion_many(self.plant, positions, velocities, self._work, tips, kinetic, potential)
+        """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""
+        shape = (np.atleast_2d(position).shape[0], len(self.plant.parents))
+        tips, kinetic, potential = np.zeros((shape[0], 3)), np.zeros(shape[0]), np.zeros(shape[0])
+        motion_many(self.plant, _rows(position, shape), _rows(velocity, shape), self._work, tips, kinetic, potential)
+        if np.ndim(position) == 1:
+            return Motion(tips[0], kinetic[0], potential[0])
         return Motion(tips, kinetic, potential)
+
+
+def _rows(values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return a copy of one kind alone, of which the core has one compilation: writable, contiguous, of floats."""
+    return np.array(np.broadcast_to(values, shape), dtype=float, order="C")

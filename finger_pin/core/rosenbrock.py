@@ -134,15 +134,19 @@ def advance(
     recorded = 0
     exponent = 1.0 / tableau.order
     fresh = True
-    jumped = control.held
+    # Right after a full record nothing has jumped.
+    jumped = control.held and memory[HELD_STEP] >= 0.0
+    memory[HELD_STEP] = abs(memory[HELD_STEP])
     if jumped and memory[HELD_STEP] > 0.0:
         # Held tensions have just jumped: what sufficed after the last jump is the best guess.
         memory[STEP], memory[LAST_STEP] = memory[HELD_STEP], 0.0
     while memory[TIME] < end:
         if times.size > 0 and recorded == times.size:
+            memory[HELD_STEP] = -memory[HELD_STEP]
             return FULL, recorded
         time, h = memory[TIME], memory[STEP]
         last = time + 1.01 * h >= end
+        cut = last and end - time < h
         if last:
             h = end - time
         error = np.inf
@@ -164,8 +168,8 @@ def advance(
         else:
             factor = min(_GROW, max(_SHRINK, _SAFETY * max(error, 1e-10) ** -exponent))
         if error <= 1.0:
-            if memory[LAST_STEP] > 0.0:
-                # Gustafsson's predictive controller: the error's trend counts too.
+            if memory[LAST_STEP] > 0.0 and not cut:
+                # Gustafsson's predictive controller: the error's trend counts too, unless the end cut the step.
                 trend = (memory[LAST_ERROR] / max(error, 1e-10) ** 2) ** exponent
                 predicted = _SAFETY * h / memory[LAST_STEP] * trend
                 factor = min(factor, max(_SHRINK, predicted))
@@ -180,9 +184,9 @@ def advance(
                         for j in range(count):
                             value += tableau.dense[row, j] * k[j, c]
                         dense[recorded, row, c] = value
-            if jumped:
+            if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
-                jumped = False
+            jumped = False
             for c in range(size):
                 x[c] = scratch[1, c]
             memory[TIME] = end if last else time + h

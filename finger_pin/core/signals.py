@@ -15,7 +15,16 @@ TENDON_ROWS = at.CURVATURE + 1
 
 @entry
 def evaluate_many(
-    plant: Any, control: Any, commands: Any, states: Any, work: Any, rates: Any, strands: Any, tendons: Any, joints: Any
+    plant: Any,
+    control: Any,
+    commands: Any,
+    forces: Any,
+    states: Any,
+    work: Any,
+    rates: Any,
+    strands: Any,
+    tendons: Any,
+    joints: Any,
 ) -> None:
     """Evaluate states under given tensions; ``control`` must hold tensions.
 
@@ -23,6 +32,7 @@ def evaluate_many(
         plant: The finger.
         control: A control that holds its tensions.
         commands: f^a, shape (m, a).
+        forces: F, shape (m, 3).
         states: Shape (m, size).
         work: Scratch.
         rates: Filled with state rates, shape (m, size).
@@ -33,6 +43,8 @@ def evaluate_many(
     for m in range(states.shape[0]):
         for i in range(commands.shape[1]):
             control.tension[i] = commands[m, i]
+        for r in range(3):
+            plant.fingertip_force[r] = forces[m, r]
         evaluate(plant, control, 0.0, states[m], work, rates[m])
         for s in range(strands.shape[1]):
             strands[m, s] = work.strand[0, s]
