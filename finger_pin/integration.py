@@ -15,7 +15,7 @@ from finger_pin.routing import Array
 
 _MOST_STALLED = 1000
 
-Progress = Callable[[float], None]
+Watch = Callable[[float, Array], None]
 Stop = Callable[[], bool]
 
 
@@ -54,15 +54,15 @@ class _Broken(Exception):
 
 
 class _Monitor:
-    """Sees every accepted step: reports progress, and ends the integration inside a step when asked to.
+    """Sees every accepted step: shows it, and ends the integration inside a step when asked to.
 
     It is given to solve_ivp as an event function, the only place where solve_ivp calls back once a step.
     """
 
     terminal = True
 
-    def __init__(self, progress: Progress | None, stop: Stop | None) -> None:
-        self.progress = progress
+    def __init__(self, watch: Watch | None, stop: Stop | None) -> None:
+        self.watch = watch
         self.stop = stop
         self.reached = 0.0
         self.stop_time = np.inf
@@ -78,8 +78,8 @@ class _Monitor:
         if self.calls_here > _MOST_STALLED:
             raise _Broken("the step size is less than the spacing between numbers")
         if instant > self.reached:
-            if self.progress is not None:
-                self.progress(float(instant))
+            if self.watch is not None:
+                self.watch(float(instant), x)
             if self.stop is not None and self.stop():
                 self.stop_time = 0.5 * (self.reached + instant)
                 return self.stop_time - instant
@@ -95,7 +95,7 @@ def integrate(
     method: str,
     rtol: float,
     atol: Array,
-    progress: Progress | None = None,
+    watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
     """Integrate from time zero with one of scipy's methods.
@@ -107,17 +107,17 @@ def integrate(
         method: ``Radau``, ``BDF`` or ``LSODA``.
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
-        progress: Called with the simulated time after every step.
+        watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
     """
     began = time.perf_counter()
-    system, monitor = _System(rhs), _Monitor(progress, stop)
+    system, monitor = _System(rhs), _Monitor(watch, stop)
 
-    def solve(end: float, watch: _Monitor) -> Any:
+    def solve(end: float, monitor: _Monitor) -> Any:
         # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
         with np.errstate(over="ignore", invalid="ignore"):
             return scipy.integrate.solve_ivp(
-                system, (0.0, end), start, method=method, rtol=rtol, atol=atol, dense_output=True, events=watch
+                system, (0.0, end), start, method=method, rtol=rtol, atol=atol, dense_output=True, events=monitor
             )
 
     reason = ""

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import xarray as xr
 
 from finger_pin.blocks.controller import Controller, ProportionalController
 from finger_pin.blocks.reference import HarmonicReference
-from finger_pin.closed_loop import ClosedLoop, Reference
+from finger_pin.closed_loop import ClosedLoop, LoopSignals, Reference
 from finger_pin.core.finger import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
 from finger_pin.core.plant import Control, build_control, held_control
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
-from finger_pin.integration import Progress, Stop, Trajectory, integrate
+from finger_pin.integration import Stop, Trajectory, Watch, integrate
 from finger_pin.recording import record
+from finger_pin.routing import Array
 from finger_pin.sampling import SampledController
 from finger_pin.scenario import Scenario
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 _CONTINUOUS = "Radau"
+# Steps between two looks at a compiled simulation: rarely for a progress bar, often for an observer.
+_CHUNK, _CHUNK_OBSERVED = 256, 4
 
 
 def simulate(
@@ -28,7 +32,8 @@ def simulate(
     controller: Controller | None = None,
     reference: Reference | None = None,
     control_period: float | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[float], None] | None = None,
+    observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario from rest on its reference.
@@ -44,6 +49,7 @@ def simulate(
         reference: Replaces the scenario's reference.
         control_period: Sampling period of the controller, s; by default it is continuous. Compiled methods only.
         progress: Called with the simulated time, s, now and then.
+        observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
 
     Returns:
@@ -66,7 +72,15 @@ def simulate(
         method = _CONTINUOUS
     if scenario.simulation.method in TABLEAUS:
         loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
-    trajectory = _integrate(scenario, loop, method, progress, stop)
+
+    def watch(time: float, x: Array) -> None:
+        if progress is not None:
+            progress(time)
+        if observe is not None:
+            observe(time, loop.evaluate(time, x))
+
+    chunk = _CHUNK if observe is None else _CHUNK_OBSERVED
+    trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
     reached = float(trajectory.breakpoints[-1])
     result = record(scenario, loop, trajectory, method)
     if trajectory.failure:
@@ -85,7 +99,7 @@ def _control(loop: ClosedLoop) -> Control | None:
 
 
 def _integrate(
-    scenario: Scenario, loop: ClosedLoop, method: str, progress: Progress | None, stop: Stop | None
+    scenario: Scenario, loop: ClosedLoop, method: str, watch: Watch, chunk: int, stop: Stop | None
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
@@ -98,7 +112,8 @@ def _integrate(
             loop.finger.layout.names,
             period=sampled.period if sampled else None,
             sample=sampled.sample if sampled else None,
-            progress=progress,
+            watch=watch,
+            chunk=chunk,
             stop=stop,
         )
     return integrate(
@@ -108,6 +123,6 @@ def _integrate(
         method=method,
         rtol=settings.rtol,
         atol=atol,
-        progress=progress,
+        watch=watch,
         stop=stop,
     )

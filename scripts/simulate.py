@@ -7,7 +7,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from finger_pin.console import Interrupts
     from finger_pin.results import ResultFolder
     from finger_pin.scenario import Scenario
+    from finger_pin.viewer import LiveView
 
 DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 # A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
@@ -61,6 +62,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         add(name, action="append", dest="set", type=shorthand(key), metavar=metavar, help=f"override {key}")
     add("--output", type=Path, metavar="DIR", help="where results go; default results/<scenario>")
     add("--view", action=flag, default=False, help="open the viewer and play the result")
+    add("--live", action="store_true", help="watch in the viewer while it computes, at most in real time")
     add("--figures", action=flag, default=True, help="draw the figures")
     add("--quiet", action="store_true", help="print errors only")
     add("--list", action="store_true", help="list scenarios, fingers and methods, and exit")
@@ -111,7 +113,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
         scenario = load_scenario(options.scenario, dict(options.set))
         output = options.output or Path("results", scenario.name)
         with ResultFolder(output) as folder:
-            code, result, problem = simulate(scenario, interrupts, options.quiet)
+            code, result, problem = simulate(scenario, interrupts, options)
             if result is None:
                 complain(f"{problem}; nothing was computed")
                 return code
@@ -142,20 +144,36 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     return code
 
 
-def simulate(scenario: Scenario, interrupts: Interrupts, quiet: bool) -> tuple[int, xr.Dataset | None, str]:
+def simulate(
+    scenario: Scenario, interrupts: Interrupts, options: argparse.Namespace
+) -> tuple[int, xr.Dataset | None, str]:
     """Return the exit code, the result as far as it goes, and what went wrong if anything did."""
     from finger_pin.console import progress_bar
+    from finger_pin.core.compilation import is_cached
     from finger_pin.exceptions import IntegrationError, Interrupted
     from finger_pin.simulation import simulate
 
-    bar = progress_bar(scenario.simulation.duration) if sys.stderr.isatty() and not quiet else nullcontext()
-    with bar as progress, interrupts.patient():
+    shown = sys.stderr.isatty() and not options.quiet
+    if shown and not is_cached():
+        print("Compiling the model, once for this version: about half a minute ...", file=sys.stderr)
+    bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
+    with bar as progress, live_view(scenario, options.live) as live, interrupts.patient():
+        observe = live.observe if live else None
         try:
-            return DONE, simulate(scenario, progress=progress, stop=lambda: interrupts.requested), ""
+            return DONE, simulate(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested), ""
         except IntegrationError as error:
             return FAILED, error.result, str(error)
         except Interrupted as error:
             return INTERRUPTED, error.result, str(error)
+
+
+def live_view(scenario: Scenario, wanted: bool) -> AbstractContextManager[LiveView | None]:
+    """Return a viewer for the time of the simulation, or nothing."""
+    if not wanted:
+        return nullcontext()
+    from finger_pin.viewer import LiveView
+
+    return LiveView(scenario.finger, title=scenario.title)
 
 
 def draw(result: xr.Dataset, folder: ResultFolder, figures: bool) -> tuple[int, str]:

@@ -47,7 +47,7 @@ def share_left_open(loop, duration=0.03):
         method="BDF",
         rtol=1e-6,
         atol=1e-6 * loop.finger.layout.scales(),
-        progress=steps.append,
+        watch=lambda time, x: steps.append(time),
         stop=lambda: len(steps) == 600,
     )
     times = np.linspace(0.0, trajectory.breakpoints[-1], 101)

@@ -56,7 +56,7 @@ def test_statistics_count_steps_evaluations_jacobians_and_time(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_rises_through_every_step_to_the_end(method):
     reported = []
-    trajectory = run(decay, method=method, progress=reported.append)
+    trajectory = run(decay, method=method, watch=lambda time, x: reported.append(time))
     np.testing.assert_array_equal(reported, trajectory.breakpoints[1:])
     assert np.all(np.diff(reported) > 0.0) and reported[-1] == 1.0
 
@@ -64,7 +64,7 @@ def test_progress_rises_through_every_step_to_the_end(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_stop_ends_the_integration_there_and_keeps_what_was_computed(method):
     reported = []
-    trajectory = run(decay, method=method, progress=reported.append, stop=lambda: len(reported) == 7)
+    trajectory = run(decay, method=method, watch=lambda time, x: reported.append(time), stop=lambda: len(reported) == 7)
     assert trajectory.interrupted and not trajectory.failure
     assert len(reported) == 7
     end = trajectory.breakpoints[-1]

@@ -407,7 +407,7 @@ def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monk
 def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, monkeypatch, number):
     simulate = fp.simulation.simulate
 
-    def interrupted(scenario, *, progress, stop):
+    def interrupted(scenario, *, stop, **options):
         asked = []
 
         def counted():
@@ -416,7 +416,7 @@ def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, mon
                 os.kill(os.getpid(), number)
             return stop()
 
-        return simulate(scenario, progress=progress, stop=counted)
+        return simulate(scenario, stop=counted, **options)
 
     monkeypatch.setattr("finger_pin.simulation.simulate", interrupted)
     handler = signal.getsignal(number)

@@ -392,3 +392,15 @@ def test_two_passive_tendons_get_a_dimension_of_their_own():
     planned = 5e4 * 3e-3 * (result.joint_reference[:, 1] - result.joint_reference[:, 2])
     np.testing.assert_allclose(planned, 1.0, rtol=1e-9)
     assert float(abs(result.energy_residual).max()) < 1e-9
+
+
+def test_an_observer_sees_rising_times_and_the_signals_of_the_dynamics_and_changes_nothing():
+    scenario = short()
+    seen = []
+    observed = fp.simulate(scenario, observe=lambda time, signals: seen.append((time, signals)))
+    np.testing.assert_array_equal(observed.joint_position, fp.simulate(scenario).joint_position)
+    times = [time for time, _ in seen]
+    assert len(times) > 3 and np.all(np.diff(times) > 0.0) and times[-1] == observed.end_time
+    signals = seen[-1][1].finger
+    np.testing.assert_allclose(signals.state.position, observed.joint_position[-1], rtol=1e-12)
+    np.testing.assert_allclose(signals.joints.reaction, observed.joint_reaction[-1], rtol=1e-9)

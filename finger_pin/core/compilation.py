@@ -43,6 +43,11 @@ def _cache_folder() -> str | None:
 CACHE_FOLDER = _cache_folder()
 
 
+def is_cached() -> bool:
+    """Return whether compiled code is at hand, so that the first simulation starts at once."""
+    return CACHE_FOLDER is not None and any(Path(CACHE_FOLDER).rglob("*.nbi"))
+
+
 def compiled(function: _Function) -> _Function:
     """Return the function compiled, to be called by compiled code only, where it is inlined."""
     return _compile(function, cache=False, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)

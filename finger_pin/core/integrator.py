@@ -12,11 +12,10 @@ from finger_pin.core import rosenbrock as core
 from finger_pin.core.linearisation import build_linear
 from finger_pin.core.plant import Control, Plant, build_work
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
-from finger_pin.integration import Progress, Statistics, Stop, Trajectory
+from finger_pin.integration import Statistics, Stop, Trajectory, Watch
 from finger_pin.routing import Array
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
-_CHUNK = 256
 _FIRST_STEP = 1e-6
 
 
@@ -107,7 +106,8 @@ def integrate_compiled(
     *,
     period: float | None = None,
     sample: Callable[[float, Array], Array] | None = None,
-    progress: Progress | None = None,
+    watch: Watch | None = None,
+    chunk: int = 256,
     stop: Stop | None = None,
 ) -> Trajectory:
     """Integrate from time zero with the compiled core.
@@ -118,12 +118,15 @@ def integrate_compiled(
         names: Names of the numbers of the state, for messages.
         period: Sampling period of a controller that holds its tensions in between, s.
         sample: That controller: maps time and state to tensions, shape (a,).
-        progress: Called with the simulated time now and then.
+        watch: Called with the simulated time and the state after every chunk of steps.
+        chunk: Most steps between two calls.
         stop: Asked now and then; true ends the integration there.
     """
+    # Advancing by nothing compiles, which is no part of an integration's cost.
+    stepper.advance(stepper.time)
     began = time.perf_counter()
     start, size = stepper.x.copy(), len(stepper.x)
-    record = (np.zeros(_CHUNK), np.zeros((_CHUNK, size)), np.zeros((_CHUNK, len(stepper.tableau.dense), size)))
+    record = (np.zeros(chunk), np.zeros((chunk, size)), np.zeros((chunk, len(stepper.tableau.dense), size)))
     kept: tuple[list[Array], list[Array], list[Array]] = ([np.zeros(1)], [start[None]], [])
     reason, interrupted, samples = "", False, 0
     while stepper.time < duration and not reason and not interrupted:
@@ -137,8 +140,8 @@ def integrate_compiled(
         for store, block in zip(kept, record, strict=True):
             store.append(block[:steps].copy())
         reason = stepper.failure(status, names)
-        if progress is not None:
-            progress(stepper.time)
+        if watch is not None:
+            watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()
     times, states = np.concatenate(kept[0]), np.concatenate(kept[1])
     dense = np.concatenate(kept[2]) if kept[2] else np.zeros((0, len(stepper.tableau.dense), size))

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.closed_loop import LoopSignals
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
 from finger_pin.routing import Array
@@ -102,6 +103,7 @@ class LiveView(Viewing):
         self._scene = Scene(description)
         self._interval = 1.0 / rate
         self._due = -np.inf
+        self._started = np.inf
         self._pending: tuple[float, Array, Array, Array | None] | None = None
         limits = np.array([joint.range for joint in description.joints.values()]).clip(-np.pi, np.pi)
         # The camera must see all of the range: poses with the joints bent alike, and every combination of the first
@@ -137,6 +139,21 @@ class LiveView(Viewing):
         if now >= self._due:
             self._due = now + self._interval
             self._show()
+
+    def observe(self, t: float, signals: LoopSignals) -> None:
+        """Show a simulation in progress, held back to real time: an observer for `simulate`.
+
+        Args:
+            t: Simulated time, s.
+            signals: All signals then.
+        """
+        now = time.monotonic()
+        self._started = min(self._started, now - t)
+        time.sleep(max(0.0, self._started + t - now))
+        strands = signals.finger.tendons.strands
+        actuated = signals.finger.command.size
+        tension = np.concatenate([strands[:actuated], strands[actuated + 1 :: 2]])
+        self.update(t, signals.finger.state.position, tension, strands[actuated::2])
 
     def close(self) -> None:
         """Show the last state and stop serving; open pages keep what they have."""
