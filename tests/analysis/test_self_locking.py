@@ -1,0 +1,181 @@
+"""The critical joint friction: against the loop iterated, the kernel of the balance, hand results and simulations."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.analysis import critical_friction, self_locking_map, self_locking_margin
+
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=4)))
+
+
+def loop_converges(routing, coefficient, sign):
+    """Iterate friction -> torque -> tensions (21), (22) -> reaction -> friction; do its steps become shorter?"""
+    inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
+    loads = np.hstack([routing.loads[:, :4], routing.loads[:, 4:].sum(axis=1, keepdims=True)])
+    torque, change = np.zeros(4), np.zeros(4)
+    for _ in range(150):
+        minimal = inverse @ torque
+        tension = minimal + np.max((1.0 - minimal) / internal) * internal
+        before, change = change, coefficient * sign * (loads @ tension) - torque
+        torque = torque + change
+    # Steps at the level of rounding are as good as none.
+    return np.linalg.norm(change) < max(np.linalg.norm(before), 1e-9 * np.linalg.norm(torque))
+
+
+def bisect(routing, sign):
+    low, high = 1e-5, 0.02
+    while high - low > 1e-5 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if loop_converges(routing, middle, sign) else (low, middle)
+    return 0.5 * (low + high)
+
+
+def steps(coefficient, duration=2.0):
+    """Abduction and proximal swing one way, medial and distal the other, half a period: the worst directions."""
+    overrides = {"simulation.duration": duration, "simulation.sample_rate": 100.0}
+    overrides |= {f"finger.joint_friction.{name}": coefficient for name in ("coulomb", "stiction")}
+    swings = {"abduction": (0.0, 8.0), "proximal": (35.0, 25.0), "medial": (35.0, -25.0)}
+    for name, (offset, amplitude) in swings.items():
+        overrides[f"reference.joints.{name}"] = {
+            "offset": np.deg2rad(offset),
+            "amplitude": np.deg2rad(amplitude),
+            "frequency": 0.25,
+            "phase": 0.5 * np.pi,
+        }
+    return fp.load_scenario("fig6", overrides)
+
+
+def test_paper_finger_locks_near_three_quarters_of_a_millimetre(ub):
+    found = critical_friction(ub)
+    assert found.coefficient == pytest.approx(0.7537e-3, rel=1e-3)
+    assert abs(found.directions @ [1, 1, -1, -1]) == 4
+    assert found.tension.min() == pytest.approx(0.0, abs=1e-9 * found.tension.max())
+
+
+def test_single_joints_lock_between_two_and_eight_millimetres_as_by_hand(ub):
+    single = {name: critical_friction(ub, joints=[name]).coefficient for name in ub.joints}
+    assert single["proximal"] == pytest.approx(2.181e-3, rel=1e-3)
+    assert single["distal"] == pytest.approx(5.0e-3)  # T5 alone, on its radius
+    assert single["medial"] == pytest.approx(4.374e-3, rel=1e-3)
+    assert single["abduction"] == pytest.approx(1.714e-3, rel=1e-3)
+    assert critical_friction(ub, joints=["proximal"], velocity=[0, 1, 0, 0]).coefficient == pytest.approx(
+        8.0e-3
+    )  # T1 and T2
+
+
+@pytest.mark.parametrize("sign", [SIGNS[0], SIGNS[1], SIGNS[3], SIGNS[10], [1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, -1]])
+def test_the_loop_iterated_diverges_where_the_eigenvalue_says(ub, routing, sign):
+    sign = np.array(sign, dtype=float)
+    exact = critical_friction(ub, velocity=sign).coefficient
+    assert bisect(routing, sign) == pytest.approx(exact, rel=1e-4)
+
+
+def test_friction_undoes_force_closure_exactly_there(ub, routing):
+    halves = np.hstack([np.eye(5), np.eye(5)[:, 4:]]).T
+    for sign in SIGNS:
+        critical = critical_friction(ub, velocity=sign).coefficient
+
+        def kernel(share, critical=critical, sign=sign):
+            matrix = routing.coupling.T - share * critical * sign[:, None] * (routing.loads @ halves)
+            vector = np.linalg.svd(matrix)[2][-1]
+            return vector * np.sign(vector.sum())
+
+        assert all(kernel(share).min() > 0.0 for share in np.linspace(0.0, 0.999, 100))
+        assert kernel(1.001).min() < 0.0
+
+
+def test_runaway_satisfies_the_equations_of_the_finger(ub, finger):
+    for position in ([0.1, 0.4, 0.8, 0.56], [-0.1, 1.5, 0.2, 0.14]):
+        found = critical_friction(ub, position)
+        tendons, routing = finger.tendons, finger.routing
+        curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
+        loss = np.exp(-tendons.surface * curvature)
+        # Tendons slide one way or the other: one combination satisfies the balance.
+        residuals = []
+        for slide in product((-1.0, 1.0), repeat=5):
+            delivered = found.tension[:4] * loss[:4] ** np.array(slide[:4])
+            mean, part = found.tension[4], slide[4] * np.tanh(0.5 * tendons.surface[4] * curvature[4])
+            strands = np.append(delivered, [mean * (1.0 + part), mean * (1.0 - part)])
+            friction = found.coefficient * found.directions * (routing.loads @ strands)
+            residuals.append(np.abs(strands @ routing.strand_coupling - friction).max())
+        assert min(residuals) < 1e-9 * np.abs(friction).max()
+
+
+def test_gains_and_curvature_of_actuated_tendons_do_not_matter_to_the_paper_finger(ub):
+    # The delivered tensions balance, and whichever is zero stays so when scaled by its capstan factor. Only the passive
+    # tendon's friction shifts the value, and no joint bends its canal.
+    draw = np.random.default_rng(4)
+    found = [
+        critical_friction(ub, draw.uniform([-0.17, 0, 0, 0], [0.17, 1.5, 1.5, 1.5]), gain=gain).coefficient
+        for gain in (None, 0.1, 1.0, 10.0)
+    ]
+    assert found == pytest.approx([0.7418e-3] * 4, rel=1e-4)
+
+
+def test_map_varies_where_joints_bend_the_canal_of_a_passive_tendon(ub, finger):
+    paper = self_locking_map(finger, samples=5)
+    assert np.ptp(paper.coefficient) < 1e-9
+    assert paper.joints == ("proximal", "medial")
+    assert np.ptp(paper.tension) > 1.0
+    crossings = {"medial": {"radius": -0.0035, "bends": True}, "distal": {"radius": 0.005, "bends": True}}
+    overrides = {f"finger.tendons.T5.crossings.{joint}": entry for joint, entry in crossings.items()}
+    bent = self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=5)
+    assert np.all(np.diff(bent.coefficient, axis=1) < 0.0)
+    assert np.ptp(bent.coefficient, axis=0).max() < 1e-9
+
+
+def test_a_finger_beyond_the_critical_coefficient_can_nowhere_be_moved():
+    overrides = {f"finger.joint_friction.{name}": 7.6e-4 for name in ("coulomb", "stiction")}
+    stuck = self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=3)
+    assert stuck.coefficient.max() < stuck.actual
+    assert np.isinf(stuck.tension).all()
+
+
+def test_margin_is_the_ratio_of_critical_to_actual_stiction_in_the_worst_directions_of_the_reference():
+    margin = self_locking_margin(fp.load_scenario("fig6"))
+    assert margin.margin == pytest.approx(0.7418 / 0.35, rel=1e-3)
+    assert self_locking_margin(steps(0.7418e-3)).margin == pytest.approx(1.0, rel=1e-3)
+    assert self_locking_margin(fp.load_scenario("fig6", {"reference.joints": {}})).margin > 0.0
+
+
+def test_a_reference_at_rest_does_not_lock(ub):
+    still = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
+    assert self_locking_margin(fp.load_scenario("fig6", still)).margin == np.inf
+
+
+def test_simulated_finger_follows_below_the_critical_coefficient_and_locks_above_it():
+    # Below, the error settles: friction lags the finger by a constant. Above, it grows with every step of the
+    # reference and so does the tension, to the end of the motion.
+    late, end = 150, 200
+    peak, error = {}, {}
+    for share in (0.8, 1.2):
+        result = fp.simulate(steps(share * 0.7418e-3))
+        tension = result["tendon_command"].max("tendon").values
+        lag = np.abs(result["tracking_error"].sel(joint="distal").values)
+        peak[share], error[share] = tension.max(), lag[end] / lag[late // 2]
+    assert error[0.8] < 1.2
+    assert error[1.2] > 2.5
+    assert peak[1.2] > 5.0 * peak[0.8]
+
+
+def test_slow_motion_needs_the_tension_that_the_map_says():
+    # In the middle of the swing, where weight and inertia matter little.
+    result = fp.simulate(steps(5e-4))
+    overrides = {f"finger.joint_friction.{name}": 5e-4 for name in ("coulomb", "stiction")}
+    finger = fp.Finger(fp.load_finger("ub", overrides))
+    expected = self_locking_map(finger, samples=5).tension
+    simulated = float(result["tendon_command"].sel(time=1.0).max())
+    assert expected.min() * 0.7 < simulated < expected.max() * 1.1
+
+
+def test_wrong_arguments_are_named(ub, network):
+    with pytest.raises(fp.InputError, match="joints"):
+        critical_friction(ub, joints=["thumb"])
+    with pytest.raises(fp.InputError, match="velocity"):
+        critical_friction(ub, velocity=[1.0])
+    open_chain = network(["a", "b"], {"T1": {"a": 5.0}, "T2": {"a": -5.0, "b": 5.0}})
+    with pytest.raises(fp.InputError, match="force closure"):
+        critical_friction(open_chain)
