@@ -40,15 +40,18 @@ class Energies:
 class Powers:
     """What enters (actuators, fingertip force) and what is lost (the rest), shape (...,), W.
 
-    Slack is the difference that cutting a tension at zero makes: (f^a - f^f) v where f = 0.
+    Slack is the difference that cutting a tension at zero makes: (f^a - f^f) v where f = 0. What the micro-damping
+    takes while the bristles follow the motion it may return in part while they spring back.
     """
 
     actuators: Array
     fingertip: Array
     tendon_coulomb: Array
     tendon_viscous: Array
+    tendon_micro_damping: Array
     joint_coulomb: Array
     joint_viscous: Array
+    joint_micro_damping: Array
     limiter: Array
     slack: Array
 
@@ -86,8 +89,14 @@ def powers(finger: Finger, signals: FingerSignals) -> Powers:
             friction.coulomb_loss(state.tendon_stiction, tendons.velocity, tendons.level), axis=-1
         ),
         tendon_viscous=np.sum(friction.viscous_loss(tendons.velocity, finger.tendons.viscous), axis=-1),
+        tendon_micro_damping=np.sum(
+            friction.micro_loss(tendons.stiction_rate, tendons.velocity, finger.tendons.lag), axis=-1
+        ),
         joint_coulomb=np.sum(friction.coulomb_loss(state.joint_stiction, state.velocity, joints.level), axis=-1),
         joint_viscous=np.sum(friction.viscous_loss(state.velocity, finger.joint_friction.viscous), axis=-1),
+        joint_micro_damping=np.sum(
+            friction.micro_loss(joints.stiction_rate, state.velocity, finger.joint_friction.lag), axis=-1
+        ),
         limiter=np.sum(
             limiter_loss(signals.limiter_torque, signals.limiter_depth, state.velocity, limiter.stiffness), axis=-1
         ),

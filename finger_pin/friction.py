@@ -2,6 +2,14 @@
 
 Plain functions of numbers or arrays (they broadcast), without state. `stiction_rate` is (9a), `friction_level` is
 F^n M with M from (9b), `friction_force` is (9c). The derivatives serve implicit integrators.
+
+Two options lead from the paper's law to the usual LuGre model (Canudas de Wit et al., IEEE Trans. Automatic Control
+40(3), 1995), where F^s = sigma_0 z: the Stribeck exponent, 1 in the paper and 2 there, and the micro-damping sigma_1,
+0 in the paper, whose force is sigma_1 z' = lag F^s' with lag = sigma_1 / sigma_0.
+
+Without micro-damping the law is passive whatever happens. With it, while |F^s| <= F^n M^c and F^n is constant, it is
+if b >= sigma_1 (M^c - M^d) / M^d (Barabanov and Ortega, IEEE Trans. Automatic Control 45(4), 2000), and in any case
+as long as |v| <= 4 F^n M (1 + b / sigma_1) / sigma_1, which covers sticking.
 """
 
 from __future__ import annotations
@@ -11,21 +19,28 @@ from typing import Any
 import numpy as np
 
 
-def friction_coefficient(velocity: Any, kinetic: Any, static: Any, stribeck: Any) -> Any:
-    """Return M(v) = M^d + (M^c - M^d) exp(-|v| / omega), equation (9b).
+def friction_coefficient(velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0) -> Any:
+    """Return M(v) = M^d + (M^c - M^d) exp(-(|v| / omega)^p), equation (9b), where p = 1.
 
     Args:
         velocity: Sliding velocity v.
         kinetic: M^d, Coulomb (kinetic) coefficient.
         static: M^c, stiction coefficient.
         stribeck: omega, Stribeck velocity.
+        exponent: p, 1 or 2.
     """
-    return kinetic + (static - kinetic) * np.exp(-np.abs(velocity) / stribeck)
+    ratio = np.abs(velocity) / stribeck
+    # ratio**exponent, exact for 1 and 2, without the cost of a power.
+    power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
+    return kinetic + (static - kinetic) * np.exp(-power)
 
 
-def friction_coefficient_slope(velocity: Any, kinetic: Any, static: Any, stribeck: Any) -> Any:
+def friction_coefficient_slope(velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0) -> Any:
     """Return dM/dv of (9b)."""
-    return -np.sign(velocity) * (static - kinetic) / stribeck * np.exp(-np.abs(velocity) / stribeck)
+    ratio = np.abs(velocity) / stribeck
+    power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
+    power_slope = (2.0 - exponent) + 2.0 * (exponent - 1.0) * ratio
+    return -np.sign(velocity) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
 
 
 def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
@@ -50,9 +65,17 @@ def stiction_rate_slopes(stiction: Any, velocity: Any, level: Any, stiffness: An
     return by_stiction, by_velocity, by_level
 
 
-def friction_force(stiction: Any, velocity: Any, viscous: Any) -> Any:
-    """Return F^f = F^s + b v, equation (9c)."""
-    return stiction + viscous * velocity
+def friction_force(stiction: Any, velocity: Any, viscous: Any, rate: Any = 0.0, lag: Any = 0.0) -> Any:
+    """Return F^f = F^s + lag F^s' + b v, equation (9c), where lag = 0.
+
+    Args:
+        stiction: F^s.
+        velocity: Sliding velocity v.
+        viscous: b.
+        rate: F^s' of (9a).
+        lag: sigma_1 / sigma_0, micro-damping over bristle stiffness, s.
+    """
+    return stiction + viscous * velocity + lag * rate
 
 
 def bristle_energy(stiction: Any, stiffness: Any) -> Any:
@@ -68,6 +91,14 @@ def coulomb_loss(stiction: Any, velocity: Any, level: Any) -> Any:
 def viscous_loss(velocity: Any, viscous: Any) -> Any:
     """Return the power lost in the viscous part of (9c), b v^2."""
     return viscous * velocity * velocity
+
+
+def micro_loss(rate: Any, velocity: Any, lag: Any) -> Any:
+    """Return the power lost in the micro-damping, sigma_1 z' v.
+
+    It is positive while the bristles follow the motion; while they spring back, it may be negative.
+    """
+    return lag * rate * velocity
 
 
 def steady_force(velocity: Any, normal: Any, coefficient: Any, viscous: Any) -> Any:

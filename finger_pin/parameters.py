@@ -162,6 +162,12 @@ class TendonFriction(Description):
     floor: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
         1e-4, unit="N", source="guards (9a) at F^n = 0", doc="g_min, least friction level F^n M."
     )
+    stribeck_exponent: Annotated[Numbers, reals(1.0, 2.0, whole=True)] = quantity(
+        1.0, unit="1", source="(9b)", doc="Exponent of |v| / omega: 1 as in the paper, or 2 as in the LuGre model."
+    )
+    micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N s/m", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
+    )
 
 
 class JointFriction(Description):
@@ -184,6 +190,12 @@ class JointFriction(Description):
     )
     floor: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
         1e-7, unit="N m", source="guards (9a) at R = 0", doc="g_min, least friction level R M."
+    )
+    stribeck_exponent: Annotated[Numbers, reals(1.0, 2.0, whole=True)] = quantity(
+        1.0, unit="1", source="(9b)", doc="Exponent of |v| / omega: 1 as in the paper, or 2 as in the LuGre model."
+    )
+    micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N m s/rad", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
     )
 
     @model_validator(mode="after")

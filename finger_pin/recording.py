@@ -35,8 +35,10 @@ _EXCHANGED = {
     "fingertip": "supplied by the fingertip force",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
+    "tendon_micro_damping": "lost in the tendons' micro-damping",
     "joint_coulomb": "lost by joints sliding",
     "joint_viscous": "lost in the joints' viscous friction",
+    "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
     "slack": "booked where a tension is cut at zero",
 }

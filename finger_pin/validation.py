@@ -73,10 +73,10 @@ def real(
 
 
 def reals(
-    low: float = -math.inf, high: float = math.inf, *, above: bool = False, hint: str = ""
+    low: float = -math.inf, high: float = math.inf, *, above: bool = False, hint: str = "", whole: bool = False
 ) -> BeforeValidator:
-    """Return a validator for one finite number or a list of them, each in [low, high]."""
-    check = _checker(low, high, above, hint)
+    """Return a validator for one finite number or a list of them, each in [low, high], and ``whole`` if asked."""
+    check = _checker(low, high, above, hint, whole)
 
     def validate(value: Any) -> Numbers:
         if isinstance(value, list | tuple):
@@ -215,7 +215,7 @@ def _document(model: type[BaseModel], location: list[str]) -> str:
     return str(owner.model_fields[location[-1]].description or "a table")
 
 
-def _checker(low: float, high: float, above: bool, hint: str) -> Callable[[Any, str], float]:
+def _checker(low: float, high: float, above: bool, hint: str, whole: bool = False) -> Callable[[Any, str], float]:
     def check(value: Any, where: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
             raise problem(where, "must be a number", value)
@@ -229,6 +229,8 @@ def _checker(low: float, high: float, above: bool, hint: str) -> Callable[[Any, 
             raise problem(where, f"must be {'above' if above else 'at least'} {low:g}", value)
         if number > high:
             raise problem(where, f"must be at most {high:g}{hint}", value)
+        if whole and number != int(number):
+            raise problem(where, f"must be a whole number from {low:g} to {high:g}", value)
         return number
 
     return check

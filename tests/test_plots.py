@@ -22,7 +22,16 @@ from finger_pin.plots.style import BLUE, COLOURS, GREEN, PURPLE, VERMILLION
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
 STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "tendon_bristles", "joint_bristles")
-LOST = ("tendon_coulomb", "tendon_viscous", "joint_coulomb", "joint_viscous", "limiter", "slack")
+LOST = (
+    "tendon_coulomb",
+    "tendon_viscous",
+    "tendon_micro_damping",
+    "joint_coulomb",
+    "joint_viscous",
+    "joint_micro_damping",
+    "limiter",
+    "slack",
+)
 UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "supplied")
 
 

@@ -63,6 +63,8 @@ class JointFriction:
         viscous: b, shape (n,), N m s/rad.
         stribeck_velocity: omega, shape (n,), rad/s.
         floor: g_min, shape (n,), N m.
+        stribeck_exponent: 1 or 2, shape (n,).
+        lag: sigma_1 / sigma_0, shape (n,), s.
     """
 
     loads: Array
@@ -72,6 +74,8 @@ class JointFriction:
     viscous: Array
     stribeck_velocity: Array
     floor: Array
+    stribeck_exponent: Array
+    lag: Array
 
     @classmethod
     def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
@@ -85,6 +89,8 @@ class JointFriction:
             viscous=expand(law.viscous, size),
             stribeck_velocity=expand(law.stribeck_velocity, size),
             floor=expand(law.floor, size),
+            stribeck_exponent=expand(law.stribeck_exponent, size),
+            lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
         )
 
     def forces(
@@ -103,11 +109,14 @@ class JointFriction:
         squared = np.sum(fingertip_force**2, axis=-1)[..., None]
         across = np.sqrt(np.maximum(squared - along**2, 0.0))
         reaction = joint_reaction(strands @ self.loads.T, along, across)
-        coefficient = friction.friction_coefficient(velocity, self.kinetic, self.static, self.stribeck_velocity)
+        coefficient = friction.friction_coefficient(
+            velocity, self.kinetic, self.static, self.stribeck_velocity, self.stribeck_exponent
+        )
         level = friction.friction_level(reaction, coefficient, self.floor)
+        rate = friction.stiction_rate(stiction, velocity, level, self.stiffness)
         return JointForces(
             reaction=reaction,
-            friction=friction.friction_force(stiction, velocity, self.viscous),
+            friction=friction.friction_force(stiction, velocity, self.viscous, rate, self.lag),
             level=level,
-            stiction_rate=friction.stiction_rate(stiction, velocity, level, self.stiffness),
+            stiction_rate=rate,
         )

@@ -59,7 +59,7 @@ class TendonForces:
         coefficient: mu^d, (16).
         velocity: v, m/s; (H_c theta')_i, and p_5' for a passive tendon.
         friction: f^f, N, (9c).
-        normal: F^n = |f| + |f^a|, N, (14).
+        normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
         level: max(F^n M, g_min), N.
         stiction_rate: F^s', N/s, (9a).
         strands: f of (12), shape (..., s), N.
@@ -89,6 +89,8 @@ class Tendons:
         viscous: b, shape (t,), N s/m.
         stribeck_velocity: omega, shape (t,), m/s.
         floor: g_min, shape (t,), N.
+        stribeck_exponent: 1 or 2, shape (t,).
+        lag: sigma_1 / sigma_0, shape (t,), s.
         half_stiffness: K_h = 2 K_t, shape (p,), N/m.
         mass: m_5, shape (p,), kg.
     """
@@ -100,6 +102,8 @@ class Tendons:
     viscous: Array
     stribeck_velocity: Array
     floor: Array
+    stribeck_exponent: Array
+    lag: Array
     half_stiffness: Array
     mass: Array
 
@@ -117,6 +121,8 @@ class Tendons:
             viscous=expand(law.viscous, size),
             stribeck_velocity=expand(law.stribeck_velocity, size),
             floor=expand(law.floor, size),
+            stribeck_exponent=expand(law.stribeck_exponent, size),
+            lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
             mass=expand(passive.mass, routing.passive),
         )
@@ -143,6 +149,10 @@ class Tendons:
     ) -> TendonForces:
         """Return all tendon forces.
 
+        Micro-damping depends on the normal force, which by (14) depends on the delivered tension, which depends on
+        micro-damping. Near slack that loop has two solutions where bristles spring back, so it is not closed: the
+        tension in (14) is max(0, f^a - F^s - b v), as it is without micro-damping.
+
         Args:
             position: theta, shape (..., n), rad.
             velocity: theta', shape (..., n), rad/s.
@@ -155,16 +165,23 @@ class Tendons:
         curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
         coefficient = capstan_coefficient(self.surface, curvature)
         sliding = np.concatenate([velocity @ routing.actuated_coupling.T, passive_velocity], axis=-1)
-        loss = friction.friction_force(stiction, sliding, self.viscous)
-        delivered = delivered_tension(command, loss[..., :actuated])
+        settled = friction.friction_force(stiction, sliding, self.viscous)[..., :actuated]
+        pressing = delivered_tension(command, settled)
         proximal, distal = (
             half_tension(stretch, self.half_stiffness) for stretch in self.stretch(position, passive_position)
         )
-        normal = np.concatenate([np.abs(delivered) + np.abs(command), proximal + distal], axis=-1)
+        normal = np.concatenate([np.abs(pressing) + np.abs(command), proximal + distal], axis=-1)
         sliding_coefficient = friction.friction_coefficient(
-            sliding, coefficient, self.stiction_ratio * coefficient, self.stribeck_velocity
+            sliding,
+            coefficient,
+            self.stiction_ratio * coefficient,
+            self.stribeck_velocity,
+            self.stribeck_exponent,
         )
         level = friction.friction_level(normal, sliding_coefficient, self.floor)
+        rate = friction.stiction_rate(stiction, sliding, level, self.stiffness)
+        loss = friction.friction_force(stiction, sliding, self.viscous, rate, self.lag)
+        delivered = delivered_tension(command, loss[..., :actuated])
         halves = np.stack([proximal, distal], axis=-1).reshape(*proximal.shape[:-1], 2 * routing.passive)
         return TendonForces(
             curvature=curvature,
@@ -173,7 +190,7 @@ class Tendons:
             friction=loss,
             normal=normal,
             level=level,
-            stiction_rate=friction.stiction_rate(stiction, sliding, level, self.stiffness),
+            stiction_rate=rate,
             strands=np.concatenate([delivered, halves], axis=-1),
             passive_acceleration=passive_acceleration(proximal, distal, loss[..., actuated:], self.mass),
         )

@@ -18,8 +18,9 @@ from finger_pin.core.rigid_body import (
 )
 
 # Columns of plant.tendons, plant.joints and plant.passive.
-OFFSET, SURFACE, RATIO, STIFFNESS, VISCOUS, STRIBECK, FLOOR = range(7)
+OFFSET, SURFACE, RATIO, STIFFNESS, VISCOUS, STRIBECK, FLOOR, EXPONENT, LAG = range(9)
 KINETIC, STATIC, J_STIFFNESS, J_VISCOUS, J_STRIBECK, J_FLOOR, LOWER, UPPER, L_STIFFNESS, L_DAMPING = range(10)
+J_EXPONENT, J_LAG = range(10, 12)
 HALF_STIFFNESS, PASSIVE_MASS = range(2)
 
 # Rows of work.tendon.
@@ -100,11 +101,9 @@ def _tendons(plant: Any, x: Any, work: Any, rate: Any) -> None:
         if i >= actuated:
             speed = x[w_at + i - actuated]
         stiction = x[s_at + i]
-        loss = laws.friction_force(stiction, speed, table[i, VISCOUS])
         if i < actuated:
-            tension = laws.delivered_tension(work.planned[i], loss)
-            strand[i] = tension
-            normal = abs(tension) + abs(work.planned[i])
+            settled = laws.friction_force(stiction, speed, table[i, VISCOUS], 0.0, 0.0)
+            normal = abs(laws.delivered_tension(work.planned[i], settled)) + abs(work.planned[i])
         else:
             k = i - actuated
             row, stiffness = actuated + 2 * k, plant.passive[k, HALF_STIFFNESS]
@@ -116,13 +115,22 @@ def _tendons(plant: Any, x: Any, work: Any, rate: Any) -> None:
             strand[row + 1] = laws.half_tension(distal, stiffness)
             normal = strand[row] + strand[row + 1]
             rate[p_at + k] = speed
+        coefficient = laws.capstan_coefficient(table[i, SURFACE], curvature)
+        sliding = laws.friction_coefficient(
+            speed, coefficient, table[i, RATIO] * coefficient, table[i, STRIBECK], table[i, EXPONENT]
+        )
+        level = laws.friction_level(normal, sliding, table[i, FLOOR])
+        change = laws.stiction_rate(stiction, speed, level, table[i, STIFFNESS])
+        loss = laws.friction_force(stiction, speed, table[i, VISCOUS], change, table[i, LAG])
+        rate[s_at + i] = change
+        if i < actuated:
+            strand[i] = laws.delivered_tension(work.planned[i], loss)
+        else:
+            k = i - actuated
+            row = actuated + 2 * k
             rate[w_at + k] = laws.passive_acceleration(
                 strand[row], strand[row + 1], loss, plant.passive[k, PASSIVE_MASS]
             )
-        coefficient = laws.capstan_coefficient(table[i, SURFACE], curvature)
-        sliding = laws.friction_coefficient(speed, coefficient, table[i, RATIO] * coefficient, table[i, STRIBECK])
-        level = laws.friction_level(normal, sliding, table[i, FLOOR])
-        rate[s_at + i] = laws.stiction_rate(stiction, speed, level, table[i, STIFFNESS])
         rows[SPEED, i], rows[LOSS, i], rows[NORMAL, i], rows[CURVATURE, i] = speed, loss, normal, curvature
         rows[COEFFICIENT, i], rows[SLIDING, i], rows[LEVEL, i] = coefficient, sliding, level
 
@@ -178,12 +186,15 @@ def _joints(plant: Any, x: Any, work: Any, rate: Any) -> None:
             torque += plant.strand_coupling[s, j] * strand[s]
         along = joint[ALONG, j]
         reaction = laws.joint_reaction(load, along, np.sqrt(max(squared - along * along, 0.0)))
-        sliding = laws.friction_coefficient(speed, table[j, KINETIC], table[j, STATIC], table[j, J_STRIBECK])
+        sliding = laws.friction_coefficient(
+            speed, table[j, KINETIC], table[j, STATIC], table[j, J_STRIBECK], table[j, J_EXPONENT]
+        )
         level = laws.friction_level(reaction, sliding, table[j, J_FLOOR])
-        loss = laws.friction_force(stiction, speed, table[j, J_VISCOUS])
+        change = laws.stiction_rate(stiction, speed, level, table[j, J_STIFFNESS])
+        loss = laws.friction_force(stiction, speed, table[j, J_VISCOUS], change, table[j, J_LAG])
         depth = laws.penetration(x[j], table[j, LOWER], table[j, UPPER])
         limiter = laws.limiter_torque(depth, speed, table[j, L_STIFFNESS], table[j, L_DAMPING])
-        rate[z_at + j] = laws.stiction_rate(stiction, speed, level, table[j, J_STIFFNESS])
+        rate[z_at + j] = change
         joint[LOAD, j], joint[REACTION, j], joint[J_SLIDING, j], joint[J_LEVEL, j] = load, reaction, sliding, level
         joint[DEPTH, j], joint[LIMITER, j], joint[J_LOSS, j] = depth, limiter, loss
         joint[TORQUE, j] = torque - loss - limiter + joint[EXTERNAL, j]

@@ -8,6 +8,8 @@ eliminated by hand, as are positions: with y = (velocity part, passive velocity 
     strand force = c + F y
     stiction of a joint = c + Z y
 
+Micro-damping needs the change of F^s' along u, which the stiction's own row gives as g u - r without derivatives.
+
 and what is left is a dense system with one row per joint and passive tendon: 5 instead of 19 for the paper's finger.
 The rows of the joints are kept multiplied by the mass matrix.
 """
@@ -37,7 +39,8 @@ class Linear(NamedTuple):
 
     Attributes:
         tendon: One row each: strand force by own stiction, by sliding velocity; stiction rate by stiction, by
-            sliding velocity, by passive position; derivative of the command in time; stiction rate by command.
+            sliding velocity, by passive position; derivative of the command in time; stiction rate by command. The
+            strand force is that without micro-damping.
         joint: One row each: stiction rate by stiction, by velocity, by load.
         stiction_by_position: Tendon stiction rates by theta, shape (t, n).
         strand_by_position: Strand forces by theta, shape (s, n).
@@ -134,7 +137,9 @@ def _tendon_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
         own, by_speed, by_level = laws.stiction_rate_slopes(x[s_at + i], speed, level, table[i, at.STIFFNESS])
         if level <= table[i, at.FLOOR]:
             by_level = 0.0
-        sliding_slope = laws.friction_coefficient_slope(speed, coefficient, ratio * coefficient, stribeck)
+        sliding_slope = laws.friction_coefficient_slope(
+            speed, coefficient, ratio * coefficient, stribeck, table[i, at.EXPONENT]
+        )
         by_speed += by_level * normal * sliding_slope
         by_normal = by_level * rows[at.SLIDING, i]
         # M is proportional to mu^d, which depends on the posture through the curvature.
@@ -147,9 +152,13 @@ def _tendon_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
             command_sign = 1.0 if work.planned[i] >= 0.0 else -1.0
             out[BY_STICTION, i] = -taut
             out[BY_SPEED, i] = -taut * table[i, at.VISCOUS]
-            own -= by_normal * taut
-            by_speed += by_normal * out[BY_SPEED, i]
-            out[RATE_BY_COMMAND, i] = by_normal * (taut + command_sign)
+            # The normal force has the tension without micro-damping, which may be cut at zero on its own.
+            viscous = table[i, at.VISCOUS]
+            settled = laws.friction_force(x[s_at + i], speed, viscous, 0.0, 0.0)
+            pressing = 1.0 if laws.delivered_tension(work.planned[i], settled) > 0.0 else 0.0
+            own -= by_normal * pressing
+            by_speed -= by_normal * pressing * viscous
+            out[RATE_BY_COMMAND, i] = by_normal * (pressing + command_sign)
             out[RATE_BY_PASSIVE, i] = 0.0
             for j in range(joints):
                 slope = work.command_by_position[i, j]
@@ -220,7 +229,7 @@ def _joint_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
         if level <= table[j, at.J_FLOOR]:
             by_level = 0.0
         sliding_slope = laws.friction_coefficient_slope(
-            speed, table[j, at.KINETIC], table[j, at.STATIC], table[j, at.J_STRIBECK]
+            speed, table[j, at.KINETIC], table[j, at.STATIC], table[j, at.J_STRIBECK], table[j, at.J_EXPONENT]
         )
         by_reaction = by_level * rows[at.J_SLIDING, j]
         by_load, by_along = laws.joint_reaction_slopes(rows[at.LOAD, j], rows[at.ALONG, j], reaction)
@@ -248,10 +257,12 @@ def _time_derivative(plant: Any, linear: Any) -> None:
     for i in range(actuated):
         rate = linear.tendon[COMMAND_RATE, i]
         out[s_at + i] = linear.tendon[RATE_BY_COMMAND, i] * rate
-        delivered = -linear.tendon[BY_STICTION, i] * rate
+        delivered = -linear.tendon[BY_STICTION, i] * (rate - plant.tendons[i, at.LAG] * out[s_at + i])
         for j in range(joints):
             out[joints + j] += plant.coupling[i, j] * delivered
             out[z_at + j] += linear.joint[J_RATE_BY_LOAD, j] * plant.loads[j, i] * delivered
+    for j in range(joints):
+        out[joints + j] -= plant.joints[j, at.J_LAG] * out[z_at + j]
 
 
 @compiled
@@ -294,11 +305,12 @@ def _eliminate(plant: Any, g: float, linear: Any) -> None:
         if i >= actuated:
             tendon_gain[i, joints + i - actuated] = factor * (tendon[RATE_BY_PASSIVE, i] / g + speed)
     for s in range(strands):
+        follow = 1.0 + plant.tendons[s, at.LAG] * g if s < actuated else 0.0
         for c in range(joints):
             strand_gain[s, c] = linear.strand_by_position[s, c] / g
             if s < actuated:
                 strand_gain[s, c] += (
-                    tendon[BY_SPEED, s] * plant.coupling[s, c] + tendon[BY_STICTION, s] * tendon_gain[s, c]
+                    tendon[BY_SPEED, s] * plant.coupling[s, c] + tendon[BY_STICTION, s] * follow * tendon_gain[s, c]
                 )
         for c in range(joints, reduced):
             strand_gain[s, c] = 0.0
@@ -328,8 +340,9 @@ def factorise(plant: Any, g: float, mass: Any, linear: Any) -> bool:
     matrix, strand_gain = linear.matrix, linear.strand_gain
     reduced = matrix.shape[0]
     for r in range(joints):
+        follow = 1.0 + plant.joints[r, at.J_LAG] * g
         for c in range(reduced):
-            value = linear.joint_gain[r, c]
+            value = follow * linear.joint_gain[r, c]
             if c < joints:
                 value += g * mass[r, c] - linear.torque_by_position[r, c] / g - linear.torque_by_velocity[r, c]
             for s in range(strands):
@@ -337,8 +350,9 @@ def factorise(plant: Any, g: float, mass: Any, linear: Any) -> bool:
             matrix[r, c] = value
     for k in range(tendons - actuated):
         row, i, s = joints + k, actuated + k, actuated + 2 * k
+        follow = 1.0 + plant.tendons[i, at.LAG] * g
         for c in range(reduced):
-            matrix[row, c] = strand_gain[s + 1, c] - strand_gain[s, c] + linear.tendon_gain[i, c]
+            matrix[row, c] = strand_gain[s + 1, c] - strand_gain[s, c] + follow * linear.tendon_gain[i, c]
         matrix[row, row] += g * plant.passive[k, at.PASSIVE_MASS] + plant.tendons[i, at.VISCOUS]
     for c in range(reduced):
         best = c
@@ -406,7 +420,8 @@ def solve(plant: Any, g: float, r: Any, linear: Any, u: Any) -> None:
             value += linear.strand_by_passive[s] * r[p_at + (s - actuated) // 2]
         of_strand[s] = value / g
         if s < actuated:
-            of_strand[s] += tendon[BY_STICTION, s] * of_tendon[s]
+            lag = plant.tendons[s, at.LAG]
+            of_strand[s] += tendon[BY_STICTION, s] * ((1.0 + lag * g) * of_tendon[s] - lag * r[s_at + s])
     for j in range(joints):
         load, turned, torque = 0.0, 0.0, 0.0
         for s in range(strands):
@@ -417,12 +432,14 @@ def solve(plant: Any, g: float, r: Any, linear: Any, u: Any) -> None:
             torque += linear.torque_by_position[j, k] * r[k] / g
         rate = r[z_at + j] + linear.joint[J_RATE_BY_LOAD, j] * load + turned / g
         of_joint[j] = rate / (g - linear.joint[J_RATE_BY_STICTION, j])
-        y[j] = r[joints + j] + torque - of_joint[j]
+        lag = plant.joints[j, at.J_LAG]
+        y[j] = r[joints + j] + torque - ((1.0 + lag * g) * of_joint[j] - lag * r[z_at + j])
     for k in range(passive):
         s = actuated + 2 * k
-        y[joints + k] = (
-            plant.passive[k, at.PASSIVE_MASS] * r[w_at + k] + of_strand[s] - of_strand[s + 1] - of_tendon[actuated + k]
-        )
+        i = actuated + k
+        lag = plant.tendons[i, at.LAG]
+        friction = (1.0 + lag * g) * of_tendon[i] - lag * r[s_at + i]
+        y[joints + k] = plant.passive[k, at.PASSIVE_MASS] * r[w_at + k] + of_strand[s] - of_strand[s + 1] - friction
     _substitute(linear)
     for j in range(joints):
         u[joints + j] = y[j]

@@ -141,6 +141,8 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
                 tendons.viscous,
                 tendons.stribeck_velocity,
                 tendons.floor,
+                tendons.stribeck_exponent,
+                tendons.lag,
             ]
         ),
         joints=np.column_stack(
@@ -155,6 +157,8 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
                 limiter.upper,
                 limiter.stiffness,
                 limiter.damping,
+                joints.stribeck_exponent,
+                joints.lag,
             ]
         ),
         passive=np.column_stack([tendons.half_stiffness, tendons.mass]),

@@ -10,7 +10,7 @@ from matplotlib.ticker import NullLocator
 
 from finger_pin.plots.lines import shade, trace
 from finger_pin.plots.panels import labelled, stack, title
-from finger_pin.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled
+from finger_pin.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, YELLOW, new_figure, styled
 from finger_pin.routing import Array
 
 _STORED = {
@@ -25,8 +25,10 @@ _SUPPLIED = ("actuators", "fingertip")
 _LOST = {
     "tendon_coulomb": ("tendons sliding", VERMILLION),
     "tendon_viscous": ("tendons viscous", ORANGE),
+    "tendon_micro_damping": ("tendons' micro-damping", YELLOW),
     "joint_coulomb": ("joints sliding", BLUE),
     "joint_viscous": ("joints viscous", SKY),
+    "joint_micro_damping": ("joints' micro-damping", BLACK),
     "limiter": ("stroke limiters", GREEN),
     "slack": ("tensions cut at zero", PURPLE),
 }

@@ -11,8 +11,10 @@ from matplotlib.figure import Figure
 #: Okabe and Ito, "Color Universal Design" (2008): distinct under every common colour blindness.
 BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK = "#E69F00", "#56B4E9", "#000000"
+#: Too faint for a line on white; for areas.
+YELLOW = "#F0E442"
 
-#: For joints and other series, in this order. The eighth, yellow, is too faint for a line on white.
+#: For joints and other series, in this order.
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: Where there are more series than colours, the next round is told apart by these.
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)))
