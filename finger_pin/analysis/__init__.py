@@ -1,10 +1,18 @@
 """What a finger's statics say without simulating it: self-locking and fingertip forces.
 
-Layered beside the views: it reads descriptions, fingers and scenarios, and nothing of the simulation.
+It reads descriptions, fingers and scenarios, and nothing of the simulation.
 """
 
 from __future__ import annotations
 
+from finger_pin.analysis.force_capability import (
+    ForcePolytope,
+    Friction,
+    RequiredTension,
+    force_polytope,
+    largest_force,
+    tension_for_force,
+)
 from finger_pin.analysis.self_locking import (
     CriticalFriction,
     SelfLockingMap,
@@ -16,9 +24,15 @@ from finger_pin.analysis.self_locking import (
 
 __all__ = [
     "CriticalFriction",
+    "ForcePolytope",
+    "Friction",
+    "RequiredTension",
     "SelfLockingMap",
     "SelfLockingMargin",
     "critical_friction",
+    "force_polytope",
+    "largest_force",
     "self_locking_map",
     "self_locking_margin",
+    "tension_for_force",
 ]

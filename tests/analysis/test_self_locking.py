@@ -21,6 +21,8 @@ def loop_converges(routing, coefficient, sign):
         tension = minimal + np.max((1.0 - minimal) / internal) * internal
         before, change = change, coefficient * sign * (loads @ tension) - torque
         torque = torque + change
+        if tension.max() > 1e50:
+            return False
     # Steps at the level of rounding are as good as none.
     return np.linalg.norm(change) < max(np.linalg.norm(before), 1e-9 * np.linalg.norm(torque))
 
