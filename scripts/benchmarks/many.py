@@ -1,0 +1,54 @@
+"""Many runs: `finger_pin.simulate_many` on one and on two processes."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+import finger_pin as fp
+from benchmarks.store import Store, say
+from benchmarks.timing import clocked
+
+WORKERS = (1, 2)
+_COUNTS = (16, 64)
+_QUICK_COUNTS = (4, 12)
+
+
+def measure(store: Store) -> dict[str, Any] | None:
+    """Return the times; None where the package has no such function."""
+    if not hasattr(fp, "simulate_many"):
+        return None
+    return store.part(
+        "many-runs", lambda: _study(_QUICK_COUNTS if store.quick else _COUNTS, 2.0 if store.quick else 8.0)
+    )
+
+
+def _study(counts: tuple[int, int], duration: float) -> dict[str, Any]:
+    times: dict[str, float] = {}
+    # So that no process compiles while it is timed.
+    fp.simulate_many([fp.load_scenario("fig6", {"simulation.duration": 0.01})] * 4, workers=max(WORKERS))
+    for count in counts:
+        gains = np.linspace(0.8, 1.2, count)
+        overrides = [{"controller.gain": float(gain), "simulation.duration": duration} for gain in gains]
+        scenarios = [fp.load_scenario("fig6", each) for each in overrides]
+        for workers in WORKERS:
+            elapsed, _ = clocked(
+                lambda scenarios=scenarios, workers=workers: fp.simulate_many(
+                    scenarios, workers=workers, variables=["joint_position", "tendon_tension"]
+                )
+            )
+            times[f"{count} runs, {workers} processes"] = elapsed
+            say(f"  {count} runs of {duration:g} s on {workers} processes: {elapsed:.1f} s")
+    few, many = ([times[f"{count} runs, {workers} processes"] for workers in WORKERS] for count in counts)
+    further = [late - early for late, early in zip(many, few, strict=True)]
+    marginal = further[0] / further[1] if min(further) > 0.0 else None
+    return {
+        "duration": duration,
+        "counts": counts,
+        "cores": len(os.sched_getaffinity(0)),
+        "times": times,
+        "speed_up": many[0] / many[1],
+        "speed_up_without_start": marginal,
+    }

@@ -1,0 +1,167 @@
+"""Single integrations of a scenario, and their distance from the truth."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import finger_pin as fp
+from benchmarks.timing import clocked
+from finger_pin.closed_loop import ClosedLoop
+from finger_pin.core.compilation import entry
+from finger_pin.core.dynamics import evaluate
+from finger_pin.core.finger import CompiledFinger
+from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
+from finger_pin.core.plant import build_control, build_work
+from finger_pin.integration import integrate
+from finger_pin.routing import Array
+from finger_pin.scenario import Scenario
+
+#: Overrides that take away what MuJoCo cannot express: with mu_e = 0 and such soft bristles stiction stays below
+#: 1e-8 N, and a limiter of stiffness zero exerts nothing.
+FRICTIONLESS = {
+    "finger.tendon_friction.coulomb": 0.0,
+    "finger.tendon_friction.stiffness": 1e-9,
+    "finger.joint_friction.coulomb": 0.0,
+    "finger.joint_friction.stiction": 0.0,
+    "finger.joint_friction.stiffness": 1e-9,
+    "finger.stroke_limiter.stiffness": 0.0,
+}
+TEXTBOOK = ("BDF", "LSODA", "Radau")
+SUNDIALS = "CVODE, compiled"
+#: Integrates; returns joint positions at the sample times, shape (m, n), rad, and statistics if there are any.
+Job = Callable[[], tuple[Array, Any]]
+
+
+class Failed(Exception):
+    """An integration did not reach its end."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run: what was asked, what it cost and how far it was from the truth.
+
+    Attributes:
+        method: Name of the method.
+        rtol: Relative tolerance; atol is the same times the scales of the state.
+        error: Root mean square over all joints at the sample times, rad; None if it failed.
+        worst: Largest error, rad.
+        integration: Wall time until the states at the sample times are there, s.
+        whole: Wall time of `finger_pin.simulate`, s, with all signals and the energy account; None if not measured.
+        steps: Accepted steps.
+        evaluations: Evaluations of the right-hand side.
+    """
+
+    method: str
+    rtol: float
+    error: float | None
+    worst: float | None
+    integration: float
+    whole: float | None
+    steps: int
+    evaluations: int
+
+
+def settled(scenario: Scenario, **settings: Any) -> Scenario:
+    """Return a scenario with other simulation settings."""
+    simulation = scenario.simulation.model_copy(update=settings)
+    return scenario.model_copy(update={"simulation": simulation})
+
+
+def truth(scenario: Scenario) -> tuple[Array, dict[str, float]]:
+    """Return joint positions at the sample times, shape (m, n), rad, and how far two tight methods are apart, rad."""
+    tight = [
+        fp.simulate(settled(scenario, method=method, rtol=1e-9, atol_scale=1e-10))["joint_position"].values
+        for method in ("Rodas5P", "Rodas4")
+    ]
+    difference = tight[1] - tight[0]
+    return tight[0], {"rms": rms(difference), "worst": float(abs(difference).max())}
+
+
+def rms(difference: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(difference**2)))
+
+
+def compiled(scenario: Scenario, method: str, rtol: float) -> Job:
+    """Return a job that integrates with a compiled method; it gives joint positions and statistics."""
+    loop = ClosedLoop.from_scenario(scenario)
+    plant = CompiledFinger(loop.finger, loop.fingertip_force).plant
+    control = build_control(loop.controller, loop.reference, plant.actuated)
+    times, joints = scenario.sample_times(), len(loop.finger.routing.joints)
+    atol, names = rtol * loop.finger.layout.scales(), loop.finger.layout.names
+
+    def job() -> tuple[Array, Any]:
+        stepper = Stepper(plant, control, loop.initial_state(), TABLEAUS[method](), rtol, atol)
+        trajectory = integrate_compiled(stepper, scenario.simulation.duration, names)
+        if trajectory.failure:
+            raise Failed(trajectory.failure)
+        return trajectory.interpolate(times)[:, :joints], trajectory.statistics
+
+    return job
+
+
+def textbook(scenario: Scenario, method: str, rtol: float) -> Job:
+    """Return a job that integrates the NumPy right-hand side with one of scipy's methods."""
+    loop = ClosedLoop.from_scenario(scenario)
+    times, joints = scenario.sample_times(), len(loop.finger.routing.joints)
+    atol = rtol * loop.finger.layout.scales()
+
+    def job() -> tuple[Array, Any]:
+        duration = scenario.simulation.duration
+        trajectory = integrate(loop.rhs, loop.initial_state(), duration, method=method, rtol=rtol, atol=atol)
+        if trajectory.failure:
+            raise Failed(trajectory.failure)
+        return trajectory.interpolate(times)[:, :joints], trajectory.statistics
+
+    return job
+
+
+def has_sundials() -> bool:
+    """Return whether scikit-sundae is installed."""
+    return importlib.util.find_spec("sksundae") is not None
+
+
+@entry
+def _rate(plant: Any, control: Any, time: Any, x: Any, work: Any, rate: Any) -> None:
+    evaluate(plant, control, time, x, work, rate)
+
+
+def sundials(scenario: Scenario, rtol: float) -> Job:
+    """Return a job that integrates the compiled right-hand side with CVODE's BDF of SUNDIALS (scikit-sundae)."""
+    from sksundae.cvode import CVODE
+
+    loop = ClosedLoop.from_scenario(scenario)
+    plant = CompiledFinger(loop.finger, loop.fingertip_force).plant
+    control = build_control(loop.controller, loop.reference, plant.actuated)
+    work, times = build_work(plant), scenario.sample_times()
+    atol, joints = rtol * loop.finger.layout.scales(), len(loop.finger.routing.joints)
+    state = np.empty(loop.finger.layout.size)
+
+    def rhs(time: float, x: Array, rate: Array) -> None:
+        state[:] = x
+        _rate(plant, control, time, state, work, rate)
+
+    def job() -> tuple[Array, Any]:
+        solver = CVODE(rhs, method="BDF", rtol=rtol, atol=atol, max_num_steps=10**7)
+        solution = solver.solve(times, loop.initial_state())
+        if not solution.success:
+            raise Failed(str(solution.message))
+        return solution.y[:, :joints], None
+
+    return job
+
+
+def point(method: str, rtol: float, job: Job, exact: Array) -> Point:
+    """Run a job once and return what it cost and how far it was from the truth; a failure has no error."""
+    try:
+        elapsed, (found, statistics) = clocked(job)
+    except Failed:
+        return Point(method, rtol, None, None, 0.0, None, 0, 0)
+    difference = found - exact
+    steps, evaluations = (statistics.steps, statistics.evaluations) if statistics else (0, 0)
+    return Point(method, rtol, rms(difference), float(abs(difference).max()), elapsed, None, steps, evaluations)

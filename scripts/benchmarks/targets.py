@@ -1,0 +1,100 @@
+"""What is aimed at, and whether the measurements reach it."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from benchmarks.runs import TEXTBOOK
+from benchmarks.work_precision import OURS
+
+_MIB = 2**20
+
+
+class Target(NamedTuple):
+    """A measured figure beside its target.
+
+    Attributes:
+        name: What it is.
+        value: Measured.
+        relation: ``=``, or how the value bounds what was to be measured.
+        sense: ``>=`` or ``<=``.
+        target: Aimed at.
+        unit: Of both.
+        passed: Whether the target is reached; None where the value does not decide it.
+    """
+
+    name: str
+    value: float
+    relation: str
+    sense: str
+    target: float
+    unit: str
+    passed: bool | None
+
+
+def target(name: str, value: float, sense: str, aim: float, unit: str, relation: str = "=") -> Target:
+    """Compare a value, or a bound, with a target."""
+    reached = {">=": operator.ge, "<=": operator.le}[sense](value, aim)
+    # A lower bound above a lower target decides it, and so does an upper bound below; otherwise only "=" does.
+    decided = relation == "=" or (relation == sense if reached else relation in (">=", "<=") and relation != sense)
+    return Target(name, value, relation, sense, aim, unit, bool(reached) if decided else None)
+
+
+def targets(stages: Mapping[str, Any]) -> list[Target]:
+    """Return all targets whose stages were measured."""
+    found: list[Target] = []
+    studies = stages.get("work-precision") or {}
+    for name, real_time, ratio in (("fig6", 150.0, 50.0), ("stick_slip", 10.0, 80.0)):
+        if name in studies:
+            found += _speed(name, studies[name], real_time, ratio)
+    if stages.get("mujoco"):
+        found += _mujoco(stages["mujoco"])
+    if stages.get("step-interface"):
+        step = stages["step-interface"]
+        found.append(target("step interface at 1 kHz, steps", step["real_time_factor_stepping"], ">=", 20.0, "x"))
+        found.append(target("step interface at 1 kHz, with controller", step["real_time_factor"], ">=", 20.0, "x"))
+    if stages.get("many-runs"):
+        many = stages["many-runs"]
+        found.append(target("two processes, many runs", many["speed_up"], ">=", 1.85, "x"))
+        if many["speed_up_without_start"]:
+            found.append(target("two processes, per further run", many["speed_up_without_start"], ">=", 1.85, "x"))
+    if stages.get("main-job"):
+        job = stages["main-job"]
+        found.append(target("main job, first run", job["first"], "<=", 30.0, "s"))
+        found.append(target("main job, later runs", job["later"], "<=", 4.0, "s"))
+        found.append(
+            target("main job, peak memory", max(job["first_memory"], job["later_memory"]) / _MIB, "<=", 600.0, "MiB")
+        )
+    return found
+
+
+def _speed(name: str, study: Mapping[str, Any], real_time: float, ratio: float) -> Iterator[Target]:
+    costs, error = study["at_target"], study["target"]
+    theirs = [costs[method]["integration"] for method in TEXTBOOK if costs.get(method, {}).get("integration")]
+    for kind, words in (("integration", "integration"), ("whole", "whole simulate()")):
+        # A bound from below says nothing about what a method would need.
+        ours = [costs[m][kind] for m in OURS if costs.get(m, {}).get(kind) and costs[m][kind][1] != ">="]
+        if not ours:
+            continue
+        mine, relation = min(ours)
+        flipped = {"=": "=", "<=": ">="}[relation]
+        label = f"{name} at {error:g} rad, {words}"
+        yield target(f"{label}: real-time factor", study["duration"] / mine, ">=", real_time, "x", flipped)
+        if theirs:
+            best, bound = min(theirs)
+            known = bound if flipped == "=" else flipped if bound in ("=", flipped) else "?"
+            yield target(f"{label}: over the textbook", best / mine, ">=", ratio, "x", known)
+
+
+def _mujoco(study: Mapping[str, Any]) -> Iterator[Target]:
+    for measure in study["ours"]:
+        rows = [row for row in study["rows"] if row["measure"] == measure]
+        for massless, words in ((False, "lumped mass"), (True, "one spring")):
+            mine = [row for row in rows if row["massless"] == massless]
+            if not mine:
+                continue
+            label = f"MuJoCo, {words}, {measure} error {study['limit']:g} rad"
+            yield target(f"{label}: Python loop", min(row["loop_over_ours"] for row in mine), ">=", 4.0, "x")
+            yield target(f"{label}: rollout", min(row["rollout_over_ours"] for row in mine), ">=", 1.0, "x")

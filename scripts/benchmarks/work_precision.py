@@ -1,0 +1,88 @@
+"""Wall time against error, for all methods, on the two standing scenarios."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import finger_pin as fp
+from benchmarks.runs import SUNDIALS, TEXTBOOK, Point, compiled, has_sundials, point, settled, sundials, textbook, truth
+from benchmarks.store import Store, say
+from benchmarks.timing import clocked, cost_at
+from finger_pin.scenario import Scenario
+
+#: Error, rad, at which costs are compared, by scenario.
+TARGET = {"fig6": 1e-5, "stick_slip": 1e-4}
+OURS = ("Rodas5P", "Rodas4")
+
+_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+# Few, since each takes from ten seconds to a minute; they bracket the targets.
+_TEXTBOOK = {
+    "fig6": {"BDF": (1e-4, 1e-5, 1e-6), "LSODA": (1e-4, 1e-5), "Radau": (1e-3, 1e-4)},
+    "stick_slip": {"BDF": (1e-5, 1e-6), "LSODA": (1e-5, 1e-6), "Radau": (1e-4,)},
+}
+_QUICK_TEXTBOOK = {"BDF": (1e-4, 1e-6), "LSODA": (1e-5,)}
+_QUICK_DURATION = {"fig6": 0.3, "stick_slip": 0.1}
+
+
+def measure(store: Store) -> dict[str, Any]:
+    """Return the points of both scenarios."""
+    return {name: store.part(f"work-precision-{name}", lambda name=name: _study(name, store.quick)) for name in TARGET}
+
+
+def _study(name: str, quick: bool) -> dict[str, Any]:
+    scenario = fp.load_scenario(name)
+    if quick:
+        scenario = settled(scenario, duration=_QUICK_DURATION[name])
+    exact, agreement = truth(scenario)
+    say(f"  {name}: truth; two methods differ by {agreement['rms']:.1e} rad")
+    tolerances = _TOLERANCES[1::2] if quick else _TOLERANCES
+    jobs = {(method, rtol): compiled(scenario, method, rtol) for method in OURS for rtol in tolerances}
+    if has_sundials():
+        jobs |= {(SUNDIALS, rtol): sundials(scenario, rtol) for rtol in tolerances[1:]}
+    fast: dict[tuple[str, float], Point] = {}
+    slow: list[Point] = []
+    wanted = _QUICK_TEXTBOOK if quick else _TEXTBOOK[name]
+    for method in TEXTBOOK:
+        for rtol in wanted.get(method, ()):
+            # The compiled methods take their turn before each of the slow ones, and once more at the end.
+            _sweep(scenario, jobs, exact, fast)
+            slow.append(point(method, rtol, textbook(scenario, method, rtol), exact))
+            say(f"  {name}: {method} at rtol {rtol:g}: {slow[-1].integration:.1f} s")
+    _sweep(scenario, jobs, exact, fast)
+    points = [*fast.values(), *slow]
+    return {
+        "duration": scenario.simulation.duration,
+        "target": TARGET[name],
+        "agreement": agreement,
+        "points": [asdict(each) for each in points],
+        "at_target": {
+            method: costs(points, method, TARGET[name]) for method in dict.fromkeys(p.method for p in points)
+        },
+    }
+
+
+def _sweep(
+    scenario: Scenario, jobs: dict[tuple[str, float], Any], exact: Any, fast: dict[tuple[str, float], Point]
+) -> None:
+    """Run all quick jobs once and keep the least times."""
+    for (method, rtol), job in jobs.items():
+        found = point(method, rtol, job, exact)
+        if method in OURS:
+            asked = settled(scenario, method=method, rtol=rtol, atol_scale=rtol)
+            found = replace(found, whole=clocked(lambda asked=asked: fp.simulate(asked))[0])
+        earlier = fast.get((method, rtol))
+        if earlier:
+            whole = None if found.whole is None else min(found.whole, earlier.whole or found.whole)
+            found = replace(found, integration=min(found.integration, earlier.integration), whole=whole)
+        fast[method, rtol] = found
+
+
+def costs(points: list[Point], method: str, error: float) -> dict[str, Any]:
+    """Return the costs of a method at an error: integration and, where measured, the whole call."""
+    mine = [each for each in points if each.method == method and each.error is not None]
+    found: dict[str, Any] = {"integration": cost_at([(each.error or 0.0, each.integration) for each in mine], error)}
+    whole = [(each.error or 0.0, each.whole) for each in mine if each.whole is not None]
+    if whole:
+        found["whole"] = cost_at(whole, error)
+    return found
