@@ -188,3 +188,66 @@ def test_a_mirrored_finger_moves_as_its_mirror_image():
         np.testing.assert_allclose(other.position * [-1, 1, 1, 1], one.position, atol=1e-6)
         np.testing.assert_allclose(other.tendon_stiction[[1, 0, 2, 3, 4]], one.tendon_stiction, atol=1e-4)
         np.testing.assert_allclose(other.joint_stiction * [-1, 1, 1, 1], one.joint_stiction, atol=1e-6)
+
+
+def test_a_motion_does_not_depend_on_the_units_of_length_mass_and_time():
+    """The same two-joint finger in other units, every option of law (9) on: angles are equal, forces scale."""
+
+    def run(length, mass, time):
+        force = mass * length / time**2
+        tendon, torque = force / length, force * length
+        described = {
+            "name": "scaled",
+            "gravity": [0.0, -9.81 * length / time**2, 0.0],
+            "joints": {
+                name: {
+                    "range": [-0.5, 0.5],
+                    "link": {"length": size * length, "width": WIDTH * length, "mass": MASS * mass},
+                }
+                for name, size in (("a", 0.05), ("b", 0.04))
+            },
+            "tendons": {
+                name: {
+                    "curvature_offset": 1.3,
+                    "crossings": {joint: {"radius": radius * length} for joint, radius in each.items()},
+                }
+                for name, each in {
+                    "F": {"a": 8e-3, "b": 6e-3},
+                    "E": {"a": -8e-3, "b": -6e-3},
+                    "S": {"a": 5e-3, "b": -6e-3},
+                }.items()
+            },
+            "tendon_friction": {
+                "stiffness": 5e4 * tendon,
+                "viscous": tendon * time,
+                "stribeck_velocity": 0.01 * length / time,
+                "floor": 1e-4 * force,
+                "stribeck_exponent": 2,
+                "micro_damping": 2.0 * tendon * time,
+            },
+            "joint_friction": {
+                "coulomb": 2.5e-4 * length,
+                "stiction": 3.5e-4 * length,
+                "stiffness": 5.0 * torque,
+                "viscous": 1e-3 * torque * time,
+                "stribeck_velocity": 0.1 / time,
+                "floor": 1e-7 * torque,
+                "stribeck_exponent": 2,
+                "micro_damping": 1e-3 * torque * time,
+            },
+            "stroke_limiter": {"stiffness": 50.0 * torque, "damping": 0.5 * time},
+        }
+        finger = fp.Finger(fp.FingerDescription.model_validate(described))
+        sim = fp.Simulator(finger, [0.1, 0.2], rtol=1e-9, atol_scale=1e-9, method="Rodas5P")
+        angles, forces = [], []
+        for tension in ([3.0, 1.0, 2.0], [1.0, 4.0, 1.0], [5.0, 1.0, 0.5]):
+            state = sim.step(np.array(tension) * force, 0.05 * time)
+            angles.append(state.position)
+            forces.append(state.tendon_stiction / force)
+        return np.array(angles), np.array(forces)
+
+    angles, forces = run(1.0, 1.0, 1.0)
+    scaled_angles, scaled_forces = run(1.5, 3.0, 0.5)
+    assert np.ptp(angles) > 0.3
+    np.testing.assert_allclose(scaled_angles, angles, atol=1e-6)
+    np.testing.assert_allclose(scaled_forces, forces, atol=1e-5)
