@@ -1,0 +1,53 @@
+"""Figures of the analyses show the numbers that the analyses return."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.analysis import critical_friction, force_polytope, self_locking_map, tension_for_force
+from finger_pin.plots.force_capability import plot_force_polytope, plot_radius_sensitivity
+from finger_pin.plots.self_locking import plot_critical_friction, plot_runaway, plot_self_locking_map
+
+POSTURE = (0.1, 0.5, 0.6, 0.42)
+
+
+def test_bars_are_the_critical_coefficients(ub):
+    axes = plot_critical_friction(ub).axes[0]
+    widths = [bar.get_width() for bar in axes.patches]
+    assert widths[-1] == pytest.approx(1e3 * critical_friction(ub).coefficient)
+    assert [label.get_text() for label in axes.get_yticklabels()] == [*ub.joints, "all joints"]
+
+
+@pytest.mark.parametrize("coefficient, said", [(3.5e-4, "at every posture"), (7.6e-4, "locked everywhere")])
+def test_map_says_where_nothing_varies(coefficient, said):
+    overrides = {f"finger.joint_friction.{name}": coefficient for name in ("coulomb", "stiction")}
+    figure = plot_self_locking_map(self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=3))
+    assert any(said in text.get_text() for axes in figure.axes for text in axes.texts)
+
+
+def test_runs_are_drawn_with_their_largest_tension():
+    run = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.05}))
+    top, bottom = plot_runaway({"fig6": run}).axes
+    np.testing.assert_allclose(top.lines[0].get_ydata(), run["tendon_command"].max("tendon"))
+    np.testing.assert_allclose(bottom.lines[0].get_ydata(), np.rad2deg(np.abs(run["tracking_error"]).max("joint")))
+
+
+def test_section_lies_in_the_polytope_and_friction_orders_it(finger):
+    figure = plot_force_polytope(finger, POSTURE, 10.0)
+    polytope, plane = force_polytope(finger, POSTURE, 10.0), figure.axes[-1]
+    helping, none, hindering = (np.array(line.get_xydata()) for line in plane.lines[:3])
+    assert all(polytope.contains([x, 0.0, z], 1e-5) for x, z in none)
+    assert np.all(np.linalg.norm(helping, axis=1) >= np.linalg.norm(none, axis=1))
+    # What hinders jumps where a joint's torque changes sign; it never exceeds what holds.
+    assert np.all(np.linalg.norm(hindering, axis=1) <= np.linalg.norm(helping, axis=1))
+
+
+@pytest.mark.parametrize("name, position", [("planar", [0.4, 0.9]), ("ub", [0.0, 0.0, 0.0, 0.0])])
+def test_sets_that_are_flat_in_space_are_drawn_by_their_section(name, position):
+    assert plot_force_polytope(fp.Finger(fp.load_finger(name)), position, 10.0).axes[-1].lines
+
+
+def test_sensitivity_bars_are_the_derivatives_per_millimetre(finger):
+    force = [0.3, 0.2, 0.8]
+    bars = [bar.get_width() for bar in plot_radius_sensitivity(finger, POSTURE, force).axes[0].patches]
+    assert bars[0] == pytest.approx(1e-3 * tension_for_force(finger, POSTURE, force).by_radius[0, 0])
