@@ -44,13 +44,9 @@ def main() -> int:
 
 
 def scaled(name: str, scenario: fp.Scenario, factor: float) -> fp.Scenario:
-    """Return the scenario with every M^d and M^c of the joints times a factor."""
-    law = scenario.finger.joint_friction
-    overrides = {
-        f"finger.joint_friction.{key}": (factor * np.asarray(getattr(law, key))).tolist()
-        for key in ("coulomb", "stiction")
-    }
-    return fp.load_scenario(name, overrides)
+    """Return the scenario with M^c of the joints times a factor, and M^d alike: sliding is no easier than starting."""
+    static = (factor * np.asarray(scenario.finger.joint_friction.stiction)).tolist()
+    return fp.load_scenario(name, {f"finger.joint_friction.{key}": static for key in ("coulomb", "stiction")})
 
 
 if __name__ == "__main__":

@@ -369,17 +369,17 @@ def self_locking_map(
     )
 
 
-def self_locking_margin(scenario: Scenario, samples: int = 64) -> SelfLockingMargin:
+def self_locking_margin(scenario: Scenario, samples: int = 500) -> SelfLockingMargin:
     """Return how far a scenario stays from self-locking on its reference.
 
     The stiction coefficients M^c are scaled in proportion, joints and tendons move as the reference does, tendons rub
-    with mu^d at its postures and passive tendons are elastic under the controller's gain. Between the samples the
-    margin changes with the postures only, which it does slowly; directions that last for less than their distance
-    may be missed.
+    with mu^d at its postures and passive tendons are elastic under the controller's gain. Every combination of
+    directions that occurs is looked at where the tendons that go with it are bent least and where they are bent most.
+    Against joints that keep sliding, whose friction is M^d, the margin is the larger by M^c / M^d.
 
     Args:
         scenario: The scenario.
-        samples: Instants of the reference.
+        samples: Instants of the reference; directions that last for less than their distance may be missed.
     """
     tendons = Tendons.from_description(scenario.finger)
     routing = tendons.routing
@@ -389,12 +389,19 @@ def self_locking_margin(scenario: Scenario, samples: int = 64) -> SelfLockingMar
     size = len(routing.joints)
     # What stands still but for rounding does not move.
     speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)
-    signs, sliding = np.sign(speed), np.sign(_sliding(tendons, speed))
+    directions = np.sign(np.hstack([speed, _sliding(tendons, speed)]))
+    bend = (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1)
+    # Ordered by directions, then by bend: the first and the last of every combination.
+    order = np.lexsort((bend, *directions.T))
+    steps = np.flatnonzero(np.any(np.diff(directions[order], axis=0) != 0.0, axis=1))
+    chosen = order[np.unique(np.concatenate([[0], steps, steps + 1, [samples - 1]]))]
+    signs, sliding = directions[chosen, :size], directions[chosen, size:]
     weights = signs * expand(scenario.finger.joint_friction.stiction, size)
     loop = _Loop.of(tendons, expand(scenario.controller.gain, size))
-    kappa = loop.critical(motion.position, weights, sliding)[0]
+    kappa = loop.critical(motion.position[chosen], weights, sliding)[0]
     worst = int(np.argmin(kappa))
-    return SelfLockingMargin(float(kappa[worst]), float(times[worst]), motion.position[worst], signs[worst])
+    where = chosen[worst]
+    return SelfLockingMargin(float(kappa[worst]), float(times[where]), motion.position[where], signs[worst])
 
 
 def _tendons(finger: Finger | FingerDescription) -> Tendons:

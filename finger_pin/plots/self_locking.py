@@ -74,10 +74,10 @@ def plot_runaway(results: dict[str, xr.Dataset]) -> Figure:
     top.set_yscale("log")
     top.set_ylabel("largest command (N)")
     top.set_title("tension: settles below the critical coefficient, grows above it")
-    top.legend(loc="upper left", ncols=2)
     bottom.set_ylabel("largest error (deg)")
     bottom.set_xlabel("time (s)")
     top.margins(x=0.0)
+    figure.legend(handles=top.lines, loc="outside lower center", ncols=min(len(results), 5))
     return figure
 
 
