@@ -14,6 +14,8 @@ import scipy.linalg
 from finger_pin.routing import Array
 
 _MOST_STALLED = 1000
+# So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.
+_WINDOW, _LEAST_MEAN_STEP, _MOST_STEPS = 5000, 1e-9, 1_000_000
 
 Watch = Callable[[float, Array], None]
 Stop = Callable[[], bool]
@@ -61,12 +63,15 @@ class _Monitor:
 
     terminal = True
 
-    def __init__(self, watch: Watch | None, stop: Stop | None) -> None:
+    def __init__(self, watch: Watch | None, stop: Stop | None, bounded: bool = True) -> None:
+        self.bounded = bounded
         self.watch = watch
         self.stop = stop
         self.reached = 0.0
         self.stop_time = np.inf
         self.calls_here = 0
+        self.steps = 0
+        self.window_start = 0.0
 
     def __call__(self, instant: float, x: Array) -> float:
         if self.stop_time < np.inf:
@@ -78,6 +83,13 @@ class _Monitor:
         if self.calls_here > _MOST_STALLED:
             raise _Broken("the step size is less than the spacing between numbers")
         if instant > self.reached:
+            self.steps += 1
+            if self.bounded and self.steps % _WINDOW == 0:
+                if instant - self.window_start < _WINDOW * _LEAST_MEAN_STEP:
+                    raise _Broken(f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each")
+                self.window_start = float(instant)
+            if self.bounded and self.steps > _MOST_STEPS:
+                raise _Broken(f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory")
             if self.watch is not None:
                 self.watch(float(instant), x)
             if self.stop is not None and self.stop():
@@ -131,7 +143,7 @@ def integrate(
         else:
             reason = f"the state or its Jacobian is not finite ({error})"
         # Repeat up to the last good step, to keep what was computed.
-        solution = solve(monitor.reached, _Monitor(None, None)) if monitor.reached > 0.0 else None
+        solution = solve(monitor.reached, _Monitor(None, None, bounded=False)) if monitor.reached > 0.0 else None
     if solution is None:
         nothing = Statistics(0, system.evaluations, 0, 0, time.perf_counter() - began)
         return Trajectory(np.zeros(1), lambda at: np.tile(start, (len(at), 1)), nothing, failure=reason)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import xarray as xr
 
 from finger_pin.blocks.controller import Controller, ProportionalController
@@ -13,12 +14,13 @@ from finger_pin.closed_loop import ClosedLoop, LoopSignals, Reference
 from finger_pin.core.finger import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
 from finger_pin.core.plant import Control, build_control, held_control
+from finger_pin.cvode import integrate_cvode
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.integration import Stop, Trajectory, Watch, integrate
 from finger_pin.recording import record
 from finger_pin.routing import Array
 from finger_pin.sampling import SampledController
-from finger_pin.scenario import Scenario
+from finger_pin.scenario import METHODS_IN_NUMPY, Scenario
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 _CONTINUOUS = "Radau"
@@ -70,7 +72,7 @@ def simulate(
         loop = replace(loop, controller=SampledController(loop, control_period))
     elif method in TABLEAUS and _control(loop) is None:
         method = _CONTINUOUS
-    if scenario.simulation.method in TABLEAUS:
+    if scenario.simulation.method not in METHODS_IN_NUMPY:
         loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
 
     def watch(time: float, x: Array) -> None:
@@ -82,12 +84,31 @@ def simulate(
     chunk = _CHUNK if observe is None else _CHUNK_OBSERVED
     trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
     reached = float(trajectory.breakpoints[-1])
-    result = record(scenario, loop, trajectory, method)
+    # A motion at the edge of what numbers hold has energies beyond it: that is told below, in one line.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        result = record(scenario, loop, trajectory, method)
+    result, excess = _finite_part(result)
     if trajectory.failure:
         raise IntegrationError(reached, trajectory.failure, _ADVICE, result)
+    if excess:
+        raise IntegrationError(float(result.attrs["end_time"]), f"{excess} is not finite after that", _ADVICE, result)
     if trajectory.interrupted:
         raise Interrupted(reached, result)
     return result
+
+
+def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
+    length, excess = result.sizes["time"], ""
+    for name, values in result.data_vars.items():
+        finite = np.isfinite(values.to_numpy()).reshape(values.sizes["time"], -1).all(axis=1)
+        first = length if finite.all() else int(np.argmin(finite))
+        if first < length:
+            length, excess = first, str(name)
+    if excess:
+        result = result.isel(time=slice(max(length, 1)))
+        result.attrs["end_time"] = float(result["time"][-1])
+    return result, excess
 
 
 def _control(loop: ClosedLoop) -> Control | None:
@@ -115,6 +136,10 @@ def _integrate(
             watch=watch,
             chunk=chunk,
             stop=stop,
+        )
+    if method == "CVODE":
+        return integrate_cvode(
+            loop.rhs, start, settings.duration, rtol=settings.rtol, atol=atol, watch=watch, stop=stop
         )
     return integrate(
         loop.rhs,

@@ -17,6 +17,8 @@ from finger_pin.routing import Array
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 _FIRST_STEP = 1e-6
+# The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
+_MOST_BYTES = 2e9
 
 
 class Stepper:
@@ -94,6 +96,11 @@ class Stepper:
         culprit = names[max(int(self.memory[core.CULPRIT]), 0)]
         if status == core.UNDERFLOW:
             return f"the step size fell below the resolution of time; the error is largest in {culprit}"
+        if status == core.CREEPING:
+            return (
+                f"the last {core.WINDOW} steps advanced by less than {core.LEAST_MEAN_STEP:g} s each; "
+                f"the error is largest in {culprit}"
+            )
         if status == core.NOT_FINITE:
             return f"the rate of {culprit} is not finite"
         return ""
@@ -128,7 +135,8 @@ def integrate_compiled(
     start, size = stepper.x.copy(), len(stepper.x)
     record = (np.zeros(chunk), np.zeros((chunk, size)), np.zeros((chunk, len(stepper.tableau.dense), size)))
     kept: tuple[list[Array], list[Array], list[Array]] = ([np.zeros(1)], [start[None]], [])
-    reason, interrupted, samples = "", False, 0
+    reason, interrupted, samples, taken = "", False, 0, 0
+    most = int(_MOST_BYTES / (8 * size * (1 + len(stepper.tableau.dense))))
     while stepper.time < duration and not reason and not interrupted:
         end = duration
         if period is not None and sample is not None:
@@ -140,6 +148,9 @@ def integrate_compiled(
         for store, block in zip(kept, record, strict=True):
             store.append(block[:steps].copy())
         reason = stepper.failure(status, names)
+        taken += steps
+        if not reason and taken >= most and stepper.time < duration:
+            reason = f"after {taken} steps the trajectory has reached the most that is kept in memory"
         if watch is not None:
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()

@@ -13,10 +13,13 @@ from finger_pin.core.rigid_body import MASS_MATRIX
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
-HELD_STEP, MEMORY_SIZE = range(10, 12)
-DONE, FULL, UNDERFLOW, NOT_FINITE = range(4)
+HELD_STEP, GOAL, WINDOW_START, WINDOW_END, MEMORY_SIZE = range(10, 15)
+DONE, FULL, UNDERFLOW, NOT_FINITE, CREEPING = range(5)
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
+
+# So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
+WINDOW, LEAST_MEAN_STEP = 20_000, 1e-9
 
 
 @compiled_apart
@@ -85,12 +88,28 @@ def _step(
 
 @compiled
 def _error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
-    """Return the error of a step as a multiple of the tolerance, root mean square over the state."""
+    """Return the error of a step as a multiple of the tolerance, root mean square over the state.
+
+    It is infinite where the end is not finite: an infinite scale would make any error small.
+    """
     total = 0.0
     for c in range(x.size):
+        if not np.isfinite(end[c]):
+            return np.inf
         scale = atol[c] + rtol * max(abs(x[c]), abs(end[c]))
         total += (difference[c] / scale) ** 2
     return np.sqrt(total / x.size)
+
+
+@compiled
+def _worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
+    """Return the index of the state whose error is largest as a multiple of the tolerance."""
+    worst, index = -1.0, 0
+    for c in range(x.size):
+        ratio = abs(difference[c]) / (atol[c] + rtol * abs(x[c]))
+        if not ratio <= worst:
+            worst, index = ratio, c
+    return index
 
 
 @entry
@@ -140,7 +159,15 @@ def advance(
     if jumped and memory[HELD_STEP] > 0.0:
         # Held tensions have just jumped: what sufficed after the last jump is the best guess.
         memory[STEP], memory[LAST_STEP] = memory[HELD_STEP], 0.0
+    if memory[GOAL] != end:
+        memory[GOAL], memory[WINDOW_END] = end, 0.0
     while memory[TIME] < end:
+        tries = memory[ACCEPTED] + memory[REJECTED]
+        if tries >= memory[WINDOW_END]:
+            if memory[WINDOW_END] > 0.0 and memory[TIME] - memory[WINDOW_START] < WINDOW * LEAST_MEAN_STEP:
+                memory[CULPRIT] = float(_worst(x, k[count - 1], rtol, atol))
+                return CREEPING, recorded
+            memory[WINDOW_START], memory[WINDOW_END] = memory[TIME], tries + WINDOW
         if times.size > 0 and recorded == times.size:
             memory[HELD_STEP] = -memory[HELD_STEP]
             return FULL, recorded
@@ -207,10 +234,6 @@ def advance(
             memory[CULPRIT] = -1.0
             memory[STEP] = h * min(factor, 0.9)
             if memory[STEP] < 1e-14 * max(1.0, abs(time)):
-                worst = 0.0
-                for c in range(size):
-                    ratio = abs(k[count - 1, c]) / (atol[c] + rtol * abs(x[c]))
-                    if not ratio <= worst:
-                        worst, memory[CULPRIT] = ratio, float(c)
+                memory[CULPRIT] = float(_worst(x, k[count - 1], rtol, atol))
                 return UNDERFLOW, recorded
     return DONE, recorded
