@@ -8,14 +8,23 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted
+from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, SelfLockingWarning
 from finger_pin.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
 from finger_pin.parameters import FingerDescription
 from finger_pin.scenario import Scenario
 
 if TYPE_CHECKING:
+    from finger_pin.analysis import (
+        critical_friction,
+        force_polytope,
+        largest_force,
+        self_locking_map,
+        self_locking_margin,
+        tension_for_force,
+    )
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
+    from finger_pin.mjcf import to_mjcf
     from finger_pin.plots import draw_all, plot_energy, plot_fig6, plot_friction_law, plot_losses, plot_workspace
     from finger_pin.recording import load_result, save
     from finger_pin.simulation import simulate
@@ -27,7 +36,10 @@ _LATER = {
     "Finger": "finger",
     "LiveView": "viewer",
     "Simulator": "simulator",
+    "critical_friction": "analysis",
     "draw_all": "plots",
+    "force_polytope": "analysis",
+    "largest_force": "analysis",
     "load_result": "recording",
     "plot_energy": "plots",
     "plot_fig6": "plots",
@@ -35,8 +47,12 @@ _LATER = {
     "plot_losses": "plots",
     "plot_workspace": "plots",
     "save": "recording",
+    "self_locking_map": "analysis",
+    "self_locking_margin": "analysis",
     "simulate": "simulation",
     "simulate_many": "many",
+    "tension_for_force": "analysis",
+    "to_mjcf": "mjcf",
     "view": "viewer",
     "write_animation": "viewer",
 }
@@ -50,8 +66,12 @@ __all__ = [
     "Interrupted",
     "LiveView",
     "Scenario",
+    "SelfLockingWarning",
     "Simulator",
+    "critical_friction",
     "draw_all",
+    "force_polytope",
+    "largest_force",
     "list_fingers",
     "list_scenarios",
     "load_finger",
@@ -63,8 +83,12 @@ __all__ = [
     "plot_losses",
     "plot_workspace",
     "save",
+    "self_locking_map",
+    "self_locking_margin",
     "simulate",
     "simulate_many",
+    "tension_for_force",
+    "to_mjcf",
     "to_toml",
     "view",
     "write_animation",

@@ -85,9 +85,7 @@ def powers(finger: Finger, signals: FingerSignals) -> Powers:
     return Powers(
         actuators=np.sum(signals.command * pulled, axis=-1),
         fingertip=np.sum(signals.external_torque * state.velocity, axis=-1),
-        tendon_coulomb=np.sum(
-            friction.coulomb_loss(state.tendon_stiction, tendons.velocity, tendons.level), axis=-1
-        ),
+        tendon_coulomb=np.sum(friction.coulomb_loss(state.tendon_stiction, tendons.velocity, tendons.level), axis=-1),
         tendon_viscous=np.sum(friction.viscous_loss(tendons.velocity, finger.tendons.viscous), axis=-1),
         tendon_micro_damping=np.sum(
             friction.micro_loss(tendons.stiction_rate, tendons.velocity, finger.tendons.lag), axis=-1

@@ -168,9 +168,7 @@ class Finger:
         else:
             directions = np.zeros((*state.position.shape, 3))
             external = np.zeros_like(state.position)
-        joints = self.joint_friction.forces(
-            state.velocity, state.joint_stiction, tendons.strands, directions, force
-        )
+        joints = self.joint_friction.forces(state.velocity, state.joint_stiction, tendons.strands, directions, force)
         depth = self.stroke_limiter.depth(state.position)
         limiter = self.stroke_limiter.torque(depth, state.velocity)
         torque = tendons.strands @ self.routing.strand_coupling

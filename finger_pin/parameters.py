@@ -226,9 +226,7 @@ class PassiveTendon(Description):
 class StrokeLimiter(Description):
     """Hunt-Crossley stroke limiter (2): one number for all, or one per joint."""
 
-    stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(
-        50.0, unit="N m/rad", source="estimate", doc="k."
-    )
+    stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(50.0, unit="N m/rad", source="estimate", doc="k.")
     damping: Annotated[Numbers, reals(0.0, 1e5)] = quantity(0.5, unit="s/rad", source="estimate", doc="c.")
 
 

@@ -64,9 +64,7 @@ def quantity(default: Any, *, unit: str, source: str, doc: str) -> Any:
     return Field(default, description=doc, json_schema_extra={"unit": unit, "source": source})
 
 
-def real(
-    low: float = -math.inf, high: float = math.inf, *, above: bool = False, hint: str = ""
-) -> BeforeValidator:
+def real(low: float = -math.inf, high: float = math.inf, *, above: bool = False, hint: str = "") -> BeforeValidator:
     """Return a validator for one finite number in [low, high], or (low, high] with ``above``."""
     check = _checker(low, high, above, hint)
     return BeforeValidator(lambda value: check(value, ""))

@@ -86,9 +86,9 @@ def test_lambda_is_the_largest_of_equation_22_by_hand(controller):
 def test_the_part_besides_internal_tension_is_the_shortest_that_makes_the_torque(controller, routing):
     """Normal equations by hand: f^m = Hc (Hc^T Hc)^-1 tau is orthogonal to f^k and makes tau."""
     ratio = internal_by_hand()
-    table = np.array(
-        [[8.0, 8.0, 0, 0], [-8.0, 8.0, 0, 0], [0, 0, 6.3, 0], [0, -5.3, -5.3, -5.3], [0, 0, -3.5, 5.0]]
-    ) * 1e-3
+    table = (
+        np.array([[8.0, 8.0, 0, 0], [-8.0, 8.0, 0, 0], [0, 0, 6.3, 0], [0, -5.3, -5.3, -5.3], [0, 0, -3.5, 5.0]]) * 1e-3
+    )
     for error in errors(50):
         minimal = table @ np.linalg.solve(table.T @ table, error)
         level = max((1.0 - m) / k for m, k in zip(minimal, ratio, strict=True))

@@ -12,9 +12,7 @@ STIFFNESS, KINETIC, STATIC, STRIBECK, NORMAL = 5e4, 0.10, 0.15, 0.01, 10.0
 
 
 def level_at(velocity, normal=NORMAL, floor=1e-4):
-    return friction.friction_level(
-        normal, friction.friction_coefficient(velocity, KINETIC, STATIC, STRIBECK), floor
-    )
+    return friction.friction_level(normal, friction.friction_coefficient(velocity, KINETIC, STATIC, STRIBECK), floor)
 
 
 def slide(velocity, distance, start=0.0):

@@ -179,9 +179,7 @@ def test_actuated_tendons_come_first_wherever_the_passive_ones_are_written(netwo
     shuffled = {name: CHAIN[name] for name in ("P", "F", "Q", "E")}
     routing = Routing.from_description(network("abc", shuffled, ["P", "Q"]))
     assert routing.tendons == ("F", "E", "P", "Q")
-    np.testing.assert_allclose(
-        routing.coupling / MM, [[6, 0, 0], [-5, -5, -5], [-3, 4, 0], [0, -2, 3]], rtol=1e-14
-    )
+    np.testing.assert_allclose(routing.coupling / MM, [[6, 0, 0], [-5, -5, -5], [-3, 4, 0], [0, -2, 3]], rtol=1e-14)
 
 
 def test_a_passive_tendon_with_one_crossing_has_its_mass_before_it(network):

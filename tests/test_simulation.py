@@ -119,9 +119,7 @@ def test_samples_obey_the_tendon_equations(result):
     actuated = result.isel(tendon=slice(0, 4))
     delivered = np.maximum(0.0, actuated.tendon_command - actuated.tendon_friction)
     np.testing.assert_allclose(actuated.tendon_tension, delivered, rtol=1e-12)
-    np.testing.assert_allclose(
-        result.tendon_friction_coefficient, np.tanh(0.055 * result.tendon_curvature), rtol=1e-12
-    )
+    np.testing.assert_allclose(result.tendon_friction_coefficient, np.tanh(0.055 * result.tendon_curvature), rtol=1e-12)
     np.testing.assert_allclose(result.tracking_error, result.joint_reference - result.joint_position, atol=1e-15)
     np.testing.assert_allclose(result.joint_torque_command, result.tracking_error, rtol=1e-12, atol=1e-15)
 

@@ -131,7 +131,7 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         coupling=routing.coupling,
         strand_coupling=routing.strand_coupling,
         curvature_matrix=routing.curvature_matrix,
-        loads=routing.loads,
+        loads=np.ascontiguousarray(routing.loads),
         tendons=np.column_stack(
             [
                 routing.curvature_offset,
