@@ -1,0 +1,162 @@
+"""Fingers, closed loops and states on which the compiled core is compared with the readable model."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import kernels
+import numpy as np
+import pinocchio as pin
+
+import finger_pin as fp
+from finger_pin.closed_loop import ClosedLoop
+from finger_pin.core import rosenbrock
+from finger_pin.core.integrator import TABLEAUS, Stepper
+from finger_pin.core.linearisation import build_linear
+from finger_pin.core.plant import build_control, build_plant, build_work
+
+BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
+LOOPS = tuple(
+    name + push for push in ("", "_pushed") for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre")
+)
+FORCE = np.array([0.3, -0.2, 0.4])
+
+
+def tree_model():
+    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes."""
+    pin.seed(5)
+    turned = np.array([0.48, -0.6, 0.64])
+    joints = [
+        ("trunk", 0, pin.JointModelRZ()),
+        ("left", 1, pin.JointModelRX()),
+        ("left_twig", 2, pin.JointModelRevoluteUnaligned(turned)),
+        ("left_slide", 2, pin.JointModelPZ()),
+        ("left_tip", 4, pin.JointModelRY()),
+        ("right", 1, pin.JointModelPrismaticUnaligned(turned[[2, 0, 1]])),
+        ("right_tip", 6, pin.JointModelRevoluteUnaligned(turned[[1, 2, 0]])),
+    ]
+    model = pin.Model()
+    for name, parent, kind in joints:
+        index = model.addJoint(parent, kind, pin.SE3.Random(), name)
+        model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Random())
+    model.addFrame(pin.Frame("tip", 5, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    return model
+
+
+def on_model(model, joints, tip, gravity):
+    """A finger on a foreign model: every tendon crosses every joint, the last one passive."""
+    rng = np.random.default_rng(8)
+    tendons = {
+        f"T{i}": {
+            "kind": "passive" if i == len(joints) else "actuated",
+            "curvature_offset": 0.4,
+            "crossings": {name: {"radius": radius, "bends": True} for name, radius in zip(joints, row, strict=True)},
+        }
+        for i, row in enumerate(rng.uniform(-0.01, 0.01, (len(joints) + 1, len(joints))).tolist())
+    }
+    description = fp.FingerDescription.model_validate(
+        {
+            "name": "foreign",
+            "gravity": gravity,
+            "joints": {name: {"range": [-1.0, 1.0]} for name in joints},
+            "tendons": tendons,
+        }
+    )
+    return fp.Finger.from_model(description, model, {name: name for name in joints}, tip)
+
+
+def two_passive():
+    """`fig6` with a second passive tendon, between the proximal and the medial joint."""
+    table = fp.load_scenario("fig6").model_dump()
+    table["finger"]["tendons"]["T6"] = {
+        "kind": "passive",
+        "curvature_offset": 0.3,
+        "crossings": {"proximal": {"radius": -3e-3}, "medial": {"radius": 3e-3}},
+    }
+    del table["reference"]["joints"]["medial"]
+    return fp.Scenario.model_validate(table)
+
+
+def none_passive():
+    """The finger `planar`, all of whose tendons are actuated, bending and stretching."""
+    swing = {"offset": 0.5, "amplitude": 0.3}
+    joints = {"proximal": swing | {"frequency": 0.7}, "distal": swing | {"frequency": 0.9, "phase": 2.0}}
+    return fp.Scenario.model_validate(
+        {
+            "name": "planar_swing",
+            "finger": fp.load_finger("planar").model_dump(),
+            "controller": {},
+            "reference": {"joints": joints},
+        }
+    )
+
+
+def lugre():
+    """`two_passive` with the micro-damping and the Stribeck exponent of the LuGre model."""
+    table = two_passive().model_dump()
+    table["finger"]["tendon_friction"] |= {"micro_damping": 3.0, "stribeck_exponent": 2.0}
+    table["finger"]["joint_friction"] |= {"micro_damping": 1e-3, "stribeck_exponent": 2.0}
+    return fp.Scenario.model_validate(table)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A closed loop, readable and compiled."""
+
+    loop: ClosedLoop
+    plant: Any
+    control: Any
+    work: Any
+    linear: Any
+
+    @classmethod
+    def of(cls, loop):
+        plant = build_plant(loop.finger, loop.fingertip_force)
+        control = build_control(loop.controller, loop.reference, plant.actuated)
+        return cls(loop, plant, control, build_work(plant), build_linear(plant))
+
+    @property
+    def layout(self):
+        return self.loop.finger.layout
+
+    @property
+    def kinds(self):
+        """Indices of every kind of state that there is: positions, velocities, ..."""
+        parts = np.split(np.arange(self.layout.size), np.cumsum(self.layout.sizes)[:-1])
+        return [part for part in parts if len(part)]
+
+    def states(self, rng, count):
+        """Random states beyond the ranges and between slack and tight, slow and fast."""
+        finger, size = self.loop.finger, count
+        sizes = self.layout.sizes
+        lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
+
+        def spread(kind, low, high):
+            return rng.normal(size=(size, sizes[kind])) * 10.0 ** rng.uniform(low, high, (size, 1))
+
+        q = rng.uniform(lower - 0.15 * (upper - lower), upper + 0.15 * (upper - lower), (size, sizes[0]))
+        p = finger.tendons.rest_position(q) + spread(2, -5.0, -3.0)
+        return np.concatenate(
+            [q, spread(1, -2.0, 1.0), p, spread(3, -4.0, -1.0), spread(4, -2.0, 0.8), spread(5, -5.0, -2.0)], axis=1
+        )
+
+    def solve(self, time, x, g, r):
+        """Return the compiled rate, the solution of (g - J) u = r, and whether there is one."""
+        scaled, rate, u = np.zeros((3, len(x)))
+        solved = kernels.linear_solution(
+            self.plant, self.control, time, x, g, r, self.work, self.linear, scaled, rate, u
+        )
+        return rate, u, solved
+
+    def stepper(self, method="Rodas5P", rtol=1e-6, atol=1e-6, x=None, step=None):
+        """A compiled integrator; by default at the start of the loop, with the first step that it takes itself."""
+        start = self.loop.initial_state() if x is None else x
+        stepper = Stepper(self.plant, self.control, start, TABLEAUS[method](), rtol, atol * self.layout.scales())
+        if step is not None:
+            stepper.memory[rosenbrock.STEP] = step
+        return stepper
+
+
+def relative(found, expected):
+    """The largest distance between rows, each over the norm of the row that is expected."""
+    found, expected = (np.reshape(each, (len(expected), -1)) for each in (found, expected))
+    return np.max(np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1))

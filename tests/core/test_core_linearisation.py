@@ -1,0 +1,170 @@
+"""The compiled linearisation against sixth-order differences of the readable right-hand side, away from its kinks."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from core_cases import LOOPS, Case
+from numpy.linalg import norm
+
+from finger_pin.core.plant import held_control
+
+#: Sixth-order central differences: where to look, in steps, and weights.
+OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+#: By kind of state: small against what curves the right-hand side, large against rounding.
+STEPS = (1e-4, 1e-3, 1e-8, 1e-5, 1e-4, 1e-6)
+TIME_STEP = 1e-3
+STATES = 40
+
+
+@dataclass(frozen=True)
+class Derivative:
+    """A difference quotient and its rounding error; what is not more than rounding is zero."""
+
+    value: np.ndarray
+    rounding: np.ndarray
+
+    @classmethod
+    def of(cls, rates, step):
+        """Take differences of rates along the first axis; steps along the last one."""
+        value, rounding = np.tensordot(WEIGHTS, rates, axes=1) / step, 1e-14 * np.abs(rates).max(axis=0) / step
+        return cls(np.where(np.abs(value) > rounding, value, 0.0), rounding)
+
+
+@dataclass(frozen=True)
+class Held:
+    """A controller that keeps its tensions."""
+
+    tension: tuple[float, ...]
+
+    def command(self, time, reference, position, velocity):
+        tension = np.broadcast_to(self.tension, (*position.shape[:-1], len(self.tension)))
+        return type("Kept", (), {"tension": tension, "torque": np.zeros_like(position)})
+
+
+def pieces(case, times, x):
+    """Which smooth piece of the right-hand side each state lies on: equal rows mean the same piece."""
+    loop, finger = case.loop, case.loop.finger
+    signals = loop.evaluate(times, x)
+    found, state = signals.finger, signals.finger.state
+    rows = [
+        np.sign(state.position),
+        np.sign(state.velocity),
+        np.sign(found.tendons.velocity),
+        np.sign(found.command),
+        np.sign(found.limiter_depth),
+        found.limiter_torque != 0.0,
+        found.tendons.strands > 0.0,
+        found.tendons.level > finger.tendons.floor,
+        found.joints.level > finger.joint_friction.floor,
+    ]
+    actuated = case.plant.actuated
+    steady = state.tendon_stiction + finger.tendons.viscous * found.tendons.velocity
+    rows.append(found.command > steady[..., :actuated])
+    if not case.control.held:
+        # The tendon at its least tension, (22).
+        slack = (signals.control.tension - loop.controller.minimum) / loop.controller.internal
+        rows.append(np.argmin(slack, axis=-1)[:, None])
+    return np.concatenate(rows, axis=-1)
+
+
+def smooth_states(case, rng):
+    """Yield times and states with the differences of the right-hand side by state and by time."""
+    loop, size = case.loop, case.layout.size
+    step = np.repeat(STEPS, case.layout.sizes)
+    for time, x in zip(rng.uniform(0.0, 4.0, STATES), case.states(rng, STATES), strict=True):
+        near = (x + OFFSETS[:, None, None] * np.diag(step)).reshape(-1, size)
+        times = time + TIME_STEP * OFFSETS
+        stayed = np.tile(x, (len(OFFSETS), 1))
+        visited = np.concatenate([pieces(case, np.full(len(near), time), near), pieces(case, times, stayed)])
+        if np.any(np.ptp(visited, axis=0)):
+            continue
+        rates = loop.evaluate(np.full(len(near), time), near).finger.rate.reshape(len(OFFSETS), size, size)
+        jacobian = Derivative.of(np.moveaxis(rates, 1, 2), step)
+        rates = loop.evaluate(times, stayed).finger.rate
+        yield time, x, jacobian, Derivative.of(rates, TIME_STEP)
+
+
+def held(case):
+    """The same finger under tensions that do not change."""
+    tension = tuple(np.linspace(1.0, 4.0, case.plant.actuated))
+    control = held_control(case.plant)
+    control.tension[:] = tension
+    return replace(case, loop=replace(case.loop, controller=Held(tension)), control=control)
+
+
+@pytest.fixture(scope="module", params=[*LOOPS, "fig6_held", "two_passive_pushed_held", "lugre_held"])
+def examined(request, cases):
+    """A loop, and the states at which its right-hand side is smooth nearby."""
+    name = request.param
+    case = held(cases[name.removesuffix("_held")]) if name.endswith("_held") else cases[name]
+    found = list(smooth_states(case, np.random.default_rng(7)))
+    assert len(found) > STATES // 2
+    return case, found
+
+
+def extracted(case: Case, time, x, g):
+    """Return J from the solutions of (g - J) u = e for every unit vector e."""
+    columns = [case.solve(time, x, g, unit)[1] for unit in np.eye(len(x))]
+    return g * np.eye(len(x)) - np.linalg.inv(np.transpose(columns))
+
+
+def test_every_block_of_the_jacobian_is_that_of_differences(examined):
+    case, found = examined
+    for time, x, jacobian, _ in found:
+        ours = extracted(case, time, x, 1e5)
+        for rows in case.kinds:
+            for columns in case.kinds:
+                block = np.ix_(rows, columns)
+                scale = np.abs(jacobian.value[block]).max()
+                if scale > 0.0:
+                    error = np.abs(ours - jacobian.value)[block]
+                    assert np.all(error < 2e-5 * scale + jacobian.rounding[block])
+
+
+def test_the_states_examined_touch_a_limiter_and_have_a_slack_tendon(examined):
+    case, found = examined
+    x = np.array([each[1] for each in found])
+    signals = case.loop.evaluate(np.array([each[0] for each in found]), x).finger
+    assert np.any(signals.limiter_torque > 0.0) and np.any(signals.limiter_torque < 0.0)
+    assert np.any(signals.tendons.strands == 0.0)
+
+
+@pytest.mark.parametrize("g", [1e1, 1e3, 1e6])
+def test_the_linear_system_is_solved(examined, g):
+    """Against a dense solution with the differences' Jacobian, by kind of state, for long and for short steps."""
+    case, found = examined
+    rng = np.random.default_rng(8)
+    for time, x, jacobian, _ in found:
+        r = rng.normal(size=len(x)) * case.layout.scales()
+        _, u, solved = case.solve(time, x, g, r)
+        expected = np.linalg.solve(g * np.eye(len(x)) - jacobian.value, r)
+        assert solved
+        for kind in case.kinds:
+            assert norm(u[kind] - expected[kind]) < 1e-4 * norm(expected[kind])
+
+
+def test_the_derivative_in_time_is_that_of_differences(examined):
+    """It enters through the reference alone; tensions that are held have none."""
+    case, found = examined
+    joints = slice(len(case.layout.joints), 2 * len(case.layout.joints))
+    for time, x, _, derivative in found:
+        case.solve(time, x, 1e3, np.zeros(len(x)))
+        ours = case.linear.time_derivative.copy()
+        mass = np.triu(case.loop.finger.rigid_body.mass_matrix(x[: len(case.layout.joints)]))
+        ours[joints] = np.linalg.solve(mass + np.triu(mass, 1).T, ours[joints])
+        for kind in case.kinds:
+            error = np.abs(ours - derivative.value)[kind]
+            assert np.all(error <= 1e-4 * norm(derivative.value[kind]) + derivative.rounding[kind])
+    assert case.control.held != any(np.any(each[3].value) for each in found)
+
+
+def test_a_system_that_cannot_be_factorised_is_reported(cases):
+    case = cases["fig6"]
+    x = case.loop.initial_state()
+    assert case.solve(0.0, x, 1e3, np.ones(len(x)))[2]
+    for entry in (4, 9, 12):
+        broken = x.copy()
+        broken[entry] = np.nan
+        assert not case.solve(0.0, broken, 1e3, np.ones(len(x)))[2]

@@ -1,0 +1,313 @@
+"""The Rosenbrock methods: order conditions, stability, convergence on a finger, and what steps leave behind."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+import pytest
+from core_cases import Case
+from scipy.integrate import solve_ivp
+from test_core_linearisation import pieces
+
+import finger_pin as fp
+from finger_pin.closed_loop import ClosedLoop
+from finger_pin.core import rosenbrock
+from finger_pin.core.integrator import TABLEAUS, _interpolant
+from finger_pin.core.plant import held_control
+
+METHODS = tuple(TABLEAUS)
+ORDER = {"Rodas4": 4, "Rodas5P": 5}
+#: Length of the smooth motion, s.
+END = 5e-3
+
+
+@cache
+def trees(order):
+    """All rooted trees with so many nodes; a tree is the sorted tuple of its branches."""
+    if order == 1:
+        return ((),)
+    found = set()
+    for sizes in _partitions(order - 1):
+        choices = [()]
+        for size in set(sizes):
+            picked = combinations_with_replacement(trees(size), sizes.count(size))
+            choices = [some + more for some in choices for more in list(picked)]
+        found.update(tuple(sorted(each)) for each in choices)
+    return tuple(sorted(found))
+
+
+def _partitions(total, most=None):
+    if total == 0:
+        return [()]
+    return [
+        (first, *rest)
+        for first in range(min(total, most or total), 0, -1)
+        for rest in _partitions(total - first, first)
+    ]
+
+
+def size_of(tree):
+    return 1 + sum(map(size_of, tree))
+
+
+def density(tree):
+    """Gamma of the tree: the product of the sizes of all subtrees."""
+    return size_of(tree) * int(np.prod([density(branch) for branch in tree]))
+
+
+class Classical:
+    """A method in the coefficients in which the order conditions are written: alpha, Gamma and weights."""
+
+    def __init__(self, tableau):
+        """Undo the transformation that spares the products with J."""
+        stages = len(tableau.nodes)
+        self.gamma = np.linalg.inv(np.eye(stages) / tableau.gamma - tableau.coupling)
+        self.alpha = tableau.stage @ self.gamma
+        last = tableau.stage[-1].copy()
+        last[-1] += 1.0
+        self.weights = last @ self.gamma
+        self.embedded = tableau.stage[-1] @ self.gamma
+        self.dense = tableau.dense @ self.gamma
+
+    def stages_of(self, tree):
+        """Elementary weights of the stages: one branch alone sees Gamma too."""
+        matrix = self.alpha + self.gamma if len(tree) == 1 else self.alpha
+        branches = [matrix @ self.stages_of(branch) for branch in tree]
+        return np.prod([np.ones(len(self.alpha)), *branches], axis=0)
+
+    def defect(self, weights, tree, s=1.0):
+        return weights @ self.stages_of(tree) - s ** size_of(tree) / density(tree)
+
+    def interpolated(self, s):
+        """Weights of the interpolant at a fraction of the step."""
+        bend = self.dense[-1]
+        for row in self.dense[-2::-1]:
+            bend = row + s * bend
+        return s * (self.weights + (1.0 - s) * bend)
+
+
+@pytest.fixture(scope="module", params=METHODS)
+def method(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def classical(method):
+    return Classical(TABLEAUS[method]())
+
+
+def test_trees_are_counted_as_in_the_literature():
+    assert [len(trees(order)) for order in range(1, 7)] == [1, 1, 2, 4, 9, 20]
+
+
+def test_all_order_conditions_hold_up_to_the_order_and_not_beyond(method, classical):
+    order = ORDER[method]
+    assert TABLEAUS[method]().order == order
+    for size in range(1, order + 1):
+        for tree in trees(size):
+            assert abs(classical.defect(classical.weights, tree)) < 1e-12
+    assert max(abs(classical.defect(classical.weights, tree)) for tree in trees(order + 1)) > 1e-6
+
+
+def test_the_embedded_method_has_one_order_less(method, classical):
+    for size in range(1, ORDER[method]):
+        for tree in trees(size):
+            assert abs(classical.defect(classical.embedded, tree)) < 1e-12
+    assert max(abs(classical.defect(classical.embedded, tree)) for tree in trees(ORDER[method])) > 1e-6
+
+
+@pytest.mark.parametrize("s", [0.1, 0.35, 0.5, 0.8])
+def test_the_interpolant_has_one_order_less_everywhere_in_the_step(method, classical, s):
+    for size in range(1, ORDER[method]):
+        for tree in trees(size):
+            assert abs(classical.defect(classical.interpolated(s), tree, s)) < 1e-12
+
+
+def test_stages_lie_at_their_nodes_and_see_time_as_one_more_state(method, classical):
+    tableau = TABLEAUS[method]()
+    np.testing.assert_allclose(classical.alpha.sum(axis=1), tableau.nodes, atol=1e-13)
+    np.testing.assert_allclose(classical.gamma.sum(axis=1), tableau.time, atol=1e-13)
+    np.testing.assert_allclose(np.diag(classical.gamma), tableau.gamma, rtol=1e-13)
+
+
+def amplification(classical, z):
+    """Return R(z) of x' = lambda x with z = h lambda."""
+    stages = len(classical.alpha)
+    matrix = np.eye(stages) - z * (classical.alpha + classical.gamma)
+    return 1.0 + z * classical.weights @ np.linalg.solve(matrix, np.ones(stages))
+
+
+def test_the_methods_are_a_stable_and_forget_the_stiffest_parts(classical):
+    for y in np.logspace(-3.0, 6.0, 400):
+        assert abs(amplification(classical, 1j * y)) <= 1.0 + 1e-12
+    assert abs(amplification(classical, -1e9)) < 1e-6
+
+
+@pytest.fixture(scope="module")
+def smooth(scenarios):
+    """A loop with all its friction, moving so that nothing changes sign, slackens or reaches a limit.
+
+    Links a thousand times as heavy and a heavy, soft passive tendon leave nothing stiff at the steps taken here.
+    """
+    table = scenarios["fig6"].model_dump()
+    for joint in table["finger"]["joints"].values():
+        for name in ("mass", "transverse_inertia", "axial_inertia"):
+            joint["link"][name] *= 1e3
+    table["finger"]["gravity"] = (0.0, 0.0, -0.5)
+    table["finger"]["passive_tendon"] = {"stiffness": 500.0, "mass": 1.0}
+    table["controller"]["passive_tension"] = 0.05
+    table["finger"]["tendon_friction"]["stiffness"] = 5e3
+    table["environment"]["fingertip_force"] = [2.0, -3.0, 2.0]
+    case = Case.of(ClosedLoop.from_scenario(fp.Scenario.model_validate(table)))
+    x = case.loop.finger.rest_state(np.array([0.06, 0.3, 0.5, 0.15]))
+    x[4:8] = [1.0, 2.0, 3.0, 5.0]
+    x[9] = 0.5 * (3.5e-3 * x[6] + 5e-3 * x[7])
+    exact = solve_ivp(case.loop.rhs, (0.0, END), x, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=True)
+    return case, x, exact.sol
+
+
+def test_the_smooth_motion_has_no_kink(smooth):
+    case, _, exact = smooth
+    times = np.linspace(0.0, END, 200)
+    assert not np.any(np.ptp(pieces(case, times, exact(times).T), axis=0))
+
+
+def largest(case, error, scale):
+    """The largest error of a kind of state, each over the distance that it moves."""
+    return max(np.abs(error[..., kind]).max() / np.linalg.norm(scale[kind]) for kind in case.kinds)
+
+
+def test_steps_on_a_finger_converge_with_the_order_of_the_method(smooth, method):
+    """Steps are imposed: tolerances reject none, and every advance is one step."""
+    case, x, exact = smooth
+    moved, errors = exact(END) - x, []
+    for count in (5, 10, 20, 40):
+        stepper = case.stepper(method, rtol=1e6, atol=1e6, x=x, step=END)
+        for k in range(count):
+            assert stepper.advance(END * (k + 1) / count)[0] == rosenbrock.DONE
+        assert stepper.memory[rosenbrock.ACCEPTED] == count
+        errors.append(largest(case, stepper.x - exact(END), moved))
+    order = np.log2(errors[0] / errors[-1]) / 3.0
+    assert errors[-1] < {"Rodas4": 2e-8, "Rodas5P": 1e-9}[method]
+    assert ORDER[method] - 0.1 < order < ORDER[method] + 0.5
+
+
+def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
+    """Of one step from the same state: the error of an interpolant of order q is h^(q+1)."""
+    case, x, exact = smooth
+    moved, errors = exact(END) - x, []
+    for h in (2.5e-4, 1.25e-4, 6.25e-5):
+        stepper = case.stepper(method, rtol=1e6, atol=1e6, x=x, step=h)
+        record = (np.zeros(1), np.zeros((1, len(x))), np.zeros((1, len(stepper.tableau.dense), len(x))))
+        assert stepper.advance(h, record) == (rosenbrock.DONE, 1)
+        between = _interpolant(np.array([0.0, h]), np.stack([x, stepper.x]), record[2])
+        times = np.linspace(0.0, h, 9)
+        np.testing.assert_allclose(between(times[[0, -1]]), [x, stepper.x], rtol=1e-15, atol=1e-18)
+        errors.append(largest(case, between(times) - exact(times).T, moved))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(np.abs(orders - ORDER[method]) < 0.5), (errors, orders)
+
+
+def test_a_rejected_step_leaves_no_trace(cases, method):
+    """From a first step that is much too long, the one accepted is the same as if it had been the first tried."""
+    case = cases["stick_slip"]
+    tried = case.stepper(method, step=0.5)
+    record = tuple(np.zeros(shape) for shape in ((1,), (1, 19), (1, len(tried.tableau.dense), 19)))
+    assert tried.advance(1.0, record) == (rosenbrock.FULL, 1)
+    assert tried.memory[rosenbrock.REJECTED] > 0
+    direct = case.stepper(method, step=tried.time)
+    again = tuple(np.zeros_like(each) for each in record)
+    assert direct.advance(1.0, again) == (rosenbrock.FULL, 1)
+    assert direct.memory[rosenbrock.REJECTED] == 0
+    np.testing.assert_array_equal(direct.x, tried.x)
+    for ours, theirs in zip(again, record, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_names_the_culprit(cases, method):
+    """An absolute tolerance that no rounding can meet, for one number of the state alone."""
+    case = cases["fig6"]
+    for culprit in (6, 9):
+        stepper = case.stepper(method, rtol=0.0)
+        stepper.atol = np.ones(19)
+        stepper.atol[culprit] = 1e-60
+        start = stepper.x.copy()
+        status, _ = stepper.advance(1.0)
+        assert status == rosenbrock.UNDERFLOW
+        np.testing.assert_array_equal(stepper.x, start)
+        assert stepper.time == 0.0
+        name = case.layout.names[culprit]
+        assert stepper.failure(status, case.layout.names).endswith(f"the error is largest in {name}")
+
+
+def test_a_rate_that_is_not_finite_is_a_failure_that_keeps_the_state_and_names_the_culprit(scenarios, method):
+    """A mass at the edge of floating point makes the passive tendon's acceleration infinite, and nothing else."""
+    table = scenarios["fig6"].model_dump()
+    table["finger"]["passive_tendon"]["mass"] = 1e-320
+    case = Case.of(ClosedLoop.from_scenario(fp.Scenario.model_validate(table)))
+    x = case.loop.initial_state()
+    x[14] = 0.1
+    with np.errstate(over="ignore"):
+        rate = case.loop.rhs(0.0, x)
+    assert list(np.flatnonzero(~np.isfinite(rate))) == [9]
+    stepper = case.stepper(method, x=x)
+    status, _ = stepper.advance(1.0)
+    assert status == rosenbrock.NOT_FINITE
+    np.testing.assert_array_equal(stepper.x, x)
+    assert stepper.failure(status, case.layout.names) == "the rate of passive_velocity[T5] is not finite"
+
+
+def recorded(stepper, end, size):
+    """Advance with a record of some size; return the times, states and interpolants of all steps."""
+    width = len(stepper.x)
+    record = (np.zeros(size), np.zeros((size, width)), np.zeros((size, len(stepper.tableau.dense), width)))
+    kept = []
+    while stepper.time < end:
+        status, steps = stepper.advance(end, record)
+        assert status in (rosenbrock.DONE, rosenbrock.FULL)
+        kept.append([each[:steps].copy() for each in record])
+    return [np.concatenate(each) for each in zip(*kept, strict=True)]
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["continuous", "held"])
+def test_steps_do_not_depend_on_the_size_of_the_record_nor_on_the_run(cases, method, held):
+    """Bit by bit. Held tensions jump at every period, which shall not happen where a record is full."""
+    runs = []
+    for size in (1, 4, 7, 10_000, 10_000):
+        case = cases["stick_slip"]
+        if held:
+            case = replace(case, control=held_control(case.plant))
+        stepper, kept = case.stepper(method), []
+        for period in range(5):
+            case.control.tension[:] = [6.0 + period, 6.0, 14.0 - period, 10.0]
+            kept.append(recorded(stepper, 2e-3 * (period + 1), size))
+        runs.append([np.concatenate(each) for each in zip(*kept, strict=True)])
+    assert len(runs[0][0]) > 40
+    for run in runs[1:]:
+        for ours, first in zip(run, runs[0], strict=True):
+            np.testing.assert_array_equal(ours, first)
+
+
+def test_an_advance_ends_exactly_where_it_is_told(cases, method):
+    stepper = cases["fig6"].stepper(method)
+    for end in (1e-9, 1e-3, 1e-3 + 1e-15, 0.1, 1.0 / 3.0):
+        stepper.advance(end)
+        assert stepper.time == end
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["continuous", "held"])
+def test_an_advance_by_next_to_nothing_costs_one_step(cases, method, held):
+    """And the step size that was found before is not forgotten."""
+    case, taken = cases["fig6"], []
+    if held:
+        case = replace(case, control=held_control(case.plant))
+        case.control.tension[:] = [2.0, 2.0, 6.0, 4.0]
+    for gap in (0.0, 1e-12):
+        stepper = case.stepper(method)
+        for period in range(1, 40):
+            stepper.advance(1e-3 * period)
+            if period == 10 and gap > 0.0:
+                stepper.advance(stepper.time + gap)
+        taken.append(stepper.memory[rosenbrock.ACCEPTED])
+    assert taken[1] <= taken[0] + 2
