@@ -12,7 +12,7 @@ from benchmarks.store import Store, say
 from benchmarks.timing import clocked
 
 WORKERS = (1, 2)
-_COUNTS = (16, 64)
+_COUNTS = (12, 48)
 _QUICK_COUNTS = (4, 12)
 
 
