@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from finger_pin.analysis.self_locking import self_locking_margin
 from finger_pin.blocks.controller import Controller, ProportionalController
 from finger_pin.blocks.reference import HarmonicReference
 from finger_pin.closed_loop import ClosedLoop, LoopSignals, Reference
@@ -17,7 +15,7 @@ from finger_pin.core.finger import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
 from finger_pin.core.plant import Control, build_control, held_control
 from finger_pin.cvode import integrate_cvode
-from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.integration import Stop, Trajectory, Watch, integrate
 from finger_pin.recording import record
 from finger_pin.routing import Array
@@ -26,8 +24,6 @@ from finger_pin.scenario import METHODS_IN_NUMPY, Scenario
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 _CONTINUOUS = "Radau"
-# Below this ratio of locking to actual joint friction, the self-locking loop multiplies tensions sixfold.
-_CLOSE_TO_LOCKING = 1.2
 # Steps between two looks at a compiled simulation: rarely for a progress bar, often for an observer.
 _CHUNK, _CHUNK_OBSERVED = 256, 4
 
@@ -68,8 +64,6 @@ def simulate(
     """
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
-    if controller is None and reference is None:
-        _warn_of_locking(scenario)
     if control_period is not None:
         if not control_period > 0.0:
             raise InputError("control_period", "must be above 0", control_period)
@@ -115,14 +109,6 @@ def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
         result = result.isel(time=slice(max(length, 1)))
         result.attrs["end_time"] = float(result["time"][-1])
     return result, excess
-
-
-def _warn_of_locking(scenario: Scenario) -> None:
-    margin = self_locking_margin(scenario).margin
-    if margin < _CLOSE_TO_LOCKING:
-        effect = "the finger can lock or its tension run away" if margin < 1.0 else "tensions rise several times over"
-        message = f"joint friction is at {1.0 / margin:.2f} of what locks the finger on this reference: {effect}"
-        warnings.warn(message, SelfLockingWarning, stacklevel=3)
 
 
 def _control(loop: ClosedLoop) -> Control | None:
