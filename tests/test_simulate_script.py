@@ -405,14 +405,14 @@ def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monk
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, monkeypatch, number):
-    simulate = fp.simulation.simulate
+    simulate = fp.simulate
 
     def interrupted(scenario, *, stop, **options):
         asked = []
 
         def counted():
             asked.append(None)
-            if len(asked) == 30:
+            if len(asked) == 2:
                 os.kill(os.getpid(), number)
             return stop()
 
@@ -435,7 +435,7 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
     assert run("s.toml", "--output", "out")[0] == 0
     before = contents(here)
 
-    def stubborn(scenario, *, progress, stop):
+    def stubborn(scenario, **options):
         os.kill(os.getpid(), signal.SIGINT)
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(1.0)
