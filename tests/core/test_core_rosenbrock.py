@@ -241,6 +241,19 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
         assert stepper.failure(status, case.layout.names).endswith(f"the error is largest in {name}")
 
 
+def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_names_the_culprit(cases, method):
+    """An absolute tolerance that rounding meets only in steps far below a nanosecond."""
+    case = cases["fig6"]
+    stepper = case.stepper(method, rtol=0.0)
+    stepper.atol = np.ones(19)
+    stepper.atol[9] = 1e-22
+    status, _ = stepper.advance(1.0)
+    assert status == rosenbrock.CREEPING
+    tries = stepper.memory[[rosenbrock.ACCEPTED, rosenbrock.REJECTED]].sum()
+    assert 0.0 < stepper.time < tries * rosenbrock.LEAST_MEAN_STEP
+    assert stepper.failure(status, case.layout.names).endswith("the error is largest in passive_velocity[T5]")
+
+
 def test_a_rate_that_is_not_finite_is_a_failure_that_keeps_the_state_and_names_the_culprit(scenarios, method):
     """A mass at the edge of floating point makes the passive tendon's acceleration infinite, and nothing else."""
     table = scenarios["fig6"].model_dump()

@@ -1,0 +1,102 @@
+"""The compiler's cache: where it is, when it is thrown away, and that nothing is compiled before it is needed."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from finger_pin.core import compilation
+
+PACKAGE = Path(compilation.__file__).parent.parent
+
+
+@pytest.fixture
+def sources(tmp_path, monkeypatch):
+    """A copy of the package's source that the digest is taken of."""
+    copy = tmp_path / "finger_pin"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(compilation, "__file__", str(copy / "core" / "compilation.py"))
+    return copy
+
+
+@pytest.mark.parametrize("name", ["friction.py", "blocks/tendons.py", "blocks/stroke_limiter.py", "core/dynamics.py"])
+def test_a_changed_law_has_a_cache_of_its_own(sources, name):
+    before = compilation._digest()
+    assert compilation._digest() == before
+    source = sources / name
+    source.write_text(source.read_text() + "\n# The same law, another file.\n")
+    assert compilation._digest() != before
+
+
+def test_a_change_of_what_is_not_compiled_keeps_the_cache(sources):
+    before = compilation._digest()
+    source = sources / "recording.py"
+    source.write_text(source.read_text() + "\n# Not compiled.\n")
+    assert compilation._digest() == before
+
+
+def test_the_digest_covers_every_module_whose_functions_are_compiled():
+    """Every law that the core compiles lives in one of the files whose change the digest sees."""
+    from finger_pin.core import laws
+
+    seen = {*PACKAGE.glob("core/*.py"), *PACKAGE.glob("blocks/*.py"), PACKAGE / "friction.py"}
+    compiled = [value for value in vars(laws).values() if hasattr(value, "py_func")]
+    assert len(compiled) > 15
+    for function in compiled:
+        assert Path(function.py_func.__code__.co_filename) in seen
+
+
+def test_the_cache_lies_in_the_folder_that_the_environment_names(tmp_path, monkeypatch):
+    monkeypatch.setenv("FINGER_PIN_CACHE_DIR", str(tmp_path / "new" / "cache"))
+    folder = compilation._cache_folder()
+    assert folder == str(tmp_path / "new" / "cache" / compilation._digest())
+    assert list(Path(folder).iterdir()) == []
+
+
+def test_where_no_folder_can_be_made_there_is_no_cache(tmp_path, monkeypatch):
+    """Not even a person who may do anything can make a folder inside a file."""
+    file = tmp_path / "file"
+    file.write_text("not a folder")
+    monkeypatch.setenv("FINGER_PIN_CACHE_DIR", str(file))
+    assert compilation._cache_folder() is None
+    assert file.read_text() == "not a folder"
+
+
+def test_without_a_cache_code_compiles_and_runs_all_the_same(monkeypatch, tmp_path):
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", None)
+    monkeypatch.chdir(tmp_path)
+
+    @compilation.entry
+    def double(number):
+        return 2.0 * number
+
+    assert double(21.0) == 42.0
+    assert double.signatures and not double.stats.cache_path
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_compiled_arithmetic_keeps_what_is_not_a_number():
+    """An optimiser that may assume finite numbers would make both zero."""
+
+    @compilation.entry
+    def nothing(number):
+        return number - number + 0.0 * number
+
+    for number in (float("nan"), float("inf")):
+        assert nothing(number) != nothing(number)
+
+
+def test_importing_the_package_compiles_nothing_and_opens_no_cache_file(tmp_path):
+    code = (
+        "import finger_pin, finger_pin.core.rosenbrock as r, finger_pin.core.signals as s\n"
+        "print(len(r.advance.signatures) + len(s.evaluate_many.signatures) + len(s.motion_many.signatures))\n"
+    )
+    environment = os.environ | {"FINGER_PIN_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, cwd=PACKAGE.parent, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["0"]
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
