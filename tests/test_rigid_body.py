@@ -243,3 +243,25 @@ def test_a_prismatic_joint_is_accepted():
     body = RigidBody(model, "tool")
     np.testing.assert_allclose(body.tip_position(np.array([0.5])), [0.6, 0.0, 0.0])
     np.testing.assert_allclose(body.mass_matrix(np.array([0.5])), [[2.0]])
+
+
+def test_link_directions_off_the_fingertip_s_branch_do_not_depend_on_what_was_evaluated_before():
+    model = pin.Model()
+    inertia = pin.Inertia(0.01, np.array([0.01, 0.0, 0.0]), 1e-6 * np.eye(3))
+    along = pin.SE3(np.eye(3), np.array([0.03, 0.0, 0.0]))
+    root = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "root")
+    tip = model.addJoint(root, pin.JointModelRZ(), along, "tip")
+    side = model.addJoint(root, pin.JointModelRZ(), along, "side")
+    last = model.addJoint(side, pin.JointModelRZ(), along, "last")
+    for joint in (root, tip, side, last):
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame("fingertip", tip, 0, along, pin.FrameType.OP_FRAME))
+    body = RigidBody(model)
+    q, still = np.array([0.3, -0.4, 0.5, 0.2]), np.zeros(4)
+    index = body.joints.index("last")
+    for before in (np.zeros(4), np.ones(4)):
+        body.kinematics(before, still)
+        # The link before the last joint is turned by the root and the side joint, about z.
+        angle = q[body.joints.index("root")] + q[body.joints.index("side")]
+        expected = [np.cos(angle), np.sin(angle), 0.0]
+        np.testing.assert_allclose(body.kinematics(q, still).directions[index], expected, atol=1e-14)

@@ -128,8 +128,9 @@ class RigidBody:
             return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
         tip = np.array(self._data.oMf[self.tip_frame].translation)
-        directions = self._directions()
         kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
+        # Only now is every branch placed: the Jacobian places the fingertip's alone.
+        directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
         return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
 
