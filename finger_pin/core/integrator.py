@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from finger_pin.core import rosenbrock as core
+from finger_pin.core.binding import block_for
 from finger_pin.core.linearisation import build_linear
 from finger_pin.core.plant import Control, Plant, build_work
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
@@ -22,33 +23,64 @@ _MOST_BYTES = 2e9
 
 
 class Stepper:
-    """A state that the compiled integrator carries forward; everything that a continued integration needs.
-
-    Attributes:
-        x: The packed state, shape (size,).
-        memory: Time, step size, error history and counters.
-    """
+    """A state that the compiled integrator carries forward; everything that a continued integration needs."""
 
     def __init__(self, plant: Plant, control: Control, x: Array, tableau: Tableau, rtol: float, atol: Array) -> None:
         """Start at time zero."""
-        self.plant, self.control, self.tableau = plant, control, tableau
-        self.x = np.array(x, dtype=float)
-        self.rtol, self.atol = rtol, np.asarray(atol, dtype=float)
-        self.memory = np.zeros(core.MEMORY_SIZE)
-        self.memory[core.STEP] = _FIRST_STEP
-        self._allocate()
+        memory = np.zeros(core.MEMORY_SIZE)
+        memory[core.STEP] = _FIRST_STEP
+        self._bind(plant, control, np.array(x, dtype=float), tableau, float(rtol), np.array(atol, dtype=float), memory)
 
-    def _allocate(self) -> None:
-        plant, tableau = self.plant, self.tableau
-        stages, size = len(tableau.nodes), len(self.x)
-        self._scratch = (
-            self.memory,
-            build_work(plant),
-            build_linear(plant),
-            np.zeros((stages, size)),
-            np.zeros((4 + len(plant.parents), size)),
+    def _bind(
+        self, plant: Plant, control: Control, x: Array, tableau: Tableau, rtol: float, atol: Array, memory: Array
+    ) -> None:
+        # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
+        self._bound = core.Integration(
+            plant=plant,
+            control=control,
+            tableau=tableau,
+            x=x,
+            rtol=rtol,
+            atol=atol,
+            memory=memory,
+            work=build_work(plant),
+            linear=build_linear(plant),
+            k=np.zeros((len(tableau.nodes), len(x))),
+            scratch=np.zeros((4 + len(plant.parents), len(x))),
         )
-        self._nothing = (np.zeros(0), np.zeros((0, size)), np.zeros((0, len(tableau.dense), size)))
+        self._block = block_for(core.INTEGRATION)
+        core.bind(self._bound, self._block)
+        self._nothing = (np.zeros(0), np.zeros((0, len(x))), np.zeros((0, len(tableau.dense), len(x))))
+
+    @property
+    def plant(self) -> Plant:
+        """The finger."""
+        return self._bound.plant
+
+    @property
+    def control(self) -> Control:
+        """The controller."""
+        return self._bound.control
+
+    @property
+    def tableau(self) -> Tableau:
+        """The method."""
+        return self._bound.tableau
+
+    @property
+    def x(self) -> Array:
+        """The packed state itself, shape (size,)."""
+        return self._bound.x
+
+    @property
+    def atol(self) -> Array:
+        """Absolute tolerances, shape (size,)."""
+        return self._bound.atol
+
+    @property
+    def memory(self) -> Array:
+        """Time, step size, error history and counters."""
+        return self._bound.memory
 
     @property
     def time(self) -> float:
@@ -57,17 +89,7 @@ class Stepper:
 
     def advance(self, end: float, record: tuple[Array, Array, Array] | None = None) -> tuple[int, int]:
         """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
-        status, steps = core.advance(
-            self.plant,
-            self.control,
-            self.tableau,
-            self.x,
-            end,
-            self.rtol,
-            self.atol,
-            *self._scratch,
-            *(record or self._nothing),
-        )
+        status, steps = core.advance(self._block, end, *(record or self._nothing))
         return status, steps
 
     def restart(self, x: Array) -> None:
@@ -78,17 +100,18 @@ class Stepper:
 
     def load(self, fingertip_force: Array) -> None:
         """Set the fingertip force, shape (3,), N, base frame."""
-        self.plant.fingertip_force[:] = fingertip_force
-        if np.any(fingertip_force) and not self.plant.loaded:
-            self.plant = self.plant._replace(loaded=True)
+        bound = self._bound
+        bound.plant.fingertip_force[:] = fingertip_force
+        if np.any(fingertip_force) and not bound.plant.loaded:
+            plant = bound.plant._replace(loaded=True)
+            self._bind(plant, bound.control, bound.x, bound.tableau, bound.rtol, bound.atol, bound.memory)
 
     def copy(self) -> Stepper:
         """Return an independent stepper that goes on bit by bit alike."""
-        twin = copy.copy(self)
-        twin.plant = self.plant._replace(fingertip_force=self.plant.fingertip_force.copy())
-        twin.control = self.control._replace(tension=self.control.tension.copy())
-        twin.x, twin.memory = self.x.copy(), self.memory.copy()
-        twin._allocate()
+        bound, twin = self._bound, copy.copy(self)
+        plant = bound.plant._replace(fingertip_force=bound.plant.fingertip_force.copy())
+        control = bound.control._replace(tension=bound.control.tension.copy())
+        twin._bind(plant, control, bound.x.copy(), bound.tableau, bound.rtol, bound.atol, bound.memory.copy())
         return twin
 
     def failure(self, status: int, names: tuple[str, ...]) -> str:

@@ -22,6 +22,7 @@ import numpy as np
 
 from finger_pin.core import dynamics as at
 from finger_pin.core import laws
+from finger_pin.core.binding import Indices, Matrix, Vector
 from finger_pin.core.compilation import compiled
 from finger_pin.core.plant import Plant
 from finger_pin.core.rigid_body import (
@@ -31,7 +32,6 @@ from finger_pin.core.rigid_body import (
     inverse_dynamics,
     inverse_dynamics_derivatives,
 )
-from finger_pin.routing import Array
 
 
 class Linear(NamedTuple):
@@ -58,22 +58,22 @@ class Linear(NamedTuple):
         time_derivative: df/dt with the joints' rows multiplied by M, shape (size,).
     """
 
-    tendon: Array
-    joint: Array
-    stiction_by_position: Array
-    strand_by_position: Array
-    strand_by_passive: Array
-    joint_by_position: Array
-    torque_by_position: Array
-    torque_by_velocity: Array
-    tendon_gain: Array
-    strand_gain: Array
-    joint_gain: Array
-    matrix: Array
-    pivots: Any
-    vector: Array
-    constant: Array
-    time_derivative: Array
+    tendon: Matrix
+    joint: Matrix
+    stiction_by_position: Matrix
+    strand_by_position: Matrix
+    strand_by_passive: Vector
+    joint_by_position: Matrix
+    torque_by_position: Matrix
+    torque_by_velocity: Matrix
+    tendon_gain: Matrix
+    strand_gain: Matrix
+    joint_gain: Matrix
+    matrix: Matrix
+    pivots: Indices
+    vector: Vector
+    constant: Matrix
+    time_derivative: Vector
 
 
 # Rows of Linear.tendon and Linear.joint.

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from finger_pin.blocks.controller import ProportionalController
 from finger_pin.blocks.reference import HarmonicReference
+from finger_pin.core.binding import Indices, Layers, Matrix, Vector
 from finger_pin.core.rigid_body import (
     BODY_COLUMNS,
     CENTRE,
@@ -25,8 +25,6 @@ from finger_pin.exceptions import InputError
 from finger_pin.finger import Finger
 from finger_pin.routing import Array
 
-Indices = NDArray[np.int64]
-
 
 class Plant(NamedTuple):
     """A finger with n joints, t tendons (a actuated, p passive) and s strands.
@@ -36,20 +34,20 @@ class Plant(NamedTuple):
 
     parents: Indices
     kinds: Indices
-    bodies: Array
-    gravity: Array
+    bodies: Matrix
+    gravity: Vector
     tip_body: int
-    tip_offset: Array
-    directions: Array
-    coupling: Array
-    strand_coupling: Array
-    curvature_matrix: Array
-    loads: Array
-    tendons: Array
-    joints: Array
-    passive: Array
+    tip_offset: Vector
+    directions: Matrix
+    coupling: Matrix
+    strand_coupling: Matrix
+    curvature_matrix: Matrix
+    loads: Matrix
+    tendons: Matrix
+    joints: Matrix
+    passive: Matrix
     actuated: int
-    fingertip_force: Array
+    fingertip_force: Vector
     loaded: bool
 
 
@@ -57,38 +55,38 @@ class Control(NamedTuple):
     """The paper's controller and a harmonic reference; with ``held`` the tensions in ``tension`` are kept instead."""
 
     held: bool
-    tension: Array
-    gain: Array
-    minimum: Array
-    inverse: Array
-    internal: Array
-    reference: Array
-    coupling: Array
-    offset: Array
+    tension: Vector
+    gain: Vector
+    minimum: Vector
+    inverse: Matrix
+    internal: Vector
+    reference: Matrix
+    coupling: Matrix
+    offset: Vector
 
 
 class Work(NamedTuple):
     """Scratch memory and results of one evaluation and its linearisation; never holds anything between calls."""
 
-    rotation: Array
-    origin: Array
-    frame: Array
-    centre: Array
-    base_acceleration: Array
-    spatial: Array
-    inertia: Array
-    composite: Array
-    coriolis: Array
-    vectors: Array
-    square: Array
-    jacobian: Array
-    joint: Array
-    tendon: Array
-    strand: Array
-    direction: Array
+    rotation: Layers
+    origin: Matrix
+    frame: Matrix
+    centre: Vector
+    base_acceleration: Vector
+    spatial: Layers
+    inertia: Matrix
+    composite: Matrix
+    coriolis: Matrix
+    vectors: Matrix
+    square: Layers
+    jacobian: Matrix
+    joint: Matrix
+    tendon: Matrix
+    strand: Matrix
+    direction: Matrix
     active: Indices
-    command_by_position: Array
-    planned: Array
+    command_by_position: Matrix
+    planned: Vector
 
 
 def build_plant(finger: Finger, fingertip_force: Array) -> Plant:

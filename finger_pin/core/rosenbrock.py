@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from finger_pin.core.binding import Matrix, Vector, get, kind_of, put
 from finger_pin.core.compilation import compiled, compiled_apart, entry
 from finger_pin.core.dynamics import evaluate
-from finger_pin.core.linearisation import factorise, linearise, solve
+from finger_pin.core.linearisation import Linear, factorise, linearise, solve
+from finger_pin.core.plant import Control, Plant, Work
 from finger_pin.core.rigid_body import MASS_MATRIX
+from finger_pin.core.tableaus import Tableau
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
@@ -20,6 +23,39 @@ _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
 # So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
 WINDOW, LEAST_MEAN_STEP = 20_000, 1e-9
+
+
+class Integration(NamedTuple):
+    """All that an integration works on, from its start to its end.
+
+    Attributes:
+        plant: The finger.
+        control: The controller.
+        tableau: The method.
+        x: State, changed in place, shape (size,).
+        rtol: Relative tolerance.
+        atol: Absolute tolerances, shape (size,).
+        memory: Time, step size, error history and counters; kept between calls.
+        work: Scratch of the dynamics.
+        linear: Scratch of the linearisation.
+        k: Scratch for the stages, shape (s, size).
+        scratch: Scratch, shape (4 + n, size).
+    """
+
+    plant: Plant
+    control: Control
+    tableau: Tableau
+    x: Vector
+    rtol: float
+    atol: Vector
+    memory: Vector
+    work: Work
+    linear: Linear
+    k: Matrix
+    scratch: Matrix
+
+
+INTEGRATION = kind_of(Integration)
 
 
 @compiled_apart
@@ -113,42 +149,26 @@ def _worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
 
 
 @entry
-def advance(
-    plant: Any,
-    control: Any,
-    tableau: Any,
-    x: Any,
-    end: float,
-    rtol: float,
-    atol: Any,
-    memory: Any,
-    work: Any,
-    linear: Any,
-    k: Any,
-    scratch: Any,
-    times: Any,
-    states: Any,
-    dense: Any,
-) -> Any:
+def bind(integration: Any, block: Any) -> None:
+    """Write into a block, made by `block_for(INTEGRATION)`, where all that an integration works on lies."""
+    put(block, integration, INTEGRATION)
+
+
+@entry
+def advance(block: Any, end: float, times: Any, states: Any, dense: Any) -> Any:
     """Take steps until the end, or until the record is full; return a status and the number of steps recorded.
 
     Args:
-        plant: The finger.
-        control: The controller.
-        tableau: The method.
-        x: State, changed in place, shape (size,).
+        block: Filled by `bind`.
         end: Time to reach, s.
-        rtol: Relative tolerance.
-        atol: Absolute tolerances, shape (size,).
-        memory: Time, step size, error history and counters; kept between calls.
-        work: Scratch of the dynamics.
-        linear: Scratch of the linearisation.
-        k: Scratch for the stages, shape (s, size).
-        scratch: Scratch, shape (4 + n, size).
         times: Record of the times at which steps end, shape (m,); of length zero to record nothing.
         states: Record of the states there, shape (m, size).
         dense: Record of the interpolants of the steps, shape (m, rows of the tableau's dense, size).
     """
+    integration = get(block, INTEGRATION)
+    plant, control, tableau = integration.plant, integration.control, integration.tableau
+    x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
+    work, linear, k, scratch = integration.work, integration.linear, integration.k, integration.scratch
     size, count = x.size, tableau.nodes.size
     recorded = 0
     exponent = 1.0 / tableau.order

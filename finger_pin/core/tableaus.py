@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finger_pin.core.binding import Matrix, Vector
 from finger_pin.routing import Array
 
 
@@ -31,11 +32,11 @@ class Tableau(NamedTuple):
 
     gamma: float
     order: int
-    stage: Array
-    coupling: Array
-    nodes: Array
-    time: Array
-    dense: Array
+    stage: Matrix
+    coupling: Matrix
+    nodes: Vector
+    time: Vector
+    dense: Matrix
 
 
 def _lower(*rows: list[float]) -> Array:

@@ -230,7 +230,7 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
     case = cases["fig6"]
     for culprit in (6, 9):
         stepper = case.stepper(method, rtol=0.0)
-        stepper.atol = np.ones(19)
+        stepper.atol[:] = 1.0
         stepper.atol[culprit] = 1e-60
         start = stepper.x.copy()
         status, _ = stepper.advance(1.0)
@@ -245,7 +245,7 @@ def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_name
     """An absolute tolerance that rounding meets only in steps far below a nanosecond."""
     case = cases["fig6"]
     stepper = case.stepper(method, rtol=0.0)
-    stepper.atol = np.ones(19)
+    stepper.atol[:] = 1.0
     stepper.atol[9] = 1e-22
     status, _ = stepper.advance(1.0)
     assert status == rosenbrock.CREEPING

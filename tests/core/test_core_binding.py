@@ -1,0 +1,87 @@
+"""Arguments that are bound once are the arguments that compiled code sees."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import errors
+
+from finger_pin.core.binding import Indices, Layers, Matrix, Vector, block_for, get, kind_of, put
+from finger_pin.core.compilation import entry
+
+
+class Inner(NamedTuple):
+    flag: bool
+    table: Matrix
+    count: int
+
+
+class Outer(NamedTuple):
+    indices: Indices
+    inner: Inner
+    vector: Vector
+    factor: float
+    layers: Layers
+
+
+KIND = kind_of(Outer)
+
+
+@entry
+def bind(value, block):
+    put(block, value, KIND)
+
+
+@entry
+def weigh(block, out):
+    """Sum every field with a weight of its own, by its shape; change the vector in place."""
+    value = get(block, KIND)
+    total = value.factor * value.inner.count + (100.0 if value.inner.flag else 200.0)
+    for i in range(value.indices.size):
+        total += 1e3 * (i + 1) * value.indices[i]
+    for i in range(value.inner.table.shape[0]):
+        for j in range(value.inner.table.shape[1]):
+            total += (3 * i + 7 * j) * value.inner.table[i, j]
+    for i in range(value.layers.shape[0]):
+        total += (i + 1) * value.layers[i].sum()
+    for i in range(value.vector.size):
+        value.vector[i] += 1.0
+    out[0] = total
+
+
+@pytest.fixture
+def outer():
+    return Outer(
+        indices=np.array([4, 5], dtype=np.int64),
+        inner=Inner(flag=True, table=np.arange(6.0).reshape(2, 3), count=3),
+        vector=np.zeros(2),
+        factor=0.5,
+        layers=np.ones((2, 2, 2)),
+    )
+
+
+def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
+    block, out = block_for(KIND), np.zeros(1)
+    bind(outer, block)
+    weigh(block, out)
+    table = sum((3 * i + 7 * j) * outer.inner.table[i, j] for i in range(2) for j in range(3))
+    assert out[0] == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + (1 + 2) * 4
+    outer.inner.table[1, 2] += 1.0
+    weigh(block, out)
+    assert out[0] == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + 3 + 14 + (1 + 2) * 4
+    np.testing.assert_array_equal(outer.vector, [2.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"vector": np.zeros(4)[::2]},
+        {"vector": np.zeros(2, dtype=np.float32)},
+        {"layers": np.zeros((2, 2))},
+        {"factor": 1},
+    ],
+    ids=["strided", "single precision", "fewer dimensions", "integer"],
+)
+def test_what_would_be_misread_is_not_bound(outer, change):
+    with pytest.raises(errors.TypingError, match="cannot be bound"):
+        bind(outer._replace(**change), block_for(KIND))
