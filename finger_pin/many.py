@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 
 import numpy as np
 import xarray as xr
@@ -15,6 +16,8 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 
+# Runs that are handed to each process ahead of time, so that none waits for the next.
+_IN_FLIGHT = 2
 _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time")
 
 
@@ -50,30 +53,44 @@ def simulate_many(
         raise InputError("workers", "must be at least 1", workers)
     count = min(workers or len(os.sched_getaffinity(0)), len(runs))
     keep = None if variables is None else tuple(variables)
-    # The first run comes first and here: it compiles what the other processes then find in the cache.
     results: list[xr.Dataset | None] = [None] * len(runs)
-    results[0] = _run(runs[0], keep)
-    done = 1
-    if progress is not None:
-        progress(done, len(runs))
-    if count == 1 or len(runs) == 1:
+    for done, (index, result) in enumerate(_completed(runs, keep, count), start=1):
+        results[index] = result
+        if progress is not None:
+            progress(done, len(runs))
+    return _stack(runs, results)
+
+
+def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: int) -> Iterator[tuple[int, xr.Dataset]]:
+    """Yield index and result of every run as it is finished."""
+    # The first run comes first and here: it compiles what the other processes then find in the cache.
+    yield 0, _run(runs[0], keep)
+    if count == 1:
         for index in range(1, len(runs)):
-            results[index] = _run(runs[index], keep)
-            if progress is not None:
-                progress(index + 1, len(runs))
-        return _stack(runs, results)
+            yield index, _run(runs[index], keep)
+        return
+    waiting = deque(range(1, len(runs)))
+    pending: dict[Future[xr.Dataset], int] = {}
+    started = False
     with ProcessPoolExecutor(count, mp_context=_context()) as pool:
-        pending = {pool.submit(_run, run, keep): index for index, run in enumerate(runs) if index > 0}
         try:
-            for future in as_completed(pending):
-                results[pending[future]] = future.result()
-                done += 1
-                if progress is not None:
-                    progress(done, len(runs))
+            while waiting or pending:
+                while waiting and len(pending) < _IN_FLIGHT * count:
+                    index = waiting.popleft()
+                    pending[pool.submit(_run, runs[index], keep)] = index
+                if waiting and not started:
+                    # The processes take a second or two to start; this one is there already.
+                    index = waiting.popleft()
+                    yield index, _run(runs[index], keep)
+                finished, _ = wait(
+                    pending, timeout=None if started or not waiting else 0.0, return_when=FIRST_COMPLETED
+                )
+                started = started or bool(finished)
+                for future in finished:
+                    yield pending.pop(future), future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return _stack(runs, results)
 
 
 def _context() -> multiprocessing.context.BaseContext:

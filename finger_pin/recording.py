@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -158,5 +159,10 @@ def _attributes(scenario: Scenario, trajectory: Trajectory, method: str) -> dict
         "atol_scale": settings.atol_scale,
         "end_time": float(trajectory.breakpoints[-1]),
         **statistics,
-        **{f"version_{name.replace('-', '_')}": metadata.version(name) for name in _PACKAGES},
+        **_versions(),
     }
+
+
+@cache
+def _versions() -> Mapping[str, str]:
+    return {f"version_{name.replace('-', '_')}": metadata.version(name) for name in _PACKAGES}

@@ -101,10 +101,11 @@ def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
     """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
     length, excess = result.sizes["time"], ""
     for name, values in result.data_vars.items():
-        finite = np.isfinite(values.to_numpy()).reshape(values.sizes["time"], -1).all(axis=1)
-        first = length if finite.all() else int(np.argmin(finite))
-        if first < length:
-            length, excess = first, str(name)
+        finite = np.isfinite(values.to_numpy())
+        if not finite.all():
+            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
+            if first < length:
+                length, excess = first, str(name)
     if excess:
         result = result.isel(time=slice(max(length, 1)))
         result.attrs["end_time"] = float(result["time"][-1])

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,16 @@ from benchmarks.store import Store, say
 _SCRIPT = Path(__file__).resolve().parents[1] / "simulate.py"
 _LATER = 3
 _KIB = 1024
+# A new process counts the memory of the one that it was forked from as its own: a small one starts the job.
+_MEASURE = """
+import resource, subprocess, sys, time
+began = time.perf_counter()
+code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL)
+elapsed = time.perf_counter() - began
+usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(elapsed, usage.ru_utime + usage.ru_stime, usage.ru_maxrss)
+sys.exit(code)
+"""
 
 
 def measure(store: Store) -> dict[str, Any]:
@@ -44,13 +53,11 @@ def _run(options: list[str], folder: Path) -> dict[str, float]:
     """Run the script to its end; return its wall and processor times, s, and its peak memory, bytes."""
     command = [sys.executable, str(_SCRIPT), *options, "--quiet", "--output", str(folder / "results")]
     environment = {**os.environ, "FINGER_PIN_CACHE_DIR": str(folder / "cache")}
-    began = time.perf_counter()
-    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    elapsed = time.perf_counter() - began
-    if process.returncode:
-        raise RuntimeError(f"simulate.py ended with exit code {process.returncode}")
+    measured = [sys.executable, "-S", "-c", _MEASURE, *command]
+    done = subprocess.run(measured, env=environment, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"simulate.py ended with exit code {done.returncode}")
+    wall_time, processor_time, memory = map(float, done.stdout.split()[-3:])
     # Linux counts in KiB, macOS in bytes.
     unit = 1 if sys.platform == "darwin" else _KIB
-    return {"wall_time": elapsed, "processor_time": usage.ru_utime + usage.ru_stime, "memory": usage.ru_maxrss * unit}
+    return {"wall_time": wall_time, "processor_time": processor_time, "memory": memory * unit}
