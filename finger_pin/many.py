@@ -51,7 +51,7 @@ def simulate_many(
     _check_alike(runs)
     if workers is not None and workers < 1:
         raise InputError("workers", "must be at least 1", workers)
-    count = min(workers or len(os.sched_getaffinity(0)), len(runs))
+    count = min(workers or usable_cores(), len(runs))
     keep = None if variables is None else tuple(variables)
     results: list[xr.Dataset | None] = [None] * len(runs)
     for done, (index, result) in enumerate(_completed(runs, keep, count), start=1):
@@ -91,6 +91,15 @@ def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: in
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        # Only Linux binds processes to cores.
+        return os.cpu_count() or 1
 
 
 def _context() -> multiprocessing.context.BaseContext:

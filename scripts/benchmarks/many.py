@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
+from finger_pin.many import usable_cores
 
 WORKERS = (1, 2)
 # Many enough that the start of the processes, two seconds, no longer counts.
@@ -48,7 +48,7 @@ def _study(counts: tuple[int, int], duration: float) -> dict[str, Any]:
     return {
         "duration": duration,
         "counts": counts,
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": usable_cores(),
         "times": times,
         "speed_up": many[0] / many[1],
         "speed_up_without_start": marginal,
