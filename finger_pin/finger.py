@@ -15,6 +15,7 @@ from finger_pin.blocks.tendons import TendonForces, Tendons
 from finger_pin.description import build_rigid_body
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
+from finger_pin.pins import pin_loads
 from finger_pin.routing import Array
 from finger_pin.state import Layout, State
 
@@ -72,7 +73,8 @@ class Finger:
                 description's links make.
 
         Raises:
-            InputError: If the joints of the two differ.
+            InputError: If the joints of the two differ, or the full joint reaction is asked for on a rigid body that
+                was given.
         """
         self.description = description
         self.rigid_body = rigid_body or build_rigid_body(description)
@@ -80,7 +82,8 @@ class Finger:
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
         self.tendons = Tendons.from_description(description)
         self.routing = self.tendons.routing
-        self.joint_friction = JointFriction.from_description(description, self.routing.loads)
+        pins = pin_loads(description, self.routing, self.rigid_body, foreign=rigid_body is not None)
+        self.joint_friction = JointFriction.from_description(description, pins)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive)
 
@@ -161,14 +164,15 @@ class Finger:
             state.tendon_stiction,
             command,
         )
-        if np.any(force):
+        pins = self.joint_friction.pins
+        if np.any(force) or pins.heavy:
             kinematics = body.kinematics(state.position, state.velocity)
-            directions = kinematics.directions
+            on_pins = pins.external(kinematics.rotations, force)
             external = np.einsum("...ij,...i->...j", kinematics.jacobian, force)
         else:
-            directions = np.zeros((*state.position.shape, 3))
+            on_pins = np.zeros((*state.position.shape, 3))
             external = np.zeros_like(state.position)
-        joints = self.joint_friction.forces(state.velocity, state.joint_stiction, tendons.strands, directions, force)
+        joints = self.joint_friction.forces(state.velocity, state.joint_stiction, tendons.strands, on_pins)
         depth = self.stroke_limiter.depth(state.position)
         limiter = self.stroke_limiter.torque(depth, state.velocity)
         torque = tendons.strands @ self.routing.strand_coupling

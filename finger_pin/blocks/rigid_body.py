@@ -20,7 +20,7 @@ class Kinematics:
         tip: p, fingertip position, shape (..., 3), m.
         tip_velocity: p', shape (..., 3), m/s.
         jacobian: J of (6), shape (..., 3, n).
-        directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
+        rotations: From the body proximal to each joint to the base frame, shape (..., n, 3, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
     """
@@ -28,7 +28,7 @@ class Kinematics:
     tip: Array
     tip_velocity: Array
     jacobian: Array
-    directions: Array
+    rotations: Array
     kinetic_energy: Array
     potential_energy: Array
 
@@ -119,7 +119,12 @@ class RigidBody:
     def link_directions(self, q: Array) -> Array:
         """Return e_j of (17), shape (n, 3): along the proximal link, from its joint to this one; base frame."""
         pin.forwardKinematics(self.model, self._data, q)
-        return self._directions()
+        return np.einsum("jrc,jc->jr", self._rotations(), self.proximal_axes[1:])
+
+    def distal_weights(self) -> Array:
+        """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
+        pin.computeSubtreeMasses(self.model, self._data)
+        return np.outer(np.array(self._data.mass)[1:], self.model.gravity.linear)
 
     def kinematics(self, q: Array, v: Array) -> Kinematics:
         """Return what follows from position and velocity, for shapes (..., n)."""
@@ -130,11 +135,10 @@ class RigidBody:
         tip = np.array(self._data.oMf[self.tip_frame].translation)
         kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
-        directions = self._directions()
+        rotations = self._rotations()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
-        return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
+        return Kinematics(tip, jacobian @ v, jacobian, rotations, np.array(kinetic), np.array(potential))
 
-    def _directions(self) -> Array:
+    def _rotations(self) -> Array:
         placements, parents = self._data.oMi, self.model.parents
-        rows = [placements[parents[j]].rotation @ self.proximal_axes[j] for j in range(1, self.model.njoints)]
-        return np.array(rows)
+        return np.array([placements[parents[j]].rotation for j in range(1, self.model.njoints)])

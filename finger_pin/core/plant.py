@@ -40,17 +40,18 @@ class Plant(NamedTuple):
     gravity: Array
     tip_body: int
     tip_offset: Array
-    directions: Array
     coupling: Array
     strand_coupling: Array
     curvature_matrix: Array
-    loads: Array
+    pulls: Array
+    weights: Array
     tendons: Array
     joints: Array
     passive: Array
     actuated: int
     fingertip_force: Array
     loaded: bool
+    heavy: bool
 
 
 class Control(NamedTuple):
@@ -85,7 +86,8 @@ class Work(NamedTuple):
     joint: Array
     tendon: Array
     strand: Array
-    direction: Array
+    external: Array
+    pressure: Array
     active: Indices
     command_by_position: Array
     planned: Array
@@ -125,13 +127,11 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         gravity=np.array(model.gravity.linear),
         tip_body=tip_body,
         tip_offset=turns[tip_body + 1].T @ frame.placement.translation,
-        directions=np.array(
-            [turns[parents[i] + 1].T @ axis for i, axis in enumerate(finger.rigid_body.proximal_axes[1:])]
-        ),
         coupling=routing.coupling,
         strand_coupling=routing.strand_coupling,
         curvature_matrix=routing.curvature_matrix,
-        loads=np.ascontiguousarray(routing.loads),
+        pulls=np.array([turns[parents[i] + 1].T @ joints.pins.pulls[i] for i in range(size)]),
+        weights=joints.pins.weights,
         tendons=np.column_stack(
             [
                 routing.curvature_offset,
@@ -165,6 +165,7 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         actuated=routing.actuated,
         fingertip_force=np.array(fingertip_force, dtype=float),
         loaded=bool(np.any(fingertip_force)),
+        heavy=joints.pins.heavy,
     )
 
 
@@ -218,10 +219,11 @@ def build_work(plant: Plant) -> Work:
         vectors=np.zeros((2, 6)),
         square=np.zeros((SQUARE_LAYERS, joints, joints)),
         jacobian=np.zeros((3, joints)),
-        joint=np.zeros((17, joints)),
+        joint=np.zeros((15, joints)),
         tendon=np.zeros((7, tendons)),
         strand=np.zeros((1, strands)),
-        direction=np.zeros((joints, 3)),
+        external=np.zeros((joints, 3)),
+        pressure=np.zeros((joints, 3)),
         active=np.zeros(1, dtype=np.int64),
         command_by_position=np.zeros((tendons, joints)),
         planned=np.zeros(tendons),
