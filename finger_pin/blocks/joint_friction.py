@@ -64,7 +64,7 @@ class PinLoads:
             rotations: A, shape (..., n, 3, 3).
             fingertip_force: F, shape (3,) or (..., 3), N, base frame.
         """
-        return np.einsum("...jcr,...jc->...jr", rotations, fingertip_force[..., None, :] + self.weights)
+        return np.asarray(np.einsum("...jcr,...jc->...jr", rotations, fingertip_force[..., None, :] + self.weights))
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,7 +119,7 @@ class RigidBody:
     def link_directions(self, q: Array) -> Array:
         """Return e_j of (17), shape (n, 3): along the proximal link, from its joint to this one; base frame."""
         pin.forwardKinematics(self.model, self._data, q)
-        return np.einsum("jrc,jc->jr", self._rotations(), self.proximal_axes[1:])
+        return np.asarray(np.einsum("jrc,jc->jr", self._rotations(), self.proximal_axes[1:]))
 
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""

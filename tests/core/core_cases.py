@@ -15,11 +15,8 @@ from finger_pin.core.linearisation import build_linear
 from finger_pin.core.plant import build_control, build_plant, build_work
 
 BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
-LOOPS = tuple(
-    name + push
-    for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "full")
-)
+SCENARIOS = ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "full")
+LOOPS = tuple(name + push for push in ("", "_pushed") for name in SCENARIOS)
 FORCE = np.array([0.3, -0.2, 0.4])
 
 
