@@ -1,0 +1,300 @@
+"""How good the joint reaction (17) is: the whole force and moment on every pin along a result.
+
+Cut a joint open and free everything that it carries. On it act its weight, the fingertip force F, the tendons that
+cross the cut, each with its tension along its path, and the pin. Newton and Euler give what the pin must exert:
+
+    P_j = sum m (a - g) + sum f t - F,      moment likewise, about the joint's origin,
+
+with t the direction of a tendon from its actuator on. (17) keeps e_j S_j - F: no weight, no inertia, and all tendons
+along the proximal link. The first sum is that of recursive Newton-Euler (Pinocchio's); tendons are massless.
+
+Assumptions. A tendon has the tension f of (12) wherever it crosses a joint, since (12) puts its friction before the
+joints; friction of a passive tendon acts on the link of its lumped mass, beyond the cut. Grooves are part of the distal
+link, or of the proximal one (`geometry.cuts.Groove`); a loose pulley would press on the pin itself, with the pull of
+both sides, which is the former case for the pin's other end. Canals inside what is cut free do not show. Joint friction
+and stroke limiters are pure couples about the axis, as in (18): the moment of the pin about its axis is
+-(tau^f + tau^r). R_j is the length of P_j; P_j has a part along the axis, the thrust, and the moment across the axis,
+the tilt, is a pair of forces in bearings, which (17) does not know and whose size depends on their distance.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+import xarray as xr
+
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.geometry import Groove, TendonGeometry
+from finger_pin.routing import Array
+from finger_pin.scenario import Scenario
+from finger_pin.validation import validate
+
+_NEEDED = ("joint_position", "joint_velocity", "joint_acceleration", "tendon_tension")
+
+
+@dataclass(frozen=True, eq=False)
+class PinWrench:
+    """What the pins exert on what the joints carry, base frame, moments about the joints' origins; shapes (m, n, 3).
+
+    Attributes:
+        axis: Unit vectors of the joint axes.
+        paper: e_j S_j, the tendons as in (17), N.
+        tendons: The tendons along their paths, N.
+        carried: Against the weight, N.
+        inertia: sum m a, N.
+        external: -F, N.
+        moment: Of all of it but ``paper``, N m.
+    """
+
+    axis: Array
+    paper: Array
+    tendons: Array
+    carried: Array
+    inertia: Array
+    external: Array
+    moment: Array
+
+    @property
+    def force(self) -> Array:
+        """P_j, N."""
+        return self.tendons + self.carried + self.inertia + self.external
+
+
+@dataclass(frozen=True, eq=False)
+class JointReactions:
+    """Reactions of n joints at m instants, shapes (m, n), N unless said otherwise.
+
+    Attributes:
+        time: Shape (m,), s.
+        joints: Names.
+        paper: R_j by (17).
+        direction: (17) with the tendons along their paths.
+        weight: (17) with the weight.
+        inertia: (17) with inertia.
+        static: Tendons along their paths, and weight: the full quasi-static reaction.
+        full: With inertia as well.
+        other_groove: The full quasi-static reaction with the grooves on the proximal links.
+        thrust: Part of the full force along the axis, signed.
+        tilt: Moment of the pin across its axis, N m.
+        coulomb: M^d of the joints, shape (n,), m.
+    """
+
+    time: Array
+    joints: tuple[str, ...]
+    paper: Array
+    direction: Array
+    weight: Array
+    inertia: Array
+    static: Array
+    full: Array
+    other_groove: Array
+    thrust: Array
+    tilt: Array
+    coulomb: Array
+
+    def differences(self) -> tuple[ReactionDifference, ...]:
+        """Return a summary for every joint."""
+        return tuple(ReactionDifference.of(self, index) for index in range(len(self.joints)))
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How a reaction differs from (17) over a result, in parts of the mean of (17).
+
+    Attributes:
+        mean: Of the signed difference.
+        largest: Of its size.
+    """
+
+    mean: float
+    largest: float
+
+    @classmethod
+    def between(cls, other: Array, paper: Array) -> Difference:
+        """Compare, for shapes (m,)."""
+        scale = float(np.mean(paper)) or float("nan")
+        return cls(float(np.mean(other - paper)) / scale, float(np.max(np.abs(other - paper))) / scale)
+
+
+@dataclass(frozen=True)
+class ReactionDifference:
+    """What (17) misses at one joint.
+
+    Attributes:
+        joint: Its name.
+        paper: Mean of (17), N.
+        direction: Through the tendons' direction alone.
+        weight: Through weight alone.
+        inertia: Through inertia alone.
+        static: Through direction and weight.
+        full: Through all of it.
+        other_groove: As ``static``, with grooves on the proximal link.
+        friction: Mean and largest change of the joint's Coulomb friction, M^d times that of ``static``, N m.
+        thrust: Largest force along the axis, N.
+        tilt: Mean moment across the axis, N m.
+    """
+
+    joint: str
+    paper: float
+    direction: Difference
+    weight: Difference
+    inertia: Difference
+    static: Difference
+    full: Difference
+    other_groove: Difference
+    friction: tuple[float, float]
+    thrust: float
+    tilt: float
+
+    @classmethod
+    def of(cls, reactions: JointReactions, index: int) -> ReactionDifference:
+        """Summarise one joint."""
+        paper = reactions.paper[:, index]
+        more = reactions.coulomb[index] * (reactions.static[:, index] - paper)
+        return cls(
+            joint=reactions.joints[index],
+            paper=float(np.mean(paper)),
+            direction=Difference.between(reactions.direction[:, index], paper),
+            weight=Difference.between(reactions.weight[:, index], paper),
+            inertia=Difference.between(reactions.inertia[:, index], paper),
+            static=Difference.between(reactions.static[:, index], paper),
+            full=Difference.between(reactions.full[:, index], paper),
+            other_groove=Difference.between(reactions.other_groove[:, index], paper),
+            friction=(float(np.mean(more)), float(np.max(np.abs(more)))),
+            thrust=float(np.max(np.abs(reactions.thrust[:, index]))),
+            tilt=float(np.mean(reactions.tilt[:, index])),
+        )
+
+
+def joint_reactions(result: xr.Dataset) -> JointReactions:
+    """Return the reactions by (17) and in full along a result, whichever of them the simulation used.
+
+    Args:
+        result: What `simulate` returned, of a finger whose joints all carry links.
+
+    Raises:
+        InputError: If something is missing in the result, or a joint carries no link.
+    """
+    scenario, finger = _scenario(result)
+    motion = [_values(result, name) for name in _NEEDED[:3]]
+    strands, force = _strands(result, finger), np.array(scenario.environment.fingertip_force)
+    found = pin_wrench(finger, *motion, strands, force)
+    other = pin_wrench(finger, *motion, strands, force, Groove.PROXIMAL)
+    paper = found.paper + found.external
+    along = np.sum(found.moment * found.axis, axis=-1, keepdims=True)
+    return JointReactions(
+        time=np.asarray(result["time"].values, dtype=float),
+        joints=finger.routing.joints,
+        paper=_length(paper),
+        direction=_length(found.tendons + found.external),
+        weight=_length(paper + found.carried),
+        inertia=_length(paper + found.inertia),
+        static=_length(found.force - found.inertia),
+        full=_length(found.force),
+        other_groove=_length(other.force - other.inertia),
+        thrust=np.sum(found.force * found.axis, axis=-1),
+        tilt=_length(found.moment - along * found.axis),
+        coulomb=finger.joint_friction.kinetic,
+    )
+
+
+def pin_wrench(
+    finger: Finger,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    strands: Array,
+    fingertip_force: Array,
+    groove: Groove = Groove.DISTAL,
+) -> PinWrench:
+    """Return what the pins exert at m states.
+
+    Args:
+        finger: A finger whose joints all carry links.
+        position: theta, shape (m, n), rad.
+        velocity: theta', shape (m, n), rad/s.
+        acceleration: theta'', shape (m, n), rad/s2.
+        strands: f, shape (m, s), N.
+        fingertip_force: F, shape (3,), N, base frame.
+        groove: What the grooves are part of.
+
+    Raises:
+        InputError: If a joint carries no link.
+    """
+    geometry, body, routing = TendonGeometry(finger.description), finger.rigid_body, finger.routing
+    model, data = body.model, body.model.createData()
+    count, size = position.shape
+    axis, tendons, inertia, moment = (np.zeros((count, size, 3)) for _ in range(4))
+    cuts = [(cut, routing.strand(cut.tendon, distal=cut.distal)) for cut in geometry.cuts(groove)]
+    carried = -body.distal_weights()
+    for k in range(count):
+        # Newton-Euler alone leaves the links unplaced.
+        pin.framesForwardKinematics(model, data, position[k])
+        pin.rnea(model, data, position[k], velocity[k], acceleration[k])
+        places, tip = data.oMi, data.oMf[body.tip_frame].translation
+        for j in range(size):
+            place, needed = places[j + 1], data.f[j + 1]
+            axis[k, j] = place.rotation[:, 2]
+            inertia[k, j] = place.rotation @ needed.linear - carried[j]
+            moment[k, j] = place.rotation @ needed.angular - np.cross(tip - place.translation, fingertip_force)
+        for cut, strand in cuts:
+            j, place = cut.joint - 1, places[cut.link]
+            pull = place.rotation @ cut.direction * strands[k, strand]
+            tendons[k, j] += pull
+            moment[k, j] += np.cross(place.act(cut.point) - places[cut.joint].translation, pull)
+    directions = np.array([body.link_directions(theta) for theta in position])
+    return PinWrench(
+        axis=axis,
+        paper=directions * (strands @ routing.loads.T)[..., None],
+        tendons=tendons,
+        carried=np.broadcast_to(carried, tendons.shape),
+        inertia=inertia,
+        external=np.broadcast_to(-fingertip_force, tendons.shape),
+        moment=moment,
+    )
+
+
+def fingertip_loads(sizes: Iterable[float]) -> dict[str, tuple[float, float, float]]:
+    """Return fingertip forces of given sizes, N, both ways along the axes of the base, by a label."""
+    signs = (("+", 1.0), ("\N{MINUS SIGN}", -1.0))
+    return {
+        f"{sign}{axis} {size:g} N": tuple(factor * size * float(axis == each) for each in "xyz")  # type: ignore[misc]
+        for size in sizes
+        for axis in "xyz"
+        for sign, factor in signs
+    }
+
+
+def _length(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=-1))
+
+
+def _values(result: xr.Dataset, name: str) -> Array:
+    if name not in result.variables:
+        raise InputError(f"result.{name}", "is missing; give what simulate returned")
+    return np.asarray(result[name].transpose("time", ...).values, dtype=float)
+
+
+def _strands(result: xr.Dataset, finger: Finger) -> Array:
+    routing, tension = finger.routing, _values(result, "tendon_tension")
+    strands = np.zeros((len(tension), len(routing.strand_coupling)))
+    strands[:, : routing.actuated] = tension[:, : routing.actuated]
+    if routing.passive:
+        proximal = _values(result, "passive_tension_proximal")
+        strands[:, routing.actuated :: 2] = proximal.reshape(len(tension), -1)
+        strands[:, routing.actuated + 1 :: 2] = tension[:, routing.actuated :]
+    return strands
+
+
+def _scenario(result: xr.Dataset) -> tuple[Scenario, Finger]:
+    try:
+        table = tomllib.loads(result.attrs["scenario"])
+    except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
+        raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
+    scenario = validate(Scenario, table, ())
+    return scenario, Finger(scenario.finger)
