@@ -15,7 +15,6 @@ from finger_pin.blocks.tendons import TendonForces, Tendons
 from finger_pin.description import build_rigid_body
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
-from finger_pin.pins import pin_loads
 from finger_pin.routing import Array
 from finger_pin.state import Layout, State
 
@@ -73,8 +72,7 @@ class Finger:
                 description's links make.
 
         Raises:
-            InputError: If the joints of the two differ, or the full joint reaction is asked for on a rigid body that
-                was given.
+            InputError: If the joints of the two differ.
         """
         self.description = description
         self.rigid_body = rigid_body or build_rigid_body(description)
@@ -82,8 +80,7 @@ class Finger:
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
         self.tendons = Tendons.from_description(description)
         self.routing = self.tendons.routing
-        pins = pin_loads(description, self.routing, self.rigid_body, foreign=rigid_body is not None)
-        self.joint_friction = JointFriction.from_description(description, pins)
+        self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive)
 
@@ -164,15 +161,14 @@ class Finger:
             state.tendon_stiction,
             command,
         )
-        pins = self.joint_friction.pins
-        if np.any(force) or pins.heavy:
+        if np.any(force):
             kinematics = body.kinematics(state.position, state.velocity)
-            on_pins = pins.external(kinematics.rotations, force)
+            directions = kinematics.directions
             external = np.einsum("...ij,...i->...j", kinematics.jacobian, force)
         else:
-            on_pins = np.zeros((*state.position.shape, 3))
+            directions = np.zeros((*state.position.shape, 3))
             external = np.zeros_like(state.position)
-        joints = self.joint_friction.forces(state.velocity, state.joint_stiction, tendons.strands, on_pins)
+        joints = self.joint_friction.forces(state.velocity, state.joint_stiction, tendons.strands, directions, force)
         depth = self.stroke_limiter.depth(state.position)
         limiter = self.stroke_limiter.torque(depth, state.velocity)
         torque = tendons.strands @ self.routing.strand_coupling

@@ -197,9 +197,6 @@ class JointFriction(Description):
     micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         0.0, unit="N m s/rad", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
     )
-    reaction: Annotated[Literal["paper", "full"], choice("paper", "full")] = quantity(
-        "paper", unit="1", source="(17)", doc="What presses on the pins: (17), or with weight and real tendon paths."
-    )
 
     @model_validator(mode="after")
     def _stiction_above_coulomb(self) -> Self:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.blocks.joint_friction import JointFriction, PinLoads
+from finger_pin.blocks.joint_friction import JointFriction, joint_reaction
 
 COULOMB, STICTION, STIFFNESS, VISCOUS, STRIBECK, FLOOR = 2.5e-4, 3.5e-4, 5.0, 1e-3, 0.1, 1e-7
 
@@ -27,14 +27,9 @@ def loads(strands):
     return [f1 + f2 + f3 + f4, f1 + f2 + f3 + f4, f3 + f4 + f53, f4 + f54]
 
 
-def pins(routing):
-    """Those of (17), in frames whose x axis is the link proximal to the joint."""
-    return PinLoads.of_paper(routing.loads, np.tile([1.0, 0.0, 0.0], (4, 1)))
-
-
 @pytest.fixture(scope="module")
 def joints(ub, routing):
-    return JointFriction.from_description(ub, pins(routing))
+    return JointFriction.from_description(ub, routing.loads)
 
 
 def test_links_point_where_table_i_turns_them(finger):
@@ -45,7 +40,7 @@ def test_links_point_where_table_i_turns_them(finger):
 
 def test_without_external_force_the_reaction_is_the_sum_of_the_crossing_tensions(joints):
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-    forces = joints.forces(np.zeros(4), np.zeros(4), strands, np.zeros((4, 3)))
+    forces = joints.forces(np.zeros(4), np.zeros(4), strands, np.zeros((4, 3)), np.zeros(3))
     np.testing.assert_allclose(forces.reaction, [15.0, 15.0, 28.0, 40.0], rtol=1e-14)
 
 
@@ -63,13 +58,11 @@ def test_reaction_is_the_norm_of_tendon_pull_and_external_force_at_random_postur
         np.testing.assert_allclose(signals.joints.reaction, expected, rtol=1e-9)
 
 
-def test_a_pull_at_the_tip_along_the_tendons_unloads_the_joint_they_press_on(joints):
-    """Links in line, a tension of 5 N through joints 1 and 2, a force at the tip along the links or across them."""
-    rotations = np.broadcast_to(np.eye(3), (4, 3, 3))
-    for force, reaction in (((5, 0, 0), 0.0), ((2, 0, 0), 3.0), ((-2, 0, 0), 7.0), ((0, 12, 0), 13.0)):
-        external = joints.pins.external(rotations, np.array(force, dtype=float))
-        forces = joints.forces(np.zeros(4), np.zeros(4), np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.0]), external)
-        np.testing.assert_allclose(forces.reaction[:2], reaction)
+def test_a_pull_at_the_tip_along_the_tendons_unloads_the_joint_they_press_on():
+    assert joint_reaction(5.0, 5.0, 0.0) == 0.0
+    assert joint_reaction(5.0, 2.0, 0.0) == pytest.approx(3.0)
+    assert joint_reaction(5.0, -2.0, 0.0) == pytest.approx(7.0)
+    assert joint_reaction(3.0, 0.0, 4.0) == pytest.approx(5.0)
 
 
 def test_joint_friction_is_law_9_loaded_by_the_reaction(joints):
@@ -77,7 +70,7 @@ def test_joint_friction_is_law_9_loaded_by_the_reaction(joints):
     for _ in range(50):
         velocity, stiction = draw.normal(0.0, 0.5, 4), draw.normal(0.0, 2e-3, 4)
         strands = draw.uniform(0.0, 5.0, 6)
-        forces = joints.forces(velocity, stiction, strands, np.zeros((4, 3)))
+        forces = joints.forces(velocity, stiction, strands, np.zeros((4, 3)), np.zeros(3))
         for j, load in enumerate(loads(strands)):
             v, s = float(velocity[j]), float(stiction[j])
             level = max(load * (COULOMB + (STICTION - COULOMB) * math.exp(-abs(v) / STRIBECK)), FLOOR)
@@ -87,7 +80,7 @@ def test_joint_friction_is_law_9_loaded_by_the_reaction(joints):
 
 
 def test_an_unloaded_joint_slides_at_the_floor(joints):
-    forces = joints.forces(np.ones(4), np.full(4, FLOOR), np.zeros(6), np.zeros((4, 3)))
+    forces = joints.forces(np.ones(4), np.full(4, FLOOR), np.zeros(6), np.zeros((4, 3)), np.zeros(3))
     np.testing.assert_array_equal(forces.level, FLOOR)
     np.testing.assert_allclose(forces.stiction_rate, 0.0, atol=1e-12)
 
@@ -97,7 +90,7 @@ def test_coefficients_can_differ_from_joint_to_joint(routing):
     description = fp.load_finger(
         "ub", {"finger.joint_friction.coulomb": list(coulomb), "finger.joint_friction.stiction": list(stiction)}
     )
-    joints = JointFriction.from_description(description, pins(routing))
+    joints = JointFriction.from_description(description, routing.loads)
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-    forces = joints.forces(np.zeros(4), np.zeros(4), strands, np.zeros((4, 3)))
+    forces = joints.forces(np.zeros(4), np.zeros(4), strands, np.zeros((4, 3)), np.zeros(3))
     np.testing.assert_allclose(forces.level, np.array(stiction) * [15.0, 15.0, 28.0, 40.0], rtol=1e-12)

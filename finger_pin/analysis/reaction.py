@@ -1,20 +1,8 @@
-"""How good the joint reaction (17) is: the whole force and moment on every pin along a result.
+"""How good the joint reaction (17) is along a result: against the whole force on the pins, part by part.
 
-Cut a joint open and free everything that it carries. On it act its weight, the fingertip force F, the tendons that
-cross the cut, each with its tension along its path, and the pin. Newton and Euler give what the pin must exert:
-
-    P_j = sum m (a - g) + sum f t - F,      moment likewise, about the joint's origin,
-
-with t the direction of a tendon from its actuator on. (17) keeps e_j S_j - F: no weight, no inertia, and all tendons
-along the proximal link. The first sum is that of recursive Newton-Euler (Pinocchio's); tendons are massless.
-
-Assumptions. A tendon has the tension f of (12) wherever it crosses a joint, since (12) puts its friction before the
-joints; friction of a passive tendon acts on the link of its lumped mass, beyond the cut. Grooves are part of the distal
-link, or of the proximal one (`geometry.cuts.Groove`); a loose pulley would press on the pin itself, with the pull of
-both sides, which is the former case for the pin's other end. Canals inside what is cut free do not show. Joint friction
-and stroke limiters are pure couples about the axis, as in (18): the moment of the pin about its axis is
--(tau^f + tau^r). R_j is the length of P_j; P_j has a part along the axis, the thrust, and the moment across the axis,
-the tilt, is a pair of forces in bearings, which (17) does not know and whose size depends on their distance.
+R_j is the length of the pin's force P_j. Beside it stand what (17) does not know at all: the part of P_j along the
+axis, the thrust, and the moment across the axis, the tilt, a pair of forces whose size depends on the distance of the
+joint's bearings. See `pin_wrench` for the mechanics and its assumptions.
 """
 
 from __future__ import annotations
@@ -24,45 +12,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 import xarray as xr
 
+from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.exceptions import InputError
 from finger_pin.finger import Finger
-from finger_pin.geometry import Groove, TendonGeometry
+from finger_pin.geometry import Groove
 from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
 from finger_pin.validation import validate
 
 _NEEDED = ("joint_position", "joint_velocity", "joint_acceleration", "tendon_tension")
-
-
-@dataclass(frozen=True, eq=False)
-class PinWrench:
-    """What the pins exert on what the joints carry, base frame, moments about the joints' origins; shapes (m, n, 3).
-
-    Attributes:
-        axis: Unit vectors of the joint axes.
-        paper: e_j S_j, the tendons as in (17), N.
-        tendons: The tendons along their paths, N.
-        carried: Against the weight, N.
-        inertia: sum m a, N.
-        external: -F, N.
-        moment: Of all of it but ``paper``, N m.
-    """
-
-    axis: Array
-    paper: Array
-    tendons: Array
-    carried: Array
-    inertia: Array
-    external: Array
-    moment: Array
-
-    @property
-    def force(self) -> Array:
-        """P_j, N."""
-        return self.tendons + self.carried + self.inertia + self.external
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +132,7 @@ class ReactionDifference:
 
 
 def joint_reactions(result: xr.Dataset) -> JointReactions:
-    """Return the reactions by (17) and in full along a result, whichever of them the simulation used.
+    """Return the reactions by (17) and in full along a result.
 
     Args:
         result: What `simulate` returned, of a finger whose joints all carry links.
@@ -203,67 +163,11 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     )
 
 
-def pin_wrench(
-    finger: Finger,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
-    strands: Array,
-    fingertip_force: Array,
-    groove: Groove = Groove.DISTAL,
-) -> PinWrench:
-    """Return what the pins exert at m states.
-
-    Args:
-        finger: A finger whose joints all carry links.
-        position: theta, shape (m, n), rad.
-        velocity: theta', shape (m, n), rad/s.
-        acceleration: theta'', shape (m, n), rad/s2.
-        strands: f, shape (m, s), N.
-        fingertip_force: F, shape (3,), N, base frame.
-        groove: What the grooves are part of.
-
-    Raises:
-        InputError: If a joint carries no link.
-    """
-    geometry, body, routing = TendonGeometry(finger.description), finger.rigid_body, finger.routing
-    model, data = body.model, body.model.createData()
-    count, size = position.shape
-    axis, tendons, inertia, moment = (np.zeros((count, size, 3)) for _ in range(4))
-    cuts = [(cut, routing.strand(cut.tendon, distal=cut.distal)) for cut in geometry.cuts(groove)]
-    carried = -body.distal_weights()
-    for k in range(count):
-        # Newton-Euler alone leaves the links unplaced.
-        pin.framesForwardKinematics(model, data, position[k])
-        pin.rnea(model, data, position[k], velocity[k], acceleration[k])
-        places, tip = data.oMi, data.oMf[body.tip_frame].translation
-        for j in range(size):
-            place, needed = places[j + 1], data.f[j + 1]
-            axis[k, j] = place.rotation[:, 2]
-            inertia[k, j] = place.rotation @ needed.linear - carried[j]
-            moment[k, j] = place.rotation @ needed.angular - np.cross(tip - place.translation, fingertip_force)
-        for cut, strand in cuts:
-            j, place = cut.joint - 1, places[cut.link]
-            pull = place.rotation @ cut.direction * strands[k, strand]
-            tendons[k, j] += pull
-            moment[k, j] += np.cross(place.act(cut.point) - places[cut.joint].translation, pull)
-    directions = np.array([body.link_directions(theta) for theta in position])
-    return PinWrench(
-        axis=axis,
-        paper=directions * (strands @ routing.loads.T)[..., None],
-        tendons=tendons,
-        carried=np.broadcast_to(carried, tendons.shape),
-        inertia=inertia,
-        external=np.broadcast_to(-fingertip_force, tendons.shape),
-        moment=moment,
-    )
-
-
-def fingertip_loads(sizes: Iterable[float]) -> dict[str, tuple[float, float, float]]:
+def fingertip_loads(sizes: Iterable[float]) -> dict[str, tuple[float, ...]]:
     """Return fingertip forces of given sizes, N, both ways along the axes of the base, by a label."""
     signs = (("+", 1.0), ("\N{MINUS SIGN}", -1.0))
     return {
-        f"{sign}{axis} {size:g} N": tuple(factor * size * float(axis == each) for each in "xyz")  # type: ignore[misc]
+        f"{sign}{axis} {size:g} N": (*(factor * size if axis == each else 0.0 for each in "xyz"),)
         for size in sizes
         for axis in "xyz"
         for sign, factor in signs

@@ -13,58 +13,25 @@ from finger_pin.routing import Array
 from finger_pin.validation import expand
 
 
-def joint_reaction(x: Any, y: Any, z: Any) -> Any:
-    """Return R, N, the length of the force on the pin, (17)."""
-    return np.sqrt(x * x + y * y + z * z)
+def joint_reaction(load: Any, along: Any, across: Any) -> Any:
+    """Return R = |-e S + F|, N, equation (17) with an external force.
+
+    Args:
+        load: S, sum of the tensions that cross the joint, N; they pull along -e.
+        along: e . F, N.
+        across: |F - (e . F) e|, N.
+    """
+    return np.hypot(along - load, across)
 
 
-def joint_reaction_slopes(x: Any, y: Any, z: Any, reaction: Any) -> tuple[Any, Any, Any]:
-    """Return the derivatives of R with respect to the components of the force.
+def joint_reaction_slopes(load: Any, along: Any, reaction: Any) -> tuple[Any, Any]:
+    """Return the derivatives of R with respect to S and to e . F, for a given F.
 
-    At R = 0 it has a kink, which the floor of the friction level hides.
+    |F| is kept, so what e . F gains its component across loses. At R = 0 it has a kink,
+    which the floor of the friction level hides.
     """
     safe = np.maximum(reaction, 1e-100)
-    return x / safe, y / safe, z / safe
-
-
-@dataclass(frozen=True, eq=False)
-class PinLoads:
-    """What presses on the pins of n joints: R_j = |P_j f - A_j^T (F + W_j)|.
-
-    A_j turns the frame of the body proximal to joint j into the base frame. In (17) every strand that crosses a joint
-    pulls along the link, P_j f = e_j S_j, and there is no weight.
-
-    Attributes:
-        pulls: P, by joint, component and strand, in the frame of the body proximal to the joint, shape (n, 3, s).
-        weights: W, weight of everything that the joint carries, base frame, shape (n, 3), N.
-    """
-
-    pulls: Array
-    weights: Array
-
-    @classmethod
-    def of_paper(cls, loads: Array, axes: Array) -> PinLoads:
-        """Return those of (17).
-
-        Args:
-            loads: Of the routing, shape (n, s).
-            axes: e_j in the frame of the body proximal to the joint, shape (n, 3).
-        """
-        return cls(axes[:, :, None] * loads[:, None, :], np.zeros((len(loads), 3)))
-
-    @property
-    def heavy(self) -> bool:
-        """Whether weight counts."""
-        return bool(np.any(self.weights))
-
-    def external(self, rotations: Array, fingertip_force: Array) -> Array:
-        """Return A_j^T (F + W_j), shape (..., n, 3), N.
-
-        Args:
-            rotations: A, shape (..., n, 3, 3).
-            fingertip_force: F, shape (3,) or (..., 3), N, base frame.
-        """
-        return np.asarray(np.einsum("...jcr,...jc->...jr", rotations, fingertip_force[..., None, :] + self.weights))
+    return (load - along) / safe, -load / safe
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +39,7 @@ class JointForces:
     """What the joints' friction does; shapes (..., n).
 
     Attributes:
-        reaction: R, N, (17) or as `PinLoads` say.
+        reaction: R, N, (17).
         friction: tau^f, N m, (9c).
         level: max(R M, g_min), N m.
         stiction_rate: F^s', N m/s, (9a).
@@ -89,7 +56,7 @@ class JointFriction:
     """Friction of all joints.
 
     Attributes:
-        pins: What presses on the pins.
+        loads: Shape (n, s), one where a strand loads a joint.
         kinetic: M^d, shape (n,), m.
         static: M^c, shape (n,), m.
         stiffness: sigma_0, shape (n,), N m/rad.
@@ -100,7 +67,7 @@ class JointFriction:
         lag: sigma_1 / sigma_0, shape (n,), s.
     """
 
-    pins: PinLoads
+    loads: Array
     kinetic: Array
     static: Array
     stiffness: Array
@@ -111,11 +78,11 @@ class JointFriction:
     lag: Array
 
     @classmethod
-    def from_description(cls, description: FingerDescription, pins: PinLoads) -> JointFriction:
-        """Read one number per joint."""
+    def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
+        """Read one number per joint; ``loads`` comes from the routing."""
         law, size = description.joint_friction, len(description.joints)
         return cls(
-            pins=pins,
+            loads=loads,
             kinetic=expand(law.coulomb, size),
             static=expand(law.stiction, size),
             stiffness=expand(law.stiffness, size),
@@ -126,17 +93,22 @@ class JointFriction:
             lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
         )
 
-    def forces(self, velocity: Array, stiction: Array, strands: Array, external: Array) -> JointForces:
+    def forces(
+        self, velocity: Array, stiction: Array, strands: Array, directions: Array, fingertip_force: Array
+    ) -> JointForces:
         """Return reaction and friction of every joint.
 
         Args:
             velocity: theta', shape (..., n), rad/s.
             stiction: F^s, shape (..., n), N m.
             strands: f of (12), shape (..., s), N.
-            external: What acts from outside, as from `PinLoads.external`, shape (..., n, 3), N.
+            directions: e_j in the base frame, shape (..., n, 3).
+            fingertip_force: F, shape (3,) or (..., 3), N, base frame.
         """
-        force = np.einsum("jrs,...s->...jr", self.pins.pulls, strands) - external
-        reaction = joint_reaction(force[..., 0], force[..., 1], force[..., 2])
+        along = (directions @ fingertip_force[..., None])[..., 0]
+        squared = np.sum(fingertip_force**2, axis=-1)[..., None]
+        across = np.sqrt(np.maximum(squared - along**2, 0.0))
+        reaction = joint_reaction(strands @ self.loads.T, along, across)
         coefficient = friction.friction_coefficient(
             velocity, self.kinetic, self.static, self.stribeck_velocity, self.stribeck_exponent
         )

@@ -20,7 +20,7 @@ class Kinematics:
         tip: p, fingertip position, shape (..., 3), m.
         tip_velocity: p', shape (..., 3), m/s.
         jacobian: J of (6), shape (..., 3, n).
-        rotations: From the body proximal to each joint to the base frame, shape (..., n, 3, 3).
+        directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
     """
@@ -28,7 +28,7 @@ class Kinematics:
     tip: Array
     tip_velocity: Array
     jacobian: Array
-    rotations: Array
+    directions: Array
     kinetic_energy: Array
     potential_energy: Array
 
@@ -119,7 +119,7 @@ class RigidBody:
     def link_directions(self, q: Array) -> Array:
         """Return e_j of (17), shape (n, 3): along the proximal link, from its joint to this one; base frame."""
         pin.forwardKinematics(self.model, self._data, q)
-        return np.asarray(np.einsum("jrc,jc->jr", self._rotations(), self.proximal_axes[1:]))
+        return self._directions()
 
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
@@ -135,10 +135,11 @@ class RigidBody:
         tip = np.array(self._data.oMf[self.tip_frame].translation)
         kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
-        rotations = self._rotations()
+        directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
-        return Kinematics(tip, jacobian @ v, jacobian, rotations, np.array(kinetic), np.array(potential))
+        return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
 
-    def _rotations(self) -> Array:
+    def _directions(self) -> Array:
         placements, parents = self._data.oMi, self.model.parents
-        return np.array([placements[parents[j]].rotation for j in range(1, self.model.njoints)])
+        rows = [placements[parents[j]].rotation @ self.proximal_axes[j] for j in range(1, self.model.njoints)]
+        return np.array(rows)

@@ -26,8 +26,8 @@ HALF_STIFFNESS, PASSIVE_MASS = range(2)
 # Rows of work.tendon.
 SPEED, LOSS, NORMAL, COEFFICIENT, SLIDING, LEVEL, CURVATURE = range(7)
 # Rows of work.joint.
-BIAS, REACTION, J_SLIDING, J_LEVEL, DEPTH, LIMITER, TORQUE, EXTERNAL, REFERENCE, REFERENCE_RATE = range(10)
-DESIRED, ACCELERATION, ZERO, BASE, J_LOSS = range(10, 15)
+BIAS, LOAD, REACTION, J_SLIDING, J_LEVEL, DEPTH, LIMITER, ALONG, TORQUE, EXTERNAL, REFERENCE, REFERENCE_RATE = range(12)
+DESIRED, ACCELERATION, ZERO, BASE, J_LOSS = range(12, 17)
 
 
 @compiled
@@ -137,7 +137,7 @@ def _tendons(plant: Any, x: Any, work: Any, rate: Any) -> None:
 
 @compiled
 def _fingertip(plant: Any, work: Any) -> None:
-    """Fill the fingertip Jacobian and J^T F after `move`."""
+    """Fill the fingertip Jacobian, J^T F, the link directions and e . F after `move`."""
     force, joint = plant.fingertip_force, work.joint
     size = plant.parents.size
     tip, body = work.centre, plant.tip_body
@@ -148,9 +148,18 @@ def _fingertip(plant: Any, work: Any) -> None:
             for c in range(3):
                 tip[r] += work.rotation[body, r, c] * plant.tip_offset[c]
     for j in range(size):
+        parent = plant.parents[j]
+        joint[ALONG, j] = 0.0
         joint[EXTERNAL, j] = 0.0
         for r in range(3):
             work.jacobian[r, j] = 0.0
+            value = plant.directions[j, r]
+            if parent >= 0:
+                value = 0.0
+                for c in range(3):
+                    value += work.rotation[parent, r, c] * plant.directions[j, c]
+            work.direction[j, r] = value
+            joint[ALONG, j] += value * force[r]
     j = body
     while j >= 0:
         axis = work.spatial[AXIS, j]
@@ -163,42 +172,20 @@ def _fingertip(plant: Any, work: Any) -> None:
 
 
 @compiled
-def _on_pins(plant: Any, work: Any) -> None:
-    """Fill what acts on the pins from outside, in the frame of the body proximal to the joint, after `move`."""
-    force = plant.fingertip_force
-    for j in range(plant.parents.size):
-        parent, out = plant.parents[j], work.external[j]
-        x, y, z = force[0] + plant.weights[j, 0], force[1] + plant.weights[j, 1], force[2] + plant.weights[j, 2]
-        if parent < 0:
-            out[0], out[1], out[2] = x, y, z
-        else:
-            turn = work.rotation[parent]
-            for r in range(3):
-                out[r] = turn[0, r] * x + turn[1, r] * y + turn[2, r] * z
-
-
-@compiled
 def _joints(plant: Any, x: Any, work: Any, rate: Any) -> None:
     """Fill joint reactions, friction, limiters and the net torque."""
     tendons, joints = plant.coupling.shape
     z_at = 2 * joints + 2 * (tendons - plant.actuated) + tendons
-    joint, table, strand = work.joint, plant.joints, work.strand[0]
-    pressed = plant.loaded or plant.heavy
+    joint, table, strand, force = work.joint, plant.joints, work.strand[0], plant.fingertip_force
+    squared = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
     for j in range(joints):
         speed, stiction = x[joints + j], x[z_at + j]
-        px, py, pz, torque = 0.0, 0.0, 0.0, 0.0
+        load, torque = 0.0, 0.0
         for s in range(strand.size):
-            tension = strand[s]
-            px += plant.pulls[j, 0, s] * tension
-            py += plant.pulls[j, 1, s] * tension
-            pz += plant.pulls[j, 2, s] * tension
-            torque += plant.strand_coupling[s, j] * tension
-        if pressed:
-            px -= work.external[j, 0]
-            py -= work.external[j, 1]
-            pz -= work.external[j, 2]
-        work.pressure[j, 0], work.pressure[j, 1], work.pressure[j, 2] = px, py, pz
-        reaction = laws.joint_reaction(px, py, pz)
+            load += plant.loads[j, s] * strand[s]
+            torque += plant.strand_coupling[s, j] * strand[s]
+        along = joint[ALONG, j]
+        reaction = laws.joint_reaction(load, along, np.sqrt(max(squared - along * along, 0.0)))
         sliding = laws.friction_coefficient(
             speed, table[j, KINETIC], table[j, STATIC], table[j, J_STRIBECK], table[j, J_EXPONENT]
         )
@@ -208,7 +195,7 @@ def _joints(plant: Any, x: Any, work: Any, rate: Any) -> None:
         depth = laws.penetration(x[j], table[j, LOWER], table[j, UPPER])
         limiter = laws.limiter_torque(depth, speed, table[j, L_STIFFNESS], table[j, L_DAMPING])
         rate[z_at + j] = change
-        joint[REACTION, j], joint[J_SLIDING, j], joint[J_LEVEL, j] = reaction, sliding, level
+        joint[LOAD, j], joint[REACTION, j], joint[J_SLIDING, j], joint[J_LEVEL, j] = load, reaction, sliding, level
         joint[DEPTH, j], joint[LIMITER, j], joint[J_LOSS, j] = depth, limiter, loss
         joint[TORQUE, j] = torque - loss - limiter + joint[EXTERNAL, j]
 
@@ -225,8 +212,6 @@ def evaluate(plant: Any, control: Any, time: float, x: Any, work: Any, rate: Any
     # Without a force the rows that it fills stay zero.
     if plant.loaded:
         _fingertip(plant, work)
-    if plant.loaded or plant.heavy:
-        _on_pins(plant, work)
     _joints(plant, x, work, rate)
     mass_matrix(plant, work)
     factorise_mass(joints, work)

@@ -51,8 +51,8 @@ class CompiledFinger:
         strands = np.zeros((count, plant.strand_coupling.shape[0]))
         of_tendons = np.zeros((TENDON_ROWS, count, tendons))
         of_joints = np.zeros((JOINT_ROWS, count, joints))
-        # An earlier evaluation with a fingertip force leaves its row behind.
-        self._work.joint[at.EXTERNAL] = 0.0
+        # An earlier evaluation with a fingertip force leaves its rows behind.
+        self._work.joint[[at.ALONG, at.EXTERNAL]] = 0.0
         evaluate_many(plant, self._control, commands, forces, states, self._work, rates, strands, of_tendons, of_joints)
         if np.ndim(x) == 1:
             rates, strands, commands = rates[0], strands[0], commands[0]

@@ -41,8 +41,7 @@ class Linear(NamedTuple):
         tendon: One row each: strand force by own stiction, by sliding velocity; stiction rate by stiction, by
             sliding velocity, by passive position; derivative of the command in time; stiction rate by command. The
             strand force is that without micro-damping.
-        joint: One row each: stiction rate by stiction, by velocity.
-        joint_by_strand: Joint stiction rates by strand forces, shape (n, s).
+        joint: One row each: stiction rate by stiction, by velocity, by load.
         stiction_by_position: Tendon stiction rates by theta, shape (t, n).
         strand_by_position: Strand forces by theta, shape (s, n).
         strand_by_passive: Strand forces by the passive position of their own tendon, shape (s,).
@@ -61,7 +60,6 @@ class Linear(NamedTuple):
 
     tendon: Array
     joint: Array
-    joint_by_strand: Array
     stiction_by_position: Array
     strand_by_position: Array
     strand_by_passive: Array
@@ -80,7 +78,7 @@ class Linear(NamedTuple):
 
 # Rows of Linear.tendon and Linear.joint.
 BY_STICTION, BY_SPEED, RATE_BY_STICTION, RATE_BY_SPEED, RATE_BY_PASSIVE, COMMAND_RATE, RATE_BY_COMMAND = range(7)
-J_RATE_BY_STICTION, J_RATE_BY_SPEED = range(2)
+J_RATE_BY_STICTION, J_RATE_BY_SPEED, J_RATE_BY_LOAD = range(3)
 
 
 def build_linear(plant: Plant) -> Linear:
@@ -91,8 +89,7 @@ def build_linear(plant: Plant) -> Linear:
     reduced = joints + passive
     return Linear(
         tendon=np.zeros((7, tendons)),
-        joint=np.zeros((2, joints)),
-        joint_by_strand=np.zeros((joints, strands)),
+        joint=np.zeros((3, joints)),
         stiction_by_position=np.zeros((tendons, joints)),
         strand_by_position=np.zeros((strands, joints)),
         strand_by_passive=np.zeros(strands),
@@ -184,10 +181,26 @@ def _tendon_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
 
 @compiled
 def _fingertip_slopes(plant: Any, work: Any, linear: Any) -> None:
-    """Add d(J^T F)/d theta to the torques."""
+    """Add d(J^T F)/d theta to the torques; put d(e . F)/d theta into joint_by_position."""
+    force = plant.fingertip_force
+    joints = plant.parents.size
+    for j in range(joints):
+        for k in range(joints):
+            linear.joint_by_position[j, k] = 0.0
     if not plant.loaded:
         return
-    force = plant.fingertip_force
+    # e_j turns with every joint between it and the base.
+    for j in range(joints):
+        k = plant.parents[j]
+        e = work.direction
+        while k >= 0:
+            a = work.spatial[AXIS]
+            linear.joint_by_position[j, k] = (
+                force[0] * (a[k, 1] * e[j, 2] - a[k, 2] * e[j, 1])
+                + force[1] * (a[k, 2] * e[j, 0] - a[k, 0] * e[j, 2])
+                + force[2] * (a[k, 0] * e[j, 1] - a[k, 1] * e[j, 0])
+            )
+            k = plant.parents[k]
     # (J^T F)_i = column_i . F; a column turns with the joints below it and moves with the fingertip.
     i = plant.tip_body
     while i >= 0:
@@ -206,33 +219,6 @@ def _fingertip_slopes(plant: Any, work: Any, linear: Any) -> None:
 
 
 @compiled
-def _reaction_slopes(plant: Any, j: int, by_reaction: float, work: Any, linear: Any) -> None:
-    """Fill the derivatives of the stiction rate of joint j through its reaction: by strand forces and by theta."""
-    pressure, joints = work.pressure[j], plant.parents.size
-    x, y, z = laws.joint_reaction_slopes(pressure[0], pressure[1], pressure[2], work.joint[at.REACTION, j])
-    x, y, z = by_reaction * x, by_reaction * y, by_reaction * z
-    for s in range(plant.pulls.shape[2]):
-        linear.joint_by_strand[j, s] = x * plant.pulls[j, 0, s] + y * plant.pulls[j, 1, s] + z * plant.pulls[j, 2, s]
-    for k in range(joints):
-        linear.joint_by_position[j, k] = 0.0
-    k = plant.parents[j]
-    if k < 0 or not (plant.loaded or plant.heavy):
-        return
-    # Tendons turn with the body proximal to the joint; F + W_j stays, so against the tendons it turns the other way.
-    turn, force = work.rotation[k], plant.fingertip_force
-    bx = turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z
-    by = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
-    bz = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
-    fx, fy, fz = force[0] + plant.weights[j, 0], force[1] + plant.weights[j, 1], force[2] + plant.weights[j, 2]
-    while k >= 0:
-        a = work.spatial[AXIS, k]
-        linear.joint_by_position[j, k] = (
-            bx * (a[1] * fz - a[2] * fy) + by * (a[2] * fx - a[0] * fz) + bz * (a[0] * fy - a[1] * fx)
-        )
-        k = plant.parents[k]
-
-
-@compiled
 def _joint_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
     tendons, joints = plant.coupling.shape
     z_at = 2 * joints + 2 * (tendons - plant.actuated) + tendons
@@ -246,14 +232,17 @@ def _joint_slopes(plant: Any, x: Any, work: Any, linear: Any) -> None:
             speed, table[j, at.KINETIC], table[j, at.STATIC], table[j, at.J_STRIBECK], table[j, at.J_EXPONENT]
         )
         by_reaction = by_level * rows[at.J_SLIDING, j]
-        _reaction_slopes(plant, j, by_reaction, work, linear)
+        by_load, by_along = laws.joint_reaction_slopes(rows[at.LOAD, j], rows[at.ALONG, j], reaction)
         out[J_RATE_BY_STICTION, j] = own
         out[J_RATE_BY_SPEED, j] = by_speed + by_level * reaction * sliding_slope
+        out[J_RATE_BY_LOAD, j] = by_reaction * by_load
         limiter_by_position, limiter_by_velocity = laws.limiter_slopes(
             rows[at.DEPTH, j], speed, table[j, at.L_STIFFNESS], table[j, at.L_DAMPING]
         )
         linear.torque_by_position[j, j] -= limiter_by_position
         linear.torque_by_velocity[j, j] -= limiter_by_velocity + table[j, at.J_VISCOUS]
+        for k in range(joints):
+            linear.joint_by_position[j, k] *= by_reaction * by_along
 
 
 @compiled
@@ -271,7 +260,7 @@ def _time_derivative(plant: Any, linear: Any) -> None:
         delivered = -linear.tendon[BY_STICTION, i] * (rate - plant.tendons[i, at.LAG] * out[s_at + i])
         for j in range(joints):
             out[joints + j] += plant.coupling[i, j] * delivered
-            out[z_at + j] += linear.joint_by_strand[j, i] * delivered
+            out[z_at + j] += linear.joint[J_RATE_BY_LOAD, j] * plant.loads[j, i] * delivered
     for j in range(joints):
         out[joints + j] -= plant.joints[j, at.J_LAG] * out[z_at + j]
 
@@ -330,9 +319,10 @@ def _eliminate(plant: Any, g: float, linear: Any) -> None:
     for j in range(joints):
         factor = 1.0 / (g - linear.joint[J_RATE_BY_STICTION, j])
         for c in range(reduced):
-            value = 0.0
+            load = 0.0
             for s in range(strands):
-                value += linear.joint_by_strand[j, s] * strand_gain[s, c]
+                load += plant.loads[j, s] * strand_gain[s, c]
+            value = linear.joint[J_RATE_BY_LOAD, j] * load
             if c < joints:
                 value += linear.joint_by_position[j, c] / g
             if c == j:
@@ -435,12 +425,12 @@ def solve(plant: Any, g: float, r: Any, linear: Any, u: Any) -> None:
     for j in range(joints):
         load, turned, torque = 0.0, 0.0, 0.0
         for s in range(strands):
-            load += linear.joint_by_strand[j, s] * of_strand[s]
+            load += plant.loads[j, s] * of_strand[s]
             torque += plant.strand_coupling[s, j] * of_strand[s]
         for k in range(joints):
             turned += linear.joint_by_position[j, k] * r[k]
             torque += linear.torque_by_position[j, k] * r[k] / g
-        rate = r[z_at + j] + load + turned / g
+        rate = r[z_at + j] + linear.joint[J_RATE_BY_LOAD, j] * load + turned / g
         of_joint[j] = rate / (g - linear.joint[J_RATE_BY_STICTION, j])
         lag = plant.joints[j, at.J_LAG]
         y[j] = r[joints + j] + torque - ((1.0 + lag * g) * of_joint[j] - lag * r[z_at + j])

@@ -40,18 +40,17 @@ class Plant(NamedTuple):
     gravity: Array
     tip_body: int
     tip_offset: Array
+    directions: Array
     coupling: Array
     strand_coupling: Array
     curvature_matrix: Array
-    pulls: Array
-    weights: Array
+    loads: Array
     tendons: Array
     joints: Array
     passive: Array
     actuated: int
     fingertip_force: Array
     loaded: bool
-    heavy: bool
 
 
 class Control(NamedTuple):
@@ -86,8 +85,7 @@ class Work(NamedTuple):
     joint: Array
     tendon: Array
     strand: Array
-    external: Array
-    pressure: Array
+    direction: Array
     active: Indices
     command_by_position: Array
     planned: Array
@@ -127,11 +125,13 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         gravity=np.array(model.gravity.linear),
         tip_body=tip_body,
         tip_offset=turns[tip_body + 1].T @ frame.placement.translation,
+        directions=np.array(
+            [turns[parents[i] + 1].T @ axis for i, axis in enumerate(finger.rigid_body.proximal_axes[1:])]
+        ),
         coupling=routing.coupling,
         strand_coupling=routing.strand_coupling,
         curvature_matrix=routing.curvature_matrix,
-        pulls=np.array([turns[parents[i] + 1].T @ joints.pins.pulls[i] for i in range(size)]),
-        weights=joints.pins.weights,
+        loads=np.ascontiguousarray(routing.loads),
         tendons=np.column_stack(
             [
                 routing.curvature_offset,
@@ -165,7 +165,6 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         actuated=routing.actuated,
         fingertip_force=np.array(fingertip_force, dtype=float),
         loaded=bool(np.any(fingertip_force)),
-        heavy=joints.pins.heavy,
     )
 
 
@@ -219,11 +218,10 @@ def build_work(plant: Plant) -> Work:
         vectors=np.zeros((2, 6)),
         square=np.zeros((SQUARE_LAYERS, joints, joints)),
         jacobian=np.zeros((3, joints)),
-        joint=np.zeros((15, joints)),
+        joint=np.zeros((17, joints)),
         tendon=np.zeros((7, tendons)),
         strand=np.zeros((1, strands)),
-        external=np.zeros((joints, 3)),
-        pressure=np.zeros((joints, 3)),
+        direction=np.zeros((joints, 3)),
         active=np.zeros(1, dtype=np.int64),
         command_by_position=np.zeros((tendons, joints)),
         planned=np.zeros(tendons),

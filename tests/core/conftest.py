@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import example_robot_data
 import pytest
-from core_cases import FORCE, Case, full, lugre, none_passive, on_model, tree_model, two_passive
+from core_cases import FORCE, Case, lugre, none_passive, on_model, tree_model, two_passive
 
 import finger_pin as fp
 from finger_pin.closed_loop import ClosedLoop
@@ -34,7 +34,6 @@ def scenarios():
         "two_passive": two_passive(),
         "none_passive": none_passive(),
         "lugre": lugre(),
-        "full": full(),
     }
 
 

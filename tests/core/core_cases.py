@@ -15,8 +15,9 @@ from finger_pin.core.linearisation import build_linear
 from finger_pin.core.plant import build_control, build_plant, build_work
 
 BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
-SCENARIOS = ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "full")
-LOOPS = tuple(name + push for push in ("", "_pushed") for name in SCENARIOS)
+LOOPS = tuple(
+    name + push for push in ("", "_pushed") for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre")
+)
 FORCE = np.array([0.3, -0.2, 0.4])
 
 
@@ -94,13 +95,6 @@ def lugre():
     table = two_passive().model_dump()
     table["finger"]["tendon_friction"] |= {"micro_damping": 3.0, "stribeck_exponent": 2.0}
     table["finger"]["joint_friction"] |= {"micro_damping": 1e-3, "stribeck_exponent": 2.0}
-    return fp.Scenario.model_validate(table)
-
-
-def full():
-    """`two_passive` with the full quasi-static reaction on the pins."""
-    table = two_passive().model_dump()
-    table["finger"]["joint_friction"]["reaction"] = "full"
     return fp.Scenario.model_validate(table)
 
 
