@@ -23,6 +23,8 @@ from finger_pin.plots.reaction import plot_reaction
 
 DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 FORCE = "environment.fingertip_force"
+AS_IT_IS = "as it is"
+TEXTS = ("fingertip force", "joint")
 PARTS = ("direction", "weight", "inertia", "static", "full", "other_groove")
 
 
@@ -64,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     """Simulate all cases, compare, write and show."""
     settings = dict(options.set)
     scenario = fp.load_scenario(options.scenario, settings)
-    forces = {"as it is": scenario.environment.fingertip_force} | fingertip_loads(options.forces)
+    forces = {AS_IT_IS: scenario.environment.fingertip_force} | fingertip_loads(options.forces)
     studies: dict[str, JointReactions] = {}
     motions: dict[str, list[float]] = {}
     shown = sys.stderr.isatty() and not options.quiet
@@ -78,8 +80,8 @@ def run(options: argparse.Namespace) -> int:
         motions[label] = np.sqrt(np.mean(moved**2, axis=0)).tolist()
     rows = [row for label, study in studies.items() for row in table_rows(label, study.differences(), motions[label])]
     write_csv(rows, options.output / "reaction.csv")
-    loaded = {label: study for label, study in studies.items() if label != "as it is"}
-    save_figure(plot_reaction(studies["as it is"], loaded), options.output / "reaction.png")
+    loaded = {label: study for label, study in studies.items() if label != AS_IT_IS}
+    save_figure(plot_reaction(studies[AS_IT_IS], loaded), options.output / "reaction.png")
     if not options.quiet:
         show(rows)
         print(f"Table and figure are in {options.output}")
@@ -126,23 +128,30 @@ def write_csv(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 def show(rows: list[dict[str, Any]]) -> None:
-    """Print the table: of every difference its mean and, behind it, its largest size."""
+    """Print differences without further forces, and the worst of all forces: the mean and behind it the largest."""
     table = Table(title="What (17) misses, % of its mean: mean (largest)", title_justify="left")
-    heads = ("fingertip force", "joint", "(17), N", "direction", "weight", "inertia", "static", "full", "other grooves")
-    for head in (*heads, "friction, mN m", "motion, deg", "tilt, mN m"):
-        table.add_column(head, justify="left" if head in heads[:2] else "right", no_wrap=head != "fingertip force")
-    for previous, row in zip([None, *rows], rows, strict=False):
-        first = previous is None or previous["fingertip force"] != row["fingertip force"]
-        if first and previous is not None:
-            table.add_section()
-        shares = (f"{row[f'{part} mean, %']:.2f} ({row[f'{part} max, %']:.1f})" for part in PARTS)
-        friction = f"{row['friction mean, mN m']:.3f} ({row['friction max, mN m']:.3f})"
-        table.add_row(
-            row["fingertip force"] if first else "", row["joint"], f"{row['mean (17), N']:.2f}", *shares, friction,
-            f"{row['motion rms, deg']:.4f}", f"{row['tilt mean, mN m']:.1f}",
-        )  # fmt: skip
-    console = Console() if sys.stdout.isatty() else Console(width=170)
-    console.print(table)
+    heads = ("direction", "weight", "inertia", "static", "full", "other grooves", "friction, mN m", "motion, deg")
+    for head in ("fingertip force", "joint", "(17), N", *heads):
+        table.add_column(head, justify="right" if head in heads else "left")
+    given = [row for row in rows if row["fingertip force"] == AS_IT_IS]
+    for row in given:
+        add_row(table, row, row["fingertip force"] if row is given[0] else "")
+    table.add_section()
+    further = [[row for row in rows if row["joint"] == each["joint"] and row not in given] for each in given]
+    for each, same in zip(given, further, strict=True):
+        if same:
+            worst = {key: max((row[key] for row in same), key=abs) for key in each if key not in TEXTS}
+            count = f"worst of {len(same)} others"
+            add_row(table, worst | {"joint": each["joint"]}, count if each is given[0] else "")
+    (Console() if sys.stdout.isatty() else Console(width=150)).print(table)
+
+
+def add_row(table: Table, row: dict[str, Any], label: str) -> None:
+    """Add a joint to the printed table."""
+    shares = (f"{row[f'{part} mean, %']:.1f} ({row[f'{part} max, %']:.1f})" for part in PARTS)
+    friction = f"{row['friction mean, mN m']:.2f} ({row['friction max, mN m']:.2f})"
+    motion = f"{row['motion rms, deg']:.3f}"
+    table.add_row(label, row["joint"], f"{row['mean (17), N']:.1f}", *shares, friction, motion)
 
 
 def complain(message: str, code: int) -> int:

@@ -83,33 +83,60 @@ def pin_wrench(
         InputError: If a joint carries no link.
     """
     geometry, body, routing = TendonGeometry(finger.description), finger.rigid_body, finger.routing
-    model, data = body.model, body.model.createData()
-    count, size = position.shape
-    axis, tendons, inertia, moment = (np.zeros((count, size, 3)) for _ in range(4))
-    cuts = [(cut, routing.strand(cut.tendon, distal=cut.distal)) for cut in geometry.cuts(groove)]
     carried = -body.distal_weights()
-    for k in range(count):
-        # Newton-Euler alone leaves the links unplaced.
-        pin.framesForwardKinematics(model, data, position[k])
-        pin.rnea(model, data, position[k], velocity[k], acceleration[k])
-        places, tip = data.oMi, data.oMf[body.tip_frame].translation
-        for j in range(size):
-            place, needed = places[j + 1], data.f[j + 1]
-            axis[k, j] = place.rotation[:, 2]
-            inertia[k, j] = place.rotation @ needed.linear - carried[j]
-            moment[k, j] = place.rotation @ needed.angular - np.cross(tip - place.translation, fingertip_force)
-        for cut, strand in cuts:
-            j, place = cut.joint - 1, places[cut.link]
-            pull = place.rotation @ cut.direction * strands[k, strand]
-            tendons[k, j] += pull
-            moment[k, j] += np.cross(place.act(cut.point) - places[cut.joint].translation, pull)
-    directions = np.array([body.link_directions(theta) for theta in position])
+    links = _links(finger, position, velocity, acceleration)
+    origin = links.translation[:, 1:]
+    moment = links.moment - np.cross(links.tip[:, None] - origin, fingertip_force)
+    tendons = np.zeros_like(moment)
+    for cut in geometry.cuts(groove):
+        j, turn = cut.joint - 1, links.rotation[:, cut.link]
+        pull = strands[:, routing.strand(cut.tendon, distal=cut.distal), None] * (turn @ cut.direction)
+        tendons[:, j] += pull
+        moment[:, j] += np.cross(turn @ cut.point + links.translation[:, cut.link] - origin[:, j], pull)
+    # The body proximal to a joint is the link before it.
+    directions = np.einsum("mjrc,jc->mjr", links.rotation[:, :-1], body.proximal_axes[1:])
     return PinWrench(
-        axis=axis,
+        axis=links.rotation[:, 1:, :, 2],
         paper=directions * (strands @ routing.loads.T)[..., None],
         tendons=tendons,
         carried=np.broadcast_to(carried, tendons.shape),
-        inertia=inertia,
+        inertia=links.force - carried,
         external=np.broadcast_to(-fingertip_force, tendons.shape),
         moment=moment,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Links:
+    """Where the base (entry 0) and the links are, and what their motion asks of the joints, base frame.
+
+    Attributes:
+        rotation: Shape (m, n + 1, 3, 3).
+        translation: Shape (m, n + 1, 3), m.
+        tip: Shape (m, 3), m.
+        force: sum m (a - g), shape (m, n, 3), N.
+        moment: The same for moments about the joints' origins, shape (m, n, 3), N m.
+    """
+
+    rotation: Array
+    translation: Array
+    tip: Array
+    force: Array
+    moment: Array
+
+
+def _links(finger: Finger, position: Array, velocity: Array, acceleration: Array) -> _Links:
+    model, frame = finger.rigid_body.model, finger.rigid_body.tip_frame
+    data, count, links = model.createData(), len(position), model.njoints
+    rotation, translation, tip = np.zeros((count, links, 3, 3)), np.zeros((count, links, 3)), np.zeros((count, 3))
+    wrench = np.zeros((count, links, 2, 3))
+    for k, state in enumerate(zip(position, velocity, acceleration, strict=True)):
+        # Newton-Euler alone leaves the links unplaced.
+        pin.framesForwardKinematics(model, data, state[0])
+        pin.rnea(model, data, *state)
+        tip[k] = data.oMf[frame].translation
+        for j, (place, needed) in enumerate(zip(data.oMi, data.f, strict=True)):
+            rotation[k, j], translation[k, j] = place.rotation, place.translation
+            wrench[k, j] = needed.linear, needed.angular
+    turned = np.einsum("mjrc,mjkc->mjkr", rotation, wrench)[:, 1:]
+    return _Links(rotation, translation, tip, turned[:, :, 0], turned[:, :, 1])

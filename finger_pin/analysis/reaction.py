@@ -8,7 +8,7 @@ joint's bearings. See `pin_wrench` for the mechanics and its assumptions.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
 from finger_pin.validation import validate
 
-_NEEDED = ("joint_position", "joint_velocity", "joint_acceleration", "tendon_tension")
+_MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +141,12 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
         InputError: If something is missing in the result, or a joint carries no link.
     """
     scenario, finger = _scenario(result)
-    motion = [_values(result, name) for name in _NEEDED[:3]]
+    position, velocity, acceleration = (_values(result, name) for name in _MOTION)
     strands, force = _strands(result, finger), np.array(scenario.environment.fingertip_force)
-    found = pin_wrench(finger, *motion, strands, force)
-    other = pin_wrench(finger, *motion, strands, force, Groove.PROXIMAL)
+    found, other = (
+        pin_wrench(finger, position, velocity, acceleration, strands, force, groove)
+        for groove in (Groove.DISTAL, Groove.PROXIMAL)
+    )
     paper = found.paper + found.external
     along = np.sum(found.moment * found.axis, axis=-1, keepdims=True)
     return JointReactions(
@@ -163,14 +165,14 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     )
 
 
-def fingertip_loads(sizes: Iterable[float]) -> dict[str, tuple[float, ...]]:
+def fingertip_loads(sizes: Sequence[float]) -> dict[str, tuple[float, ...]]:
     """Return fingertip forces of given sizes, N, both ways along the axes of the base, by a label."""
     signs = (("+", 1.0), ("\N{MINUS SIGN}", -1.0))
     return {
         f"{sign}{axis} {size:g} N": (*(factor * size if axis == each else 0.0 for each in "xyz"),)
-        for size in sizes
         for axis in "xyz"
         for sign, factor in signs
+        for size in sizes
     }
 
 

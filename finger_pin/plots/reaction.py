@@ -35,17 +35,20 @@ def plot_reaction(motion: JointReactions, loaded: Mapping[str, JointReactions]) 
     edges = [0.05 + index * (_COLUMN + 0.1) for index in range(3)]
     left = stack(figure, edges[0], edges[0] + _COLUMN, [f"{name}\n(N)" for name in joints], bottom=1.0)
     title(left[0], "(a) reaction $R$ along the motion")
-    middle = stack(figure, edges[1], edges[1] + _COLUMN, ["(%)"] * len(joints), bottom=1.0)
-    title(middle[0], "(b) its difference from (17), % of mean (17)")
+    middle = stack(figure, edges[1], edges[1] + _COLUMN, ["of mean (17)\n(%)"] * len(joints), bottom=1.0)
+    title(middle[0], "(b) its difference from (17)")
     for index, (whole, rest) in enumerate(zip(left, middle, strict=True)):
         _along(whole, rest, motion, index)
     legend(left[-1], left[0].get_lines(), columns=3)
-    legend(middle[-1], middle[0].get_lines()[:3], columns=3)
+    legend(middle[-1], middle[0].get_lines()[2:3], columns=1)
     if loaded:
-        right = stack(figure, edges[2], _WIDTH - 0.15, ["(%)"] * len(joints), bottom=1.0)
-        title(right[0], "(c) the same under fingertip forces")
+        right = stack(figure, edges[2], _WIDTH - 0.15, ["of mean (17)\n(%)"] * len(joints), bottom=1.0)
+        title(right[0], "(c) quasi-static, under fingertip forces")
         for index, axes in enumerate(right):
             _under_loads(axes, loaded, index)
+        lowest, highest = (pick(axes.get_ylim()[end] for axes in right) for end, pick in enumerate((min, max)))
+        for axes in right:
+            axes.set_ylim(lowest, highest)
         _name_loads(right[-1], list(loaded))
     return figure
 
@@ -81,7 +84,7 @@ def _name_loads(axes: Axes, labels: list[str]) -> None:
     axes.set_xticks(range(len(labels)), labels, rotation=90, fontsize=8.0)
     axes.xaxis.label.set_visible(False)
     keys = [
-        Line2D([], [], color=BLUE, marker="o", linestyle="", markersize=4.0, label="mean, quasi-static"),
+        Line2D([], [], color=BLUE, marker="o", linestyle="", markersize=4.0, label="mean"),
         Line2D([], [], color=BLUE, linewidth=3.0, alpha=0.35, label="range over the motion"),
     ]
     legend(axes, keys, columns=2)
