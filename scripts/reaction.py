@@ -8,7 +8,7 @@ import sys
 import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from rich.console import Console
@@ -28,9 +28,17 @@ TEXTS = ("fingertip force", "joint")
 PARTS = ("direction", "weight", "inertia", "static", "full", "other_groove")
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and exit."""
+        self.exit(complain(message, WRONG_INPUT))
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Do what a command line says; return the exit code."""
-    parser = argparse.ArgumentParser(prog="reaction.py", description=__doc__, allow_abbrev=False)
+    parser = Parser(prog="reaction.py", description=__doc__, allow_abbrev=False)
     parser.add_argument("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path; default fig6")
     parser.add_argument("--set", action="append", default=[], type=override, metavar="KEY=VALUE", help="repeatable")
     parser.add_argument(
@@ -141,7 +149,7 @@ def show(rows: list[dict[str, Any]]) -> None:
     for each, same in zip(given, further, strict=True):
         if same:
             worst = {key: max((row[key] for row in same), key=abs) for key in each if key not in TEXTS}
-            count = f"worst of {len(same)} others"
+            count = f"worst of {len(same)}"
             add_row(table, worst | {"joint": each["joint"]}, count if each is given[0] else "")
     (Console() if sys.stdout.isatty() else Console(width=150)).print(table)
 

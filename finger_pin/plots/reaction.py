@@ -16,7 +16,7 @@ from finger_pin.plots.style import BLACK, BLUE, GREEN, GREY, VERMILLION, new_fig
 from finger_pin.routing import Array
 
 _PERCENT = 100.0
-_WIDTH, _COLUMN = 14.0, 4.55
+_COLUMN, _GAP, _RIM = 4.55, 0.1, 0.05
 #: Between instants of the difference, which inertia makes spike: least and greatest of these parts of all instants.
 _MOST = (0.5, 99.5)
 
@@ -31,8 +31,8 @@ def plot_reaction(motion: JointReactions, loaded: Mapping[str, JointReactions]) 
     """
     joints = motion.joints
     height = max(6.6, 1.45 * len(joints) + 1.2)
-    figure = new_figure(_WIDTH, height)
-    edges = [0.05 + index * (_COLUMN + 0.1) for index in range(3)]
+    edges = [_RIM + index * (_COLUMN + _GAP) for index in range(3 if loaded else 2)]
+    figure = new_figure(edges[-1] + _COLUMN + 2.0 * _RIM, height)
     left = stack(figure, edges[0], edges[0] + _COLUMN, [f"{name}\n(N)" for name in joints], bottom=1.0)
     title(left[0], "(a) reaction $R$ along the motion")
     middle = stack(figure, edges[1], edges[1] + _COLUMN, ["of mean (17)\n(%)"] * len(joints), bottom=1.0)
@@ -42,7 +42,7 @@ def plot_reaction(motion: JointReactions, loaded: Mapping[str, JointReactions]) 
     legend(left[-1], left[0].get_lines(), columns=3)
     legend(middle[-1], middle[0].get_lines()[2:3], columns=1)
     if loaded:
-        right = stack(figure, edges[2], _WIDTH - 0.15, ["of mean (17)\n(%)"] * len(joints), bottom=1.0)
+        right = stack(figure, edges[2], edges[2] + _COLUMN, ["of mean (17)\n(%)"] * len(joints), bottom=1.0)
         title(right[0], "(c) quasi-static, under fingertip forces")
         for index, axes in enumerate(right):
             _under_loads(axes, loaded, index)
