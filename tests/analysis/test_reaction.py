@@ -16,12 +16,13 @@ from finger_pin.plots.reaction import plot_reaction
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reaction.py"
 FORCE = np.array([0.4, -0.7, 0.5])
 MASS, LENGTH, CENTRE, INERTIA, WEIGHT = 0.02, 0.05, 0.03, 6e-6, 9.81
+RADII = np.array([0.006, 0.004, -0.005])
 
 
 def pendulum():
-    """One link on a hinge about z, weight along -y, pulled by two tendons at different radii."""
+    """One link on a hinge about z, weight along -y, pulled by three tendons at different radii and lanes."""
     link = {"length": LENGTH, "width": 0.012, "mass": MASS, "centre_of_mass": CENTRE, "transverse_inertia": INERTIA}
-    tendons = {"T1": {"crossings": {"hinge": {"radius": 0.006}}}, "T2": {"crossings": {"hinge": {"radius": -0.004}}}}
+    tendons = {f"T{i}": {"crossings": {"hinge": {"radius": radius}}} for i, radius in enumerate(RADII)}
     table = {"name": "pendulum", "gravity": [0, -WEIGHT, 0], "joints": {"hinge": {"range": [-1, 1], "link": link}}}
     return fp.Finger(fp.FingerDescription.model_validate(table | {"tendons": tendons}))
 
@@ -34,20 +35,23 @@ def states(finger, count=20, seed=3):
     return posture, draw.normal(0.0, 4.0, (count, size)), draw.normal(0.0, 60.0, (count, size)), strands
 
 
-def test_the_pin_of_a_swinging_pendulum_bears_weight_centripetal_force_and_both_tendons():
-    """By hand: m (a - g) + f1 + f2 along x - F, with a of the mass centre; and the moment balance of the link."""
+def test_the_pin_of_a_swinging_pendulum_bears_weight_centripetal_force_and_tendons():
+    """By hand: m (a - g) + sum f along x - F, with a of the mass centre; and the moment balance of the link."""
     finger = pendulum()
+    lanes = np.array([pulley.offset for pulley in TendonGeometry(finger.description).pulleys])
+    assert np.ptp(lanes) > 1e-3
     position, velocity, acceleration, strands = states(finger)
     found = pin_wrench(finger, position, velocity, acceleration, strands, FORCE)
     rows = zip(position[:, 0], velocity[:, 0], acceleration[:, 0], strands, strict=True)
-    for k, (q, w, a, (f1, f2)) in enumerate(rows):
+    for k, (q, w, a, f) in enumerate(rows):
         c, s = np.cos(q), np.sin(q)
-        px = MASS * CENTRE * (-w * w * c - a * s) + f1 + f2 - FORCE[0]
+        px = MASS * CENTRE * (-w * w * c - a * s) + f.sum() - FORCE[0]
         py = MASS * (CENTRE * (-w * w * s + a * c) + WEIGHT) - FORCE[1]
         np.testing.assert_allclose(found.force[k, 0], [px, py, -FORCE[2]], rtol=1e-11)
         moment = (INERTIA + MASS * CENTRE**2) * a + MASS * WEIGHT * CENTRE * c
-        moment -= LENGTH * (c * FORCE[1] - s * FORCE[0]) + 0.006 * f1 - 0.004 * f2
-        assert found.moment[k, 0, 2] == pytest.approx(moment, rel=1e-9)
+        moment -= LENGTH * (c * FORCE[1] - s * FORCE[0]) + RADII @ f
+        across = [-LENGTH * s * FORCE[2], LENGTH * c * FORCE[2] + lanes @ f]
+        np.testing.assert_allclose(found.moment[k, 0], [*across, moment], rtol=1e-9)
 
 
 @pytest.mark.parametrize("groove", Groove)
