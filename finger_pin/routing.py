@@ -97,6 +97,11 @@ class Routing:
         """Rows of H_c2 of the distal halves of the passive tendons, shape (p, n), m."""
         return self.strand_coupling[self.actuated + 1 :: 2]
 
+    def strand(self, tendon: str, *, distal: bool = False) -> int:
+        """Return the index of a tendon's strand; ``distal`` asks for the distal half of a passive tendon."""
+        index = self.tendons.index(tendon)
+        return index if index < self.actuated else 2 * index - self.actuated + int(distal)
+
     def force_closure(self) -> ForceClosure:
         """Report whether tensions exist that are all positive and turn no joint."""
         return ForceClosure.of(self.coupling, self.tendons)

@@ -1,6 +1,6 @@
-"""What a finger's statics say without simulating it: self-locking and fingertip forces.
+"""What a finger's statics say without simulating it, self-locking and fingertip forces, and how good (17) is.
 
-It reads descriptions, fingers and scenarios, and nothing of the simulation.
+It reads descriptions, fingers, scenarios and results, and nothing of the simulation.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from finger_pin.analysis.force_capability import (
     largest_force,
     tension_for_force,
 )
+from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
+from finger_pin.analysis.reaction import JointReactions, ReactionDifference, fingertip_loads, joint_reactions
 from finger_pin.analysis.self_locking import (
     CriticalFriction,
     SelfLockingMap,
@@ -26,12 +28,18 @@ __all__ = [
     "CriticalFriction",
     "ForcePolytope",
     "Friction",
+    "JointReactions",
+    "PinWrench",
+    "ReactionDifference",
     "RequiredTension",
     "SelfLockingMap",
     "SelfLockingMargin",
     "critical_friction",
+    "fingertip_loads",
     "force_polytope",
+    "joint_reactions",
     "largest_force",
+    "pin_wrench",
     "self_locking_map",
     "self_locking_margin",
     "tension_for_force",

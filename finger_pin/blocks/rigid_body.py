@@ -121,6 +121,11 @@ class RigidBody:
         pin.forwardKinematics(self.model, self._data, q)
         return self._directions()
 
+    def distal_weights(self) -> Array:
+        """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
+        pin.computeSubtreeMasses(self.model, self._data)
+        return np.outer(np.array(self._data.mass)[1:], self.model.gravity.linear)
+
     def kinematics(self, q: Array, v: Array) -> Kinematics:
         """Return what follows from position and velocity, for shapes (..., n)."""
         if q.ndim > 1:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.description import build_rigid_body
 from finger_pin.exceptions import InputError
+from finger_pin.geometry.cuts import Cut, Groove, cuts
 from finger_pin.geometry.lanes import tendon_lanes
 from finger_pin.geometry.winding import Arc, Span, wind
 from finger_pin.parameters import FingerDescription
@@ -132,6 +133,11 @@ class TendonGeometry:
             distal = np.concatenate([piece.distal for piece in pieces])
             paths.append(TendonPath(name, np.concatenate(parts, axis=-2), distal))
         return tuple(paths)
+
+    def cuts(self, groove: Groove = Groove.DISTAL) -> tuple[Cut, ...]:
+        """Return where and in which direction every tendon crosses the joints; see `finger_pin.geometry.cuts`."""
+        found = (cuts(self.model, name, pieces, groove) for name, pieces in self._pieces.items())
+        return tuple(cut for each in found for cut in each)
 
     def _place(self, piece: Span | Arc, q: Array, loose: Array, poses: LinkPoses) -> Array:
         link = piece.link if isinstance(piece, Span) else piece.joint
