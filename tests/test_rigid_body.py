@@ -184,6 +184,22 @@ def test_link_directions_follow_the_links_of_the_paper_s_finger():
         np.testing.assert_allclose(body.link_directions(q), expected, rtol=0, atol=1e-14)
 
 
+def test_joints_whose_axes_meet_in_a_point_have_the_same_link_before_them():
+    """A knuckle that abducts and flexes: turning it sideways does not turn the palm, along which the tendons come."""
+    model = pin.Model()
+    inertia = pin.Inertia(0.01, np.array([0.01, 0.0, 0.0]), 1e-6 * np.eye(3))
+    along = pin.SE3(np.eye(3), np.array([0.03, 0.0, 0.0]))
+    joints = [(pin.JointModelRZ(), pin.SE3.Identity()), (pin.JointModelRY(), pin.SE3.Identity())]
+    joints += [(pin.JointModelRY(), along), (pin.JointModelRX(), pin.SE3.Identity())]
+    for index, (kind, placement) in enumerate(joints):
+        model.appendBodyToJoint(model.addJoint(index, kind, placement, f"j{index}"), inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame("fingertip", 4, 0, along, pin.FrameType.OP_FRAME))
+    aside, bent = 0.3, 0.5
+    link = [np.cos(aside) * np.cos(bent), np.sin(aside) * np.cos(bent), -np.sin(bent)]
+    found = RigidBody(model).link_directions(np.array([aside, bent, 0.7, 0.4]))
+    np.testing.assert_allclose(found, [(1, 0, 0), (1, 0, 0), link, link], rtol=0, atol=1e-15)
+
+
 def test_the_first_link_direction_is_the_base_axis_that_was_given():
     model = build_rigid_body(load_finger("planar")).model
     body = RigidBody(model, base_axis=(0.0, 0.0, 1.0))

@@ -55,6 +55,8 @@ class RigidBody:
         model: The Pinocchio model.
         tip_frame: Index of the fingertip frame.
         joints: Names of the joints, in the order of the model.
+        proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
+        carriers: Index of the joint that carries that body, 0 for the base.
     """
 
     def __init__(self, model: pin.Model, tip_frame: str = "fingertip", base_axis: Sequence[float] = (1, 0, 0)) -> None:
@@ -78,11 +80,14 @@ class RigidBody:
         self.joints: tuple[str, ...] = tuple(model.names[1:])
         self._data = model.createData()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
+        self.carriers: list[int] = [0]
         for index in range(1, model.njoints):
-            offset = np.array(model.jointPlacements[index].translation)
+            offset, parent = np.array(model.jointPlacements[index].translation), int(model.parents[index])
             length = float(np.linalg.norm(offset))
-            at_base = model.parents[index] == 0
-            self.proximal_axes.append(self.proximal_axes[0] if at_base or length == 0.0 else offset / length)
+            # At the base, and where axes meet in a point, no link lies in between: the joint has the link of the other.
+            shared = parent == 0 or length == 0.0
+            self.carriers.append(self.carriers[parent] if shared else parent)
+            self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
 
     def tip_position(self, q: Array) -> Array:
         """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
@@ -140,6 +145,6 @@ class RigidBody:
         return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
 
     def _directions(self) -> Array:
-        placements, parents = self._data.oMi, self.model.parents
-        rows = [placements[parents[j]].rotation @ self.proximal_axes[j] for j in range(1, self.model.njoints)]
-        return np.array(rows)
+        placements = self._data.oMi
+        rows = [placements[at].rotation @ axis for at, axis in zip(self.carriers, self.proximal_axes, strict=True)]
+        return np.array(rows[1:])

@@ -148,16 +148,16 @@ def _fingertip(plant: Any, work: Any) -> None:
             for c in range(3):
                 tip[r] += work.rotation[body, r, c] * plant.tip_offset[c]
     for j in range(size):
-        parent = plant.parents[j]
+        carrier = plant.carriers[j]
         joint[ALONG, j] = 0.0
         joint[EXTERNAL, j] = 0.0
         for r in range(3):
             work.jacobian[r, j] = 0.0
             value = plant.directions[j, r]
-            if parent >= 0:
+            if carrier >= 0:
                 value = 0.0
                 for c in range(3):
-                    value += work.rotation[parent, r, c] * plant.directions[j, c]
+                    value += work.rotation[carrier, r, c] * plant.directions[j, c]
             work.direction[j, r] = value
             joint[ALONG, j] += value * force[r]
     j = body

@@ -38,6 +38,7 @@ class Plant(NamedTuple):
     gravity: Vector
     tip_body: int
     tip_offset: Vector
+    carriers: Indices
     directions: Matrix
     coupling: Matrix
     strand_coupling: Matrix
@@ -115,6 +116,7 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         turns.append(turn)
     frame = model.frames[finger.rigid_body.tip_frame]
     tip_body = int(frame.parentJoint) - 1
+    carriers = finger.rigid_body.carriers[1:]
     tendons, joints, limiter = finger.tendons, finger.joint_friction, finger.stroke_limiter
     return Plant(
         parents=parents,
@@ -123,8 +125,9 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         gravity=np.array(model.gravity.linear),
         tip_body=tip_body,
         tip_offset=turns[tip_body + 1].T @ frame.placement.translation,
+        carriers=np.array(carriers, dtype=np.int64) - 1,
         directions=np.array(
-            [turns[parents[i] + 1].T @ axis for i, axis in enumerate(finger.rigid_body.proximal_axes[1:])]
+            [turns[at].T @ axis for at, axis in zip(carriers, finger.rigid_body.proximal_axes[1:], strict=True)]
         ),
         coupling=routing.coupling,
         strand_coupling=routing.strand_coupling,

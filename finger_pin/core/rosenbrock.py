@@ -9,7 +9,8 @@ import numpy as np
 from finger_pin.core.binding import Matrix, Vector, get, kind_of, put
 from finger_pin.core.compilation import compiled, compiled_apart, entry
 from finger_pin.core.dynamics import evaluate
-from finger_pin.core.linearisation import Linear, factorise, linearise, solve
+from finger_pin.core.elimination import factorise, solve
+from finger_pin.core.linearisation import Linear, linearise
 from finger_pin.core.plant import Control, Plant, Work
 from finger_pin.core.rigid_body import MASS_MATRIX
 from finger_pin.core.tableaus import Tableau

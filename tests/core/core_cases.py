@@ -1,6 +1,6 @@
 """Fingers, closed loops and states on which the compiled core is compared with the readable model."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import kernels
@@ -16,7 +16,9 @@ from finger_pin.core.plant import build_control, build_plant, build_work
 
 BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
-    name + push for push in ("", "_pushed") for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre")
+    name + push
+    for push in ("", "_pushed")
+    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
@@ -96,6 +98,17 @@ def lugre():
     table["finger"]["tendon_friction"] |= {"micro_damping": 3.0, "stribeck_exponent": 2.0}
     table["finger"]["joint_friction"] |= {"micro_damping": 1e-3, "stribeck_exponent": 2.0}
     return fp.Scenario.model_validate(table)
+
+
+def without_abduction_link(loop):
+    """A loop whose first two joint axes meet in a point."""
+    model = loop.finger.rigid_body.model.copy()
+    placement = model.jointPlacements[2].copy()
+    placement.translation = np.zeros(3)
+    model.jointPlacements[2] = placement
+    joints = {name: name for name in loop.finger.routing.joints}
+    finger = fp.Finger.from_model(loop.finger.description, model, joints, "fingertip")
+    return replace(loop, finger=finger, dynamics=finger)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,17 @@
 from finger_pin.core import dynamics as at
 from finger_pin.core.compilation import entry
 from finger_pin.core.dynamics import evaluate
-from finger_pin.core.linearisation import factorise, linearise, solve
+from finger_pin.core.elimination import factorise, solve
+from finger_pin.core.linearisation import linearise
 from finger_pin.core.rigid_body import (
     MASS_MATRIX,
     factorise_mass,
     inverse_dynamics,
-    inverse_dynamics_derivatives,
     mass_matrix,
     move,
     solve_mass,
 )
+from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
 
 
 @entry
