@@ -37,9 +37,10 @@ def main(arguments: list[str] | None = None) -> int:
     """Check, print, and write; return the exit code."""
     options = parse(arguments)
     try:
-        from finger_pin.console import print_text
         from validation import report
         from validation.check import Verdict
+
+        from finger_pin.console import print_text
 
         families = validate(options.only)
         whole = report.Report.now(families)

@@ -122,7 +122,7 @@ def pendulum() -> tuple[float, float]:
 
 
 def hanging_angle(finger: Finger) -> float:
-    """Return the angle of the first joint at which a straight finger hangs, rad: the stable zero of gravity's torque."""
+    """Return the angle of the first joint, rad, at which a straight finger hangs: where gravity's torque is zero."""
     straight = np.zeros(len(finger.routing.joints))
     return -math.copysign(math.pi / 2.0, finger.rigid_body.gravity_torque(straight)[0])
 
@@ -166,7 +166,7 @@ def chain_modes() -> list[tuple[float, Comparison]]:
     relative = np.array([[1.0, 0, 0], [-1.0, 1.0, 0], [0, -1.0, 1.0]])
     hanging = np.array([hanging_angle(finger), 0.0, 0.0])
     found = []
-    for square, mode in zip(squares, modes.T, strict=True):
+    for square, mode in sorted(zip(squares, modes.T, strict=True), key=lambda pair: pair[0]):
         shape = relative @ mode
         start = 1e-4 * shape / np.max(np.abs(shape))
         sim = Simulator(finger, hanging + start, rtol=1e-8, atol_scale=1e-11, method="Rodas5P")
@@ -260,5 +260,6 @@ def plot_friction_and_swing(pulled: Slide, released: Slide) -> Figure:
     right.plot(shares, motion.expected, color=BLACK, label="elliptic functions")
     right.plot(shares[::5], motion.measured[::5], "o", color=BLUE, markersize=3.5, label="finger_pin")
     right.set(xlabel="time (periods)", ylabel="angle (rad)", title="swing of 2.5 rad")
-    right.legend(loc="lower right")
+    right.set_ylim(top=4.2)
+    right.legend(loc="upper right", ncols=2)
     return figure

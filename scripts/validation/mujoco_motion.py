@@ -112,9 +112,7 @@ def measure() -> Section:
         for step, order in zip(STEPS[1:], each.orders, strict=True):
             what = f"{name}: order in MuJoCo's step, down to {1e6 * step:g} us"
             checks.append(compare(what, "first-order integrator", order, 0.07, "1", expected=1.0))
-    return Section.of(
-        checks, Picture(plot(found), "MuJoCo's motion approaches ours in proportion to its time step.")
-    )
+    return Section.of(checks, Picture(plot(found), "MuJoCo's motion approaches ours in proportion to its time step."))
 
 
 @styled

@@ -22,14 +22,15 @@ h2 { font-size: 1.2rem; margin: 0; }
 p { margin: .3rem 0; }
 .soft { color: var(--soft); }
 .outcome { font-size: 1.15rem; font-weight: 600; margin: .8rem 0 .2rem; }
-section { background: #fff; border: 1px solid var(--line); border-radius: .5rem; padding: 1.25rem; margin-top: 1.25rem; }
+section { background: #fff; border: 1px solid var(--line); border-radius: .5rem;
+  padding: 1.25rem; margin-top: 1.25rem; }
 table { border-collapse: collapse; width: 100%; margin-top: .8rem; font-size: .875rem; }
 th { text-align: left; color: var(--soft); font-weight: 500; border-bottom: 2px solid var(--line); }
 th, td { padding: .35rem .8rem .35rem 0; vertical-align: top; }
 td { border-bottom: 1px solid var(--line); }
 tr:last-child td { border-bottom: 0; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-th:last-child, td:last-child { padding-right: 0; }
+th:last-child, td:last-child { padding-right: 0; white-space: nowrap; }
 .verdict { display: inline-block; min-width: 4.2rem; text-align: center; padding: 0 .5rem; border-radius: .75rem;
   font-size: .8rem; font-weight: 600; border: 1px solid currentcolor; }
 .pass { color: var(--pass); background: #eaf6f1; } .differs { color: var(--differs); background: #fdf3e2; }

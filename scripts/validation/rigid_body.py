@@ -54,7 +54,9 @@ def states(finger: Finger) -> tuple[Array, Array]:
     joints = len(finger.routing.joints)
     x[:, :joints] = rng.uniform(-3.0, 3.0, (size, joints))
     x[:, joints : 2 * joints] = 10.0 * rng.normal(size=(size, joints))
-    x[:, 2 * joints + 2 * finger.routing.passive :] = 1e-2 * rng.normal(size=(size, len(finger.routing.tendons) + joints))
+    x[:, 2 * joints + 2 * finger.routing.passive :] = 1e-2 * rng.normal(
+        size=(size, len(finger.routing.tendons) + joints)
+    )
     return x, rng.uniform(0.0, 5.0, (size, finger.routing.actuated))
 
 
