@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import re
 import tomllib
@@ -15,6 +16,7 @@ import tomli_w
 
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
+from finger_pin.publishing import settle
 from finger_pin.scenario import Scenario
 from finger_pin.validation import Description, nearest, validate
 
@@ -93,6 +95,8 @@ def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
     """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
     if _is_path(name):
         what, path = f"{kind} file {name}", folder / _expand(name)
+        with contextlib.suppress(OSError, ValueError):
+            settle(path.parent)
         data = _read_bytes(what, path)
     else:
         what, path = f"{kind} {name}", Path(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
@@ -18,6 +19,7 @@ from finger_pin.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.files import replacing
 from finger_pin.integration import Trajectory
 from finger_pin.loading import to_toml
+from finger_pin.publishing import settle
 from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
 
@@ -80,7 +82,12 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
 
 
 def load_result(path: str | Path) -> xr.Dataset:
-    """Read a result that `save` wrote into memory."""
+    """Read a result that `save` wrote into memory.
+
+    In a folder of results whose run was killed while it moved them into place, the moves are finished before.
+    """
+    with contextlib.suppress(OSError):
+        settle(Path(path).parent)
     return xr.load_dataset(path, engine="netcdf4")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import tempfile
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -13,6 +12,7 @@ from typing import Self
 import xarray as xr
 
 from finger_pin.exceptions import InputError
+from finger_pin.publishing import Stage, settle
 from finger_pin.recording import save
 
 _MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
@@ -47,10 +47,12 @@ class ResultFolder:
         self.path = Path(path)
         self._made: list[Path] = []
         try:
+            settle(self.path)
             self._refuse_foreign()
             self._made = [each for each in (self.path, *self.path.parents) if not each.exists()]
             self.path.mkdir(parents=True, exist_ok=True)
-            self.stage = Path(tempfile.mkdtemp(dir=self.path, prefix=".unfinished-"))
+            self._stage = Stage(self.path)
+            self.stage = self._stage.path
         except (OSError, ValueError) as error:
             self._remove_made()
             if isinstance(error, InputError):
@@ -74,25 +76,14 @@ class ResultFolder:
     def publish(self) -> None:
         """Move what is in the stage into place, and what an earlier run left out of the way.
 
-        First all earlier files go, then all new ones come, each by a rename: at no instant do both lie side by side.
+        Of a process that is killed meanwhile, either the earlier results are in place or the new ones: what is
+        half moved is finished by the next run in the folder, and by `load_result` and `load_scenario`.
 
         Raises:
             OSError: If a file cannot be moved; the earlier results are then back in place.
         """
-        earlier = self.stage / "earlier"
-        moves = [(each, earlier / each.relative_to(self.path)) for each in _artifacts(self.path)]
-        moves += [(each, self.path / each.relative_to(self.stage)) for each in _artifacts(self.stage)]
-        done: list[tuple[Path, Path]] = []
-        try:
-            for source, target in moves:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                os.rename(source, target)
-                done.append((source, target))
-        except BaseException:
-            for source, target in reversed(done):
-                os.rename(target, source)
-            raise
-        _remove_if_empty(self.path / _FIGURES)
+        settle(self.path)
+        self._stage.publish(_artifacts(self.stage), _artifacts(self.path))
 
     def discard_views(self) -> None:
         """Remove figures and animation from the stage, such as those that an interruption left half drawn."""
@@ -107,7 +98,7 @@ class ResultFolder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Remove the stage, and folders that were made and stayed empty."""
-        shutil.rmtree(self.stage, ignore_errors=True)
+        self._stage.discard()
         self._remove_made()
 
     def _refuse_foreign(self) -> None:

@@ -1,6 +1,5 @@
 """The generated URDF against equation (1), closed forms, and an independent reader (yourdfpy)."""
 
-import io
 import os
 import subprocess
 import sys
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-import yourdfpy
+from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 
 from finger_pin.description import build_rigid_body, to_urdf
 from finger_pin.exceptions import InputError
@@ -39,28 +38,6 @@ FINGERS = {
 @pytest.fixture(params=FINGERS.values(), ids=FINGERS.keys())
 def finger(request):
     return load_finger(*request.param)
-
-
-def equation_1(lengths, theta):
-    """Fingertip of the four-joint finger, written out."""
-    a1, a2, a3, a4 = lengths
-    t1, t2, t23, t234 = theta[0], theta[1], theta[1:3].sum(), theta[1:4].sum()
-    reach = a1 + a2 * np.cos(t2) + a3 * np.cos(t23) + a4 * np.cos(t234)
-    height = a2 * np.sin(t2) + a3 * np.sin(t23) + a4 * np.sin(t234)
-    return np.array([np.cos(t1) * reach, np.sin(t1) * reach, height])
-
-
-def planar_tip(lengths, theta):
-    """Fingertip of the two-joint finger in the x-y plane, written out."""
-    (l1, l2), (t1, t12) = lengths, np.cumsum(theta)
-    return np.array([l1 * np.cos(t1) + l2 * np.cos(t12), l1 * np.sin(t1) + l2 * np.sin(t12), 0.0])
-
-
-def read_by_yourdfpy(urdf):
-    """Read a URDF from memory."""
-    robot = yourdfpy.URDF.load(io.BytesIO(urdf.encode()))
-    assert robot.validate(), robot.errors
-    return robot
 
 
 def read_by_pinocchio(urdf, kind):

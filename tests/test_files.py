@@ -1,7 +1,11 @@
 """Files and folders of results: whole or not at all, of one run and never of two."""
 
 import os
+import shutil
 import stat
+import subprocess
+import sys
+import threading
 
 import pytest
 
@@ -133,7 +137,7 @@ def test_files_that_no_run_wrote_are_not_replaced(tmp_path, name):
     assert contents(tmp_path) == before
 
 
-@pytest.mark.parametrize("failing", range(1, 9))
+@pytest.mark.parametrize("failing", range(1, 12))
 def test_a_failure_while_moving_puts_the_earlier_results_back(tmp_path, result, monkeypatch, failing):
     publish(tmp_path, result, figures=["a.png", "b.png"])
     before = contents(tmp_path)
@@ -158,13 +162,17 @@ def test_at_no_instant_do_results_of_two_runs_lie_side_by_side(tmp_path, result,
 
     def watch(source, target):
         rename(source, target)
-        present = [path for path in tmp_path.rglob("*") if path.is_file() and ".unfinished" not in str(path)]
+        present = [
+            path
+            for path in tmp_path.rglob("*")
+            if path.is_file() and not path.relative_to(tmp_path).as_posix().startswith(".")
+        ]
         old = [earlier.get(path.relative_to(tmp_path).as_posix()) == path.stat().st_ino for path in present]
         mixes.append(any(old) and not all(old))
 
     monkeypatch.setattr(os, "rename", watch)
     publish(tmp_path, result, figures=["b.png", "c.png"])
-    assert len(mixes) == 10
+    assert len(mixes) == 12
     assert not any(mixes)
 
 
@@ -210,3 +218,125 @@ def test_what_the_netcdf_library_makes_of_a_full_disk_is_an_os_error(tmp_path, r
     with pytest.raises(OSError, match="HDF error"), ResultFolder(tmp_path) as results:
         results.write(result)
     assert contents(tmp_path) == {}
+
+
+#: Publishes a set of results into a copy of a folder, over and over; every process is killed at another rename.
+KILLED = """
+import os, shutil, signal, sys
+from pathlib import Path
+
+from finger_pin.results import ResultFolder
+
+rename, calls = os.rename, 0
+
+
+def killing(source, target):
+    global calls
+    calls += 1
+    if calls == 1 + number // 2 and number % 2 == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    rename(source, target)
+    if calls == 1 + number // 2 and number % 2 == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+number, survived = 0, False
+while not survived:
+    shutil.copytree("old", f"at{number}")
+    child = os.fork()
+    if child == 0:
+        with ResultFolder(f"at{number}") as folder:
+            shutil.copytree("new", folder.stage, dirs_exist_ok=True)
+            os.rename = killing
+            folder.publish()
+        os._exit(0)
+    survived = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    number += 1
+print(number)
+"""
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory, result):
+    """Folders in which a process was killed right before and right after every rename, and the two sets of results."""
+    home = tmp_path_factory.mktemp("killed")
+    other = fp.simulate(load_scenario("fig6", {"simulation.duration": 0.003, "simulation.sample_rate": 1000}))
+    publish(home / "old", result, figures=["a.png", "b.png"])
+    publish(home / "new", other, figures=["b.png", "c.png"], animation=False)
+    done = subprocess.run([sys.executable, "-c", KILLED], cwd=home, capture_output=True, text=True, check=True)
+    count = int(done.stdout)
+    # 5 earlier files, 4 new ones, the decision and its end; before and after each, and once undisturbed.
+    assert count == 2 * 11 + 1
+    sets = [contents(home / name) for name in ("old", "new")]
+    return [home / f"at{number}" for number in range(count)], sets
+
+
+def read(folder):
+    fp.load_result(folder / "trajectory.nc")
+
+
+def resolve(folder):
+    load_scenario(folder / "scenario.toml")
+
+
+def begin_another(folder):
+    with ResultFolder(folder):
+        pass
+
+
+@pytest.mark.parametrize("look", [read, resolve, begin_another])
+def test_a_run_killed_at_any_instant_of_publishing_leaves_one_whole_set_to_whoever_looks_next(killed, tmp_path, look):
+    """The earlier set before the decision, which is the first rename, and the new one after it."""
+    folders, (old, new) = killed
+    for number, folder in enumerate(folders):
+        copy = tmp_path / folder.name
+        shutil.copytree(folder, copy)
+        look(copy)
+        found = {name: data for name, data in contents(copy).items() if not name.startswith(".unfinished-")}
+        assert found == (old if number == 0 else new), number
+
+
+def test_what_killed_runs_had_begun_is_removed_by_the_next_run_but_not_that_of_a_living_one(killed, tmp_path):
+    folders, (_, new) = killed
+    folder = tmp_path / "run"
+    shutil.copytree(folders[0], folder)
+    assert list(folder.glob(".unfinished-*"))
+    with ResultFolder(folder) as living:
+        shutil.copytree(folders[-1], living.stage, dirs_exist_ok=True)
+        with ResultFolder(folder):
+            pass
+        assert list(folder.glob(".unfinished-*")) == [living.stage]
+        living.publish()
+    assert contents(folder) == new
+
+
+def test_a_reader_waits_for_a_run_that_is_just_publishing(tmp_path, result, monkeypatch):
+    publish(tmp_path, result, figures=["a.png"])
+    earlier = (tmp_path / "trajectory.nc").stat().st_ino
+    rename, half, go_on = os.rename, threading.Event(), threading.Event()
+
+    def slow(source, target):
+        rename(source, target)
+        if os.path.basename(target) == "scenario.toml" and ".publishing" not in str(target):
+            half.set()
+            assert go_on.wait(60.0)
+
+    monkeypatch.setattr(os, "rename", slow)
+    seen = []
+
+    def look():
+        fp.load_result(tmp_path / "trajectory.nc")
+        seen.append((tmp_path / "trajectory.nc").stat().st_ino)
+
+    writer = threading.Thread(target=publish, args=(tmp_path, result))
+    reader = threading.Thread(target=look)
+    writer.start()
+    assert half.wait(60.0)
+    reader.start()
+    reader.join(0.2)
+    assert reader.is_alive() and not seen
+    go_on.set()
+    writer.join()
+    reader.join()
+    assert seen and seen[0] != earlier
+    assert set(contents(tmp_path)) == {"scenario.toml", "trajectory.nc", "animation.html"}

@@ -7,30 +7,10 @@ Control 40(3), 1995, section III and Table I: a mass of 1 kg under a constant no
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from validation import lugre
+from validation.lugre import COULOMB, EXPONENT, LAG, MICRO, STATIC, STIFFNESS, STRIBECK, VISCOUS, law, move
 
 from finger_pin import friction
-
-STIFFNESS, MICRO, VISCOUS = 1e5, np.sqrt(1e5), 0.4
-COULOMB, STATIC, STRIBECK, EXPONENT = 1.0, 1.5, 1e-3, 2.0
-LAG = MICRO / STIFFNESS
-TOLERANCES = {"method": "Radau", "rtol": 1e-8, "atol": [1e-12, 1e-10, 1e-9]}
-
-
-def law(stiction, velocity):
-    """Return the stiction's rate and the friction force, N, under a normal force of 1 N."""
-    coefficient = friction.friction_coefficient(velocity, COULOMB, STATIC, STRIBECK, EXPONENT)
-    rate = friction.stiction_rate(stiction, velocity, friction.friction_level(1.0, coefficient, 1e-9), STIFFNESS)
-    return rate, friction.friction_force(stiction, velocity, VISCOUS, rate, LAG)
-
-
-def move(force, duration, **options):
-    """Integrate position, velocity and stiction of the mass from rest under force(time, position), N."""
-
-    def rates(time, y):
-        rate, loss = law(y[2], y[1])
-        return [y[1], force(time, y[0]) - loss, rate]
-
-    return solve_ivp(rates, (0.0, duration), [0.0, 0.0, 0.0], **TOLERANCES, **options)
 
 
 def follow(velocity, duration, start=0.0, samples=2001):
@@ -49,6 +29,11 @@ def follow(velocity, duration, start=0.0, samples=2001):
     return times, solution.y[0], law(solution.y[0], velocity(times))[1]
 
 
+@pytest.fixture(scope="module")
+def break_aways():
+    return {rate: lugre.break_away(rate) for rate in lugre.BREAK_AWAY}
+
+
 @pytest.mark.parametrize(
     ("rate", "published", "tolerance"),
     [
@@ -63,25 +48,26 @@ def follow(velocity, duration, start=0.0, samples=2001):
         (50.0, 1.008, 6e-4),
     ],
 )
-def test_the_break_away_force_falls_with_the_rate_at_which_the_force_grows(rate, published, tolerance):
+def test_the_break_away_force_falls_with_the_rate_at_which_the_force_grows(break_aways, rate, published, tolerance):
     """Break-away is where friction has its first maximum, Fig. 4 of the paper."""
-    solution = move(lambda time, _: rate * time, 1.7 / rate)
-    force = law(solution.y[2], solution.y[1])[1]
-    peak = np.flatnonzero((np.diff(force)[:-1] > 0.0) & (np.diff(force)[1:] <= 0.0))[0] + 1
-    assert force[peak] == pytest.approx(published, abs=tolerance)
+    assert lugre.BREAK_AWAY[rate] == published
+    assert break_aways[rate].force == pytest.approx(published, abs=tolerance)
+
+
+def test_the_greatest_friction_before_sliding_takes_over_is_every_published_break_away_force(break_aways):
+    """Read up to one applied force for all rates, beyond the first maximum where there is a flat one."""
+    for rate, published in lugre.BREAK_AWAY.items():
+        assert break_aways[rate].greatest(lugre.READ_UP_TO) == pytest.approx(published, abs=6e-4)
 
 
 def test_a_mass_pulled_by_a_spring_sticks_and_slips_as_published():
     """A spring of 2 N/m pulled at 0.1 m/s, section III-D."""
-    solution = move(lambda time, position: 2.0 * (0.1 * time - position), 20.0, dense_output=True)
-    times = np.linspace(0.0, 20.0, 100_001)
-    speed = solution.sol(times)[1]
-    slips = times[1:][(speed[1:] > 0.05) & (speed[:-1] <= 0.05)]
-    assert len(slips) == 2
-    assert slips[0] == pytest.approx(7.54, abs=5e-3)
-    assert slips[1] - slips[0] == pytest.approx(6.36, abs=5e-3)
-    assert speed.max() == pytest.approx(0.370, abs=5e-4)
-    assert solution.y[0, -1] == pytest.approx(1.27259, abs=2e-5)
+    pulled = lugre.stick_slip()
+    assert len(pulled.slips) == 2
+    assert pulled.slips[0] == pytest.approx(7.54, abs=5e-3)
+    assert pulled.slips[1] - pulled.slips[0] == pytest.approx(6.36, abs=5e-3)
+    assert pulled.speed.max() == pytest.approx(0.370, abs=5e-4)
+    assert pulled.end == pytest.approx(1.27259, abs=2e-5)
 
 
 def test_before_sliding_force_and_displacement_make_closed_loops_that_dissipate():

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from validation import mujoco_motion
 
 import finger_pin as fp
 from finger_pin.description import to_urdf
@@ -15,16 +16,6 @@ from finger_pin.mjcf import to_mjcf
 
 mujoco = pytest.importorskip("mujoco")
 
-# What MuJoCo cannot express is taken away. With mu_e = 0 a bristle F^s carries at most sigma_0 times the path that its
-# contact slides, below 1e-9 N and 1e-9 N m here; a limiter of stiffness zero exerts nothing.
-EXPRESSIBLE = {
-    "finger.tendon_friction.coulomb": 0.0,
-    "finger.tendon_friction.stiffness": 1e-9,
-    "finger.joint_friction.coulomb": 0.0,
-    "finger.joint_friction.stiction": 0.0,
-    "finger.joint_friction.stiffness": 1e-9,
-    "finger.stroke_limiter.stiffness": 0.0,
-}
 TWO_PASSIVE = {
     "finger.tendons.T6": {
         "kind": "passive",
@@ -45,8 +36,6 @@ SOFT = {
     "finger.gravity": [4.0, 2.0, 1.0],
     "finger.joint_friction.viscous": 2e-3,
 }
-DURATION = 0.15
-STEPS = (1e-5, 5e-6, 2.5e-6)
 
 
 def load(text):
@@ -109,28 +98,6 @@ def test_without_masses_a_passive_tendon_is_one_spring_k_t_that_only_pulls():
         np.testing.assert_allclose(data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-def follow(scenario, model, step):
-    """Return MuJoCo's joint positions every millisecond under the paper's controller, written out."""
-    routing = fp.Finger(scenario.finger).routing
-    inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
-    gain = np.broadcast_to(scenario.controller.gain, len(routing.joints))
-    minimum = np.broadcast_to(scenario.controller.minimum_tension, len(routing.tendons))
-    reference = scenario.build_reference(routing).at(step * np.arange(round(DURATION / step))).position
-    model.opt.timestep = step
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    theta, control, actuated = data.qpos[: len(routing.joints)], data.ctrl, routing.actuated
-    every, path = round(1e-3 / step), [theta.copy()]
-    for index, desired in enumerate(reference, 1):
-        tension = inverse @ (gain * (desired - theta))
-        tension += np.max((minimum - tension) / internal) * internal
-        control[:] = tension[:actuated]
-        mujoco.mj_step(model, data)
-        if index % every == 0:
-            path.append(theta.copy())
-    return np.array(path)
-
-
 @pytest.mark.parametrize(
     "name, overrides",
     [
@@ -141,22 +108,18 @@ def follow(scenario, model, step):
     ids=["fig6", "soft passive tendon", "stick_slip"],
 )
 def test_mujoco_converges_to_our_trajectory_at_the_first_order_of_its_time_step(name, overrides):
-    settings = {"duration": DURATION, "rtol": 1e-9, "atol_scale": 1e-10, "sample_rate": 1000.0}
-    settings = {f"simulation.{key}": value for key, value in settings.items()}
-    scenario = fp.load_scenario(name, {**EXPRESSIBLE, **overrides, **settings})
-    result = fp.simulate(scenario)
+    found = mujoco_motion.converge(name, overrides)
+    result, finger = found.ours, found.scenario.finger
     ours = result["joint_position"].values
     assert abs(ours[-1] - ours[0]).max() > 0.01
     # The cut of a tension at zero and MuJoCo's clamp do not act, and bristles carry nothing.
     assert float(result["tendon_command"].max()) < 100.0
     assert float(result["tendon_tension"].min()) > 0.1
-    velocity = result["joint_velocity"].values @ fp.Finger(scenario.finger).coupling[:4].T
-    drag = np.broadcast_to(scenario.finger.tendon_friction.viscous, 5)[:4] * velocity
+    velocity = result["joint_velocity"].values @ fp.Finger(finger).coupling[:4].T
+    drag = np.broadcast_to(finger.tendon_friction.viscous, 5)[:4] * velocity
     assert abs(result["tendon_friction"].values[:, :4] - drag).max() < 1e-9
-    model = load(to_mjcf(scenario.finger, posture=tuple(ours[0]), shapes=False))
-    errors = np.array([abs(follow(scenario, model, step) - ours).max() for step in STEPS])
-    assert errors[-1] < 5e-5
-    np.testing.assert_allclose(errors[:-1] / errors[1:], 2.0, rtol=0.05)
+    assert found.errors[-1] < 5e-5
+    np.testing.assert_allclose(found.errors[:-1] / found.errors[1:], 2.0, rtol=0.05)
 
 
 @pytest.mark.parametrize("name", list_fingers())

@@ -140,11 +140,16 @@ def _error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
 
 @compiled
 def _worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
-    """Return the index of the state whose error is largest as a multiple of the tolerance."""
+    """Return the index of the first state whose error is no number, else of that with the largest error.
+
+    Errors are compared as multiples of the tolerance.
+    """
     worst, index = -1.0, 0
     for c in range(x.size):
         ratio = abs(difference[c]) / (atol[c] + rtol * abs(x[c]))
-        if not ratio <= worst:
+        if np.isnan(ratio):
+            return c
+        if ratio > worst:
             worst, index = ratio, c
     return index
 

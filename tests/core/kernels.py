@@ -14,6 +14,7 @@ from finger_pin.core.rigid_body import (
     solve_mass,
 )
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
+from finger_pin.core.rosenbrock import _worst
 
 
 @entry
@@ -28,6 +29,12 @@ def rigid(plant, q, v, a, torque, work, bias, needed, acceleration):
     solve_mass(q.size, work, acceleration)
     inverse_dynamics(plant, v, a, work, needed)
     inverse_dynamics_derivatives(plant, v, work)
+
+
+@entry
+def worst(x, difference, rtol, atol):
+    """Return the index of the state that a failure is blamed on."""
+    return _worst(x, difference, rtol, atol)
 
 
 @entry

@@ -4,11 +4,12 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations_with_replacement
 
+import kernels
 import numpy as np
 import pytest
 from core_cases import Case
-from scipy.integrate import solve_ivp
 from test_core_linearisation import pieces
+from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
 from finger_pin.closed_loop import ClosedLoop
@@ -18,8 +19,6 @@ from finger_pin.core.plant import held_control
 
 METHODS = tuple(TABLEAUS)
 ORDER = {"Rodas4": 4, "Rodas5P": 5}
-#: Length of the smooth motion, s.
-END = 5e-3
 
 
 @cache
@@ -102,12 +101,11 @@ def test_trees_are_counted_as_in_the_literature():
 
 
 def test_all_order_conditions_hold_up_to_the_order_and_not_beyond(method, classical):
-    order = ORDER[method]
-    assert TABLEAUS[method]().order == order
-    for size in range(1, order + 1):
+    assert TABLEAUS[method]().order == ORDER[method]
+    for size in range(1, ORDER[method] + 1):
         for tree in trees(size):
             assert abs(classical.defect(classical.weights, tree)) < 1e-12
-    assert max(abs(classical.defect(classical.weights, tree)) for tree in trees(order + 1)) > 1e-6
+    assert max(abs(classical.defect(classical.weights, tree)) for tree in trees(ORDER[method] + 1)) > 1e-6
 
 
 def test_the_embedded_method_has_one_order_less(method, classical):
@@ -145,66 +143,34 @@ def test_the_methods_are_a_stable_and_forget_the_stiffest_parts(classical):
 
 
 @pytest.fixture(scope="module")
-def smooth(scenarios):
-    """A loop with all its friction, moving so that nothing changes sign, slackens or reaches a limit.
-
-    Links a thousand times as heavy and a heavy, soft passive tendon leave nothing stiff at the steps taken here.
-    """
-    table = scenarios["fig6"].model_dump()
-    for joint in table["finger"]["joints"].values():
-        for name in ("mass", "transverse_inertia", "axial_inertia"):
-            joint["link"][name] *= 1e3
-    table["finger"]["gravity"] = (0.0, 0.0, -0.5)
-    table["finger"]["passive_tendon"] = {"stiffness": 500.0, "mass": 1.0}
-    table["controller"]["passive_tension"] = 0.05
-    table["finger"]["tendon_friction"]["stiffness"] = 5e3
-    table["environment"]["fingertip_force"] = [2.0, -3.0, 2.0]
-    case = Case.of(ClosedLoop.from_scenario(fp.Scenario.model_validate(table)))
-    x = case.loop.finger.rest_state(np.array([0.06, 0.3, 0.5, 0.15]))
-    x[4:8] = [1.0, 2.0, 3.0, 5.0]
-    x[9] = 0.5 * (3.5e-3 * x[6] + 5e-3 * x[7])
-    exact = solve_ivp(case.loop.rhs, (0.0, END), x, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=True)
-    return case, x, exact.sol
+def smooth():
+    """A loop with all its friction, moving so that nothing changes sign, slackens or reaches a limit."""
+    return smooth_motion()
 
 
 def test_the_smooth_motion_has_no_kink(smooth):
-    case, _, exact = smooth
     times = np.linspace(0.0, END, 200)
-    assert not np.any(np.ptp(pieces(case, times, exact(times).T), axis=0))
-
-
-def largest(case, error, scale):
-    """The largest error of a kind of state, each over the distance that it moves."""
-    return max(np.abs(error[..., kind]).max() / np.linalg.norm(scale[kind]) for kind in case.kinds)
+    assert not np.any(np.ptp(pieces(Case.of(smooth.loop), times, smooth.exact(times).T), axis=0))
 
 
 def test_steps_on_a_finger_converge_with_the_order_of_the_method(smooth, method):
     """Steps are imposed: tolerances reject none, and every advance is one step."""
-    case, x, exact = smooth
-    moved, errors = exact(END) - x, []
-    for count in (5, 10, 20, 40):
-        stepper = case.stepper(method, rtol=1e6, atol=1e6, x=x, step=END)
-        for k in range(count):
-            assert stepper.advance(END * (k + 1) / count)[0] == rosenbrock.DONE
-        assert stepper.memory[rosenbrock.ACCEPTED] == count
-        errors.append(largest(case, stepper.x - exact(END), moved))
-    order = np.log2(errors[0] / errors[-1]) / 3.0
+    errors = step_errors(smooth, method)
     assert errors[-1] < {"Rodas4": 2e-8, "Rodas5P": 1e-9}[method]
-    assert ORDER[method] - 0.1 < order < ORDER[method] + 0.5
+    assert ORDER[method] - 0.1 < mean_order(errors) < ORDER[method] + 0.5
 
 
 def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
     """Of one step from the same state: the error of an interpolant of order q is h^(q+1)."""
-    case, x, exact = smooth
-    moved, errors = exact(END) - x, []
+    x, errors = smooth.start, []
     for h in (2.5e-4, 1.25e-4, 6.25e-5):
-        stepper = case.stepper(method, rtol=1e6, atol=1e6, x=x, step=h)
+        stepper = smooth.stepper(method, step=h)
         record = (np.zeros(1), np.zeros((1, len(x))), np.zeros((1, len(stepper.tableau.dense), len(x))))
         assert stepper.advance(h, record) == (rosenbrock.DONE, 1)
         between = _interpolant(np.array([0.0, h]), np.stack([x, stepper.x]), record[2])
         times = np.linspace(0.0, h, 9)
         np.testing.assert_allclose(between(times[[0, -1]]), [x, stepper.x], rtol=1e-15, atol=1e-18)
-        errors.append(largest(case, between(times) - exact(times).T, moved))
+        errors.append(smooth.largest(between(times) - smooth.exact(times).T))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - ORDER[method]) < 0.5), (errors, orders)
 
@@ -239,6 +205,17 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
         assert stepper.time == 0.0
         name = case.layout.names[culprit]
         assert stepper.failure(status, case.layout.names).endswith(f"the error is largest in {name}")
+
+
+def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large():
+    """Wherever it stands; else the one with the largest error over its tolerance."""
+    x, atol = np.ones(5), np.array([1.0, 1.0, 1e-3, 1.0, 1.0])
+    difference = np.array([3.0, 9.0, 0.1, 1.0, 2.0])
+    assert kernels.worst(x, difference, 0.0, atol) == 2
+    for place in range(5):
+        broken = difference.copy()
+        broken[place] = np.nan
+        assert kernels.worst(x, broken, 0.0, atol) == place
 
 
 def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_names_the_culprit(cases, method):

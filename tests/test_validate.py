@@ -1,0 +1,163 @@
+"""The validation: how it judges, what it writes, how it ends; and the comparisons that no other test makes."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import validate as script
+from validation import methods, stiffness, symmetry
+from validation.check import Section, Verdict, compare, skipped
+from validation.page import page
+from validation.report import Family, Report, headline, text
+
+
+@pytest.fixture(scope="module")
+def stiffened():
+    return stiffness.stiffen()
+
+
+def test_an_infinitely_stiff_passive_tendon_is_the_gear_of_equation_4(stiffened):
+    """The distance r35 theta3 / r45 - theta4 falls as 1 / K_t."""
+    np.testing.assert_allclose(stiffened.orders, 1.0, atol=0.02)
+    assert stiffened.gap[-1] < 2e-5 < 1e-3 < stiffened.gap[0]
+    # The gear turns meanwhile.
+    assert np.ptp(stiffened.motion[-1, :, 3]) > 0.3
+
+
+def test_the_motion_of_all_joints_settles_in_proportion_to_one_over_the_stiffness(stiffened):
+    assert stiffened.motion_order == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_distance_from_the_gear_is_the_stretch_that_the_tensions_make(stiffened):
+    for each in stiffened.stretch:
+        np.testing.assert_allclose(each.measured, each.expected, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("scenario", methods.WINDOWS)
+def test_every_method_converges_to_one_motion_as_its_tolerance_shrinks(scenario, monkeypatch):
+    """From 1e-4 to 1e-8, 30 times nearer at least for every hundredth, and all end within 2e-8 rad of one truth."""
+    monkeypatch.setitem(methods.WINDOWS, scenario, 0.3 * methods.WINDOWS[scenario])
+    found = list(methods.approaches(scenario))
+    assert {each.method for each in found} == set(filter(methods.available, methods.METHODS))
+    for each in found:
+        assert each.errors[-1] < methods.LIMIT, each
+        assert each.errors[0] > methods.GAIN**2 * each.errors[2], each
+        assert sorted(each.errors, reverse=True) == list(each.errors), each
+
+
+@pytest.mark.parametrize(
+    ("measured", "known", "verdict"),
+    [
+        (1.0, 0.0, Verdict.PASS),
+        (1.1, 0.0, Verdict.PASS),
+        (1.11, 0.0, Verdict.FAIL),
+        (0.8, 0.3, Verdict.DIFFERS),
+        (0.6, 0.3, Verdict.FAIL),
+        (np.nan, 0.3, Verdict.FAIL),
+        (np.inf, 0.3, Verdict.FAIL),
+    ],
+)
+def test_a_number_passes_within_its_tolerance_and_differs_only_as_far_as_is_known(measured, known, verdict):
+    found = compare("x", "y", measured, 0.1 + 1e-12, "1", expected=1.0, known=known)
+    assert found.verdict is verdict
+
+
+def family(*checks):
+    return Family("one", "One & all", "What <this> is.", Section.of(checks))
+
+
+PASSING = compare("length", "a ruler", 1.0, 0.1, "m", expected=1.05)
+FAILING = compare("width <b>", "a ruler", 2.0, 0.1, "m", expected=1.0)
+ODD = compare("depth", "a book", 2.0, 0.1, "m", expected=1.5, known=1.0, note="a known misprint")
+LEFT_OUT = skipped("weight", "a balance", "there is no balance")
+
+
+def test_the_summary_counts_every_outcome_and_tells_what_did_not_pass():
+    report = Report((family(PASSING, FAILING, ODD, LEFT_OUT),), "today", {})
+    assert headline(report) == "1 of 4 checks pass, 1 differs by a known amount, 1 skipped, 1 FAIL"
+    told = text(report)
+    for says in ("fail: width <b>: 2 m, a ruler: 1 m", "differs: depth", "a known misprint", "there is no balance"):
+        assert says in told
+    assert "length" not in told
+
+
+def test_the_page_needs_nothing_else_and_escapes_what_it_shows():
+    found = page(Report((family(PASSING, FAILING, LEFT_OUT),), "today", {"pin": "4", "mujoco": None}), "1 of 3")
+    assert not re.search(r"(src|href)=\"(?!data:|#)", found)
+    assert "width &lt;b&gt;" in found and "One &amp; all" in found and "<this>" not in found
+    assert "Not installed: mujoco" in found
+
+
+@pytest.fixture
+def run(tmp_path, capsys):
+    """Run the script; return exit code, standard output and standard error."""
+
+    def run(*arguments):
+        try:
+            code = script.main([*arguments, "--output", str(tmp_path / "out")])
+        except SystemExit as end:
+            code = end.code
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run
+
+
+def test_a_validation_writes_a_page_with_its_figures_and_the_same_as_data(run, tmp_path):
+    code, out, err = run("--only", "kinematics,order")
+    assert (code, err) == (0, "")
+    assert "all" not in out and "10 of 10 checks pass" in out
+    found = (tmp_path / "out" / "validation.html").read_text(encoding="utf-8")
+    assert "data:image/png;base64," in found and "equation (1)" in found
+    data = json.loads((tmp_path / "out" / "validation.json").read_text(encoding="utf-8"))
+    assert data["counts"] == {"pass": 10, "differs": 0, "skipped": 0, "fail": 0}
+    assert {each["family"] for each in data["checks"]} == {"kinematics", "order"}
+    assert all(abs(each["measured"] - each["expected"]) <= each["tolerance"] for each in data["checks"])
+    assert data["versions"]["pin"]
+
+
+def test_a_failed_check_ends_with_1_and_is_in_the_report(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(symmetry, "measure", lambda: Section.of([PASSING, FAILING]))
+    code, out, _ = run("--only", "symmetry")
+    assert code == 1
+    assert "fail: width" in out
+    assert "1 FAIL" in (tmp_path / "out" / "validation.html").read_text(encoding="utf-8")
+
+
+def test_a_known_difference_or_a_missing_package_is_no_failure(run, monkeypatch):
+    monkeypatch.setattr(symmetry, "measure", lambda: Section.of([PASSING, ODD, LEFT_OUT]))
+    assert run("--only", "symmetry")[0] == 0
+
+
+def test_an_interrupted_validation_writes_nothing(run, tmp_path, monkeypatch):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(symmetry, "measure", interrupted)
+    code, out, err = run("--only", "symmetry")
+    assert (code, out) == (130, "")
+    assert "interrupted" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_family_that_does_not_exist_is_named_with_the_nearest(run):
+    code, _, err = run("--only", "kinematic")
+    assert code == 2
+    assert "did you mean kinematics?" in err
+
+
+def test_every_family_has_a_module_with_a_title(monkeypatch):
+    for name in script.FAMILIES.values():
+        module = script.import_module(f"validation.{name}")
+        assert module.TITLE and module.measure.__doc__
+
+
+def test_where_mujoco_is_missing_its_family_says_so_in_a_line(monkeypatch):
+    from validation import mujoco_motion
+
+    monkeypatch.setattr(mujoco_motion.importlib.util, "find_spec", lambda name: None)
+    (check,) = mujoco_motion.measure().checks
+    assert check.verdict is Verdict.SKIPPED
+    assert check == replace(check, note="mujoco is not installed")
