@@ -8,9 +8,9 @@ import numpy as np
 
 from finger_pin.blocks.controller import ControlSignals
 from finger_pin.blocks.reference import ReferenceSignals
-from finger_pin.controllers.distribution import Distribution, Plan
+from finger_pin.controllers.distribution import Distribution
 from finger_pin.controllers.joint_compensation import JointCompensation
-from finger_pin.controllers.tendon_feedforward import TendonFeedforward
+from finger_pin.controllers.tendon_feedforward import TendonFeedforward, undivided
 from finger_pin.controllers.torque import TorqueLaw
 from finger_pin.routing import Array, Routing
 
@@ -56,8 +56,11 @@ class CompensatedController:
         plan = self.distribution.plan(wanted, minimum)
         torque = wanted
         if self.tendons is not None or self.joints is not None:
+            matrix = self._friction_matrix(position, reference.velocity)
+            if self.joints is not None:
+                wanted = wanted + self.joints.viscous_torque(reference.velocity)
             for _ in range(_TURNS):
-                torque = wanted + self._friction(plan, position, reference.velocity)
+                torque = wanted + (matrix @ plan.tension[..., None])[..., 0]
                 last, plan = plan, self.distribution.plan(torque, minimum)
                 change = np.abs(plan.tension - last.tension)
                 if not np.any(change > _SETTLED * np.max(plan.tension, axis=-1, keepdims=True)):
@@ -67,16 +70,13 @@ class CompensatedController:
             command = self.tendons.command(command, position, reference.velocity)
         return ControlSignals(torque, command, plan.shortfall)
 
-    def _friction(self, plan: Plan, position: Array, desired_velocity: Array) -> Array:
-        """Return the torque that overcomes the friction of joints and passive tendons, shape (..., n), N m."""
+    def _friction_matrix(self, position: Array, desired_velocity: Array) -> Array:
+        """Return what f_hat adds to the torque by friction of joints and passive tendons, shape (..., n, t), m."""
         routing = self.routing
-        if self.tendons is None:
-            mean = plan.tension[..., routing.actuated :]
-            strands = np.concatenate([plan.tension[..., : routing.actuated], np.repeat(mean, 2, axis=-1)], axis=-1)
-            torque = np.zeros_like(position)
-        else:
-            strands = self.tendons.strands(plan.tension, position, desired_velocity)
-            torque = plan.tension @ routing.coupling - strands @ routing.strand_coupling
+        strands = undivided(routing)
+        if self.tendons is not None:
+            strands = self.tendons.strand_matrix(position, desired_velocity)
+        matrix = routing.coupling.T - routing.strand_coupling.T @ strands
         if self.joints is not None:
-            torque = torque + self.joints.torque(strands, desired_velocity)
-        return torque
+            matrix = matrix + self.joints.load_matrix(strands, desired_velocity)
+        return matrix

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from finger_pin.blocks.joint_friction import JointFriction, joint_reaction
+from finger_pin.blocks.joint_friction import JointFriction
 from finger_pin.controllers.direction import signed_coefficient
 from finger_pin.routing import Array
 
@@ -26,17 +26,22 @@ class JointCompensation:
     share: float
     reversal_speed: float
 
-    def torque(self, strands: Array, desired_velocity: Array) -> Array:
-        """Return the torque, shape (..., n), N m.
+    def load_matrix(self, strand_matrix: Array, desired_velocity: Array) -> Array:
+        """Return what planned tensions add to the torque, shape (..., n, t), m: M(v) direction(v) dR/df_hat.
+
+        Tensions are not negative, so that without an external force R = S, the sum of those that cross the joint.
 
         Args:
-            strands: Planned tensions of the strands, shape (..., s), N.
+            strand_matrix: W, shape (..., s, t); the tensions of the strands are W f_hat.
             desired_velocity: theta^d', shape (..., n), rad/s.
         """
         law = self.friction
         coefficient = signed_coefficient(
             desired_velocity, law.kinetic, law.static, law.stribeck_velocity, law.stribeck_exponent, self.reversal_speed
         )
-        reaction = joint_reaction(strands @ law.loads.T, 0.0, 0.0)
-        torque: Array = self.share * (coefficient * reaction + law.viscous * desired_velocity)
-        return torque
+        matrix: Array = self.share * coefficient[..., None] * (law.loads @ strand_matrix)
+        return matrix
+
+    def viscous_torque(self, desired_velocity: Array) -> Array:
+        """Return b v, shape (..., n), N m."""
+        return self.share * self.friction.viscous * desired_velocity

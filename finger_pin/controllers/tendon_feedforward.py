@@ -8,10 +8,16 @@ import numpy as np
 
 from finger_pin.blocks.tendons import Tendons, capstan_coefficient
 from finger_pin.controllers.direction import signed_coefficient
-from finger_pin.routing import Array
+from finger_pin.routing import Array, Routing
 
 # A tendon whose friction exceeds its tension cannot be moved by pulling harder: compensation stops short of that.
 _MOST = 0.9
+
+
+def undivided(routing: Routing) -> Array:
+    """Return W, shape (s, t), without friction: both halves of a passive tendon carry what is planned for it."""
+    tendons = np.eye(len(routing.tendons))
+    return np.concatenate([tendons[: routing.actuated], np.repeat(tendons[routing.actuated :], 2, axis=0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +65,16 @@ class TendonFeedforward:
         command = np.maximum(0.0, delivered + self.share * (needed - delivered))
         return np.concatenate([command, planned[..., actuated:]], axis=-1)
 
-    def strands(self, planned: Array, position: Array, desired_velocity: Array) -> Array:
-        """Return the tensions of all strands, shape (..., s), N, when the planned ones are delivered."""
-        actuated = self.tendons.routing.actuated
-        x = self.share * self.coefficient(position, desired_velocity)[..., actuated:]
-        mean = planned[..., actuated:]
-        halves = np.stack([mean * (1.0 + x), mean * (1.0 - x)], axis=-1)
-        return np.concatenate([planned[..., :actuated], halves.reshape(*mean.shape[:-1], -1)], axis=-1)
+    def strand_matrix(self, position: Array, desired_velocity: Array) -> Array:
+        """Return W, shape (..., s, t): the tensions of the strands are W f_hat when what is planned is delivered."""
+        routing = self.tendons.routing
+        plain = undivided(routing)
+        rows = np.arange(routing.actuated, len(plain))
+        columns = np.argmax(plain[rows], axis=1)
+        x = self.share * self.coefficient(position, desired_velocity)[..., columns]
+        matrix = np.broadcast_to(plain, (*position.shape[:-1], *plain.shape)).copy()
+        matrix[..., rows, columns] += np.where((rows - routing.actuated) % 2 == 0, x, -x)
+        return matrix
 
     def _velocity(self, desired_velocity: Array) -> Array:
         """Return v of the tendons, shape (..., t), m/s; that of a passive one is its middle's, both halves alike."""
