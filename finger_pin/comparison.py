@@ -44,7 +44,7 @@ CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "paper, f5d 4 N": {**_SAMPLED, **_TAUT},
         "all friction, f5d 4 N": {**_BOTH, **_TAUT},
         "all friction, f5d 4 N, loop": {**_BOTH, **_TAUT, **_LOOP},
-        "the same, real sensors and delay": {**_BOTH, **_TAUT, **_LOOP, **_REAL},
+        "the same, late, real sensors": {**_BOTH, **_TAUT, **_LOOP, **_REAL},
         "paper, f0 0.5 N": {**_SAMPLED, **_LOW},
         "all friction, f0 0.5 N": {**_BOTH, **_LOW},
     }

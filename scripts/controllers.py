@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import xarray as xr
+from rich import box
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -21,6 +22,9 @@ from finger_pin.plots.controllers import plot_controllers
 from finger_pin.routing import Routing
 from finger_pin.simulation import simulate
 
+WIDTH = 100
+TITLE = "Controllers on fig6, after the first second"
+CAPTION = "error: rms; by T5: of it, the passive tendon's stretch; peak, mean: commands; mJ: lost by friction; f5: mean"
 DRAWN = ("paper", "all friction", "all friction, f5d 4 N, loop")
 
 
@@ -53,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"controllers.py: interrupted; the rows so far are in {folder}", file=sys.stderr)
         return 130
-    Console().print(table(rows))
+    Console(width=max(Console().width, WIDTH)).print(table(rows))
     print(f"Table and figure are in {folder}")
     return 0
 
@@ -74,19 +78,27 @@ def runs():
 def table(rows: list[Comparison]) -> Table:
     """Return the comparison as a table; ratios are to the first row."""
     first = rows[0]
-    shown = Table(title="Controllers on fig6, after the first second", caption="peak and mean: commands; f5: delivered")
-    shown.add_column("controller")
-    for header in (
-        "rms deg", "times less", "by T5", "per joint", "peak N", "ratio", "mean N", "tendons mJ", "joints mJ", "f5 N"
-    ):  # fmt: skip
-        shown.add_column(header, justify="right")
+    shown = Table(title=TITLE, caption=CAPTION, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title_justify="left")
+    shown.add_column("controller", no_wrap=True)
+    headers = (
+        "error\ndeg",
+        "times\nless",
+        "by T5\ndeg",
+        "peak\nN",
+        "times",
+        "mean\nN",
+        "tendons\nmJ",
+        "joints\nmJ",
+        "f5\nN",
+    )
+    for header in headers:
+        shown.add_column(header, justify="right", no_wrap=True)
     for row in rows:
         shown.add_row(
             row.name,
             f"{row.error:.3f}",
             f"{first.error / row.error:.1f}",
             f"{row.passive_error:.3f}",
-            " ".join(f"{value:.2f}" for value in row.joint_error),
             f"{row.peak_tension:.2f}",
             f"{row.peak_tension / first.peak_tension:.2f}",
             f"{row.mean_tension:.2f}",

@@ -8,14 +8,14 @@ import numpy as np
 
 from finger_pin.blocks.controller import ControlSignals
 from finger_pin.blocks.reference import ReferenceSignals
-from finger_pin.controllers.distribution import Distribution
+from finger_pin.controllers.distribution import Distribution, Plan
 from finger_pin.controllers.joint_compensation import JointCompensation
 from finger_pin.controllers.tendon_feedforward import TendonFeedforward, undivided
 from finger_pin.controllers.torque import TorqueLaw
 from finger_pin.routing import Array, Routing
 
-# The loop through the joints' friction settles by a factor of two to four at every turn.
-_SETTLED, _TURNS = 1e-9, 200
+# Newton's method is done in a few turns; should it go round in circles, plain turns take over.
+_SETTLED, _NEWTON, _TURNS = 1e-9, 20, 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,8 @@ class CompensatedController:
     """A controller with the face of the paper's, and any of the compensations.
 
     The torque that the tendons have to exert is tau = tau^d + tau^f(f_hat): friction of the joints grows with the
-    tensions, and the tensions with the torque that overcomes it. The two are made to agree by turns; below the
-    critical joint friction (`critical_friction`) they do.
+    tensions, and the tensions with the torque that overcomes it. Below the critical joint friction
+    (`critical_friction`) there are tensions at which the two agree, and these are commanded.
 
     Attributes:
         routing: The routing.
@@ -54,21 +54,33 @@ class CompensatedController:
         """Return the commands with another minimum f0, shape (t,), N."""
         wanted = self.law.torque(reference, position, velocity)
         plan = self.distribution.plan(wanted, minimum)
-        torque = wanted
         if self.tendons is not None or self.joints is not None:
-            matrix = self._friction_matrix(position, reference.velocity)
             if self.joints is not None:
                 wanted = wanted + self.joints.viscous_torque(reference.velocity)
-            for _ in range(_TURNS):
-                torque = wanted + (matrix @ plan.tension[..., None])[..., 0]
-                last, plan = plan, self.distribution.plan(torque, minimum)
-                change = np.abs(plan.tension - last.tension)
-                if not np.any(change > _SETTLED * np.max(plan.tension, axis=-1, keepdims=True)):
-                    break
+            matrix = self._friction_matrix(position, reference.velocity)
+            wanted, plan = self._closed(wanted, matrix, minimum, plan)
         command = plan.tension
         if self.tendons is not None:
             command = self.tendons.command(command, position, reference.velocity)
-        return ControlSignals(torque, command, plan.shortfall)
+        return ControlSignals(wanted, command, plan.shortfall)
+
+    def _closed(self, wanted: Array, matrix: Array, minimum: Array, plan: Plan) -> tuple[Array, Plan]:
+        """Return the torque and the plan that agree: tau = wanted + matrix f_hat, and f_hat is the plan for tau.
+
+        Newton's method: between changes of the tendons that are at a limit, all is linear.
+        """
+        tension: Array = plan.tension
+        identity = np.eye(tension.shape[-1])
+        for turn in range(_TURNS):
+            torque = wanted + (matrix @ tension[..., None])[..., 0]
+            plan = self.distribution.plan(torque, minimum)
+            gap: Array = plan.tension - tension
+            if not np.any(np.abs(gap) > _SETTLED * np.max(plan.tension, axis=-1, keepdims=True)):
+                break
+            if turn < _NEWTON:
+                gap = np.asarray(np.linalg.solve(identity - plan.slope @ matrix, gap[..., None])[..., 0], dtype=float)
+            tension = tension + gap
+        return torque, plan
 
     def _friction_matrix(self, position: Array, desired_velocity: Array) -> Array:
         """Return what f_hat adds to the torque by friction of joints and passive tendons, shape (..., n, t), m."""

@@ -18,10 +18,12 @@ class Plan:
     Attributes:
         tension: f_hat, shape (..., t), N; H_c^T f_hat is the wanted torque less the shortfall.
         shortfall: What limits keep from being exerted, shape (..., n), N m.
+        slope: df_hat / dtau while the same tendons are at their limits, shape (..., t, n), 1/m.
     """
 
     tension: Array
     shortfall: Array
+    slope: Array
 
 
 class Distribution(Protocol):
@@ -51,5 +53,9 @@ class PseudoInverse:
     def plan(self, torque: Array, minimum: Array) -> Plan:
         """Return f_hat of (21) with lambda of (22); nothing is short."""
         minimal = torque @ self.inverse.T
-        level = np.max(internal_level(minimum, minimal, self.internal), axis=-1, keepdims=True)
-        return Plan(minimal + level * self.internal, np.zeros_like(torque))
+        levels = internal_level(minimum, minimal, self.internal)
+        tight = np.argmax(levels, axis=-1)
+        level = np.take_along_axis(levels, tight[..., None], axis=-1)
+        raised = self.inverse[tight] / self.internal[tight][..., None]
+        slope = self.inverse - self.internal[:, None] * raised[..., None, :]
+        return Plan(minimal + level * self.internal, np.zeros_like(torque), slope)

@@ -21,6 +21,8 @@ from finger_pin.routing import Array, Routing
 
 # The solver meets feasible programmes of this size in about ten iterations.
 _ACCURACY, _ITERATIONS = 1e-10, 300
+# So near to a limit, N, a tension is at it.
+_TIGHT = 1e-6
 
 
 class LimitedDistribution:
@@ -55,8 +57,20 @@ class LimitedDistribution:
         wanted = torque.reshape(-1, joints)
         floors = np.minimum(np.broadcast_to(minimum, (*torque.shape[:-1], tendons)), self.maximum)
         rows = [self._one(each, floor) for each, floor in zip(wanted, floors.reshape(-1, tendons), strict=True)]
-        tension = np.array([row[0] for row in rows]).reshape(floors.shape)
-        return Plan(tension, np.array([row[1] for row in rows]).reshape(torque.shape))
+        tension = np.array([row[0] for row in rows])
+        free = (tension > floors.reshape(-1, tendons) + _TIGHT) & (tension < self.maximum - _TIGHT)
+        slope = np.array([self._slope(each) for each in free])
+        return Plan(
+            tension.reshape(floors.shape),
+            np.array([row[1] for row in rows]).reshape(torque.shape),
+            slope.reshape(*floors.shape, joints),
+        )
+
+    def _slope(self, free: Array) -> Array:
+        """Return df / dtau when only the tensions that are free may change, shape (t, n), 1/m."""
+        slope = np.zeros(self._shape[::-1])
+        slope[free] = np.linalg.pinv(self._matrix[:, free]) / self._scale
+        return slope
 
     def _one(self, torque: Array, minimum: Array) -> tuple[Array, Array]:
         wanted = torque / self._scale

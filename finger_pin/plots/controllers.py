@@ -45,7 +45,7 @@ def plot_controllers(results: dict[str, xr.Dataset], rows: Sequence[Comparison])
         [row.passive_error for row in rows],
         color=ORANGE,
         height=0.66,
-        label="of it, by passive stretch",
+        label="passive stretch",
     )
     left.legend(loc="lower right")
     _bars(right, rows, [row.peak_tension for row in rows], BLUE, "peak command (N)", ".2f")
