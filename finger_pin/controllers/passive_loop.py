@@ -21,7 +21,7 @@ class PassiveTensionLoop(MeasuringController):
         f0_5 = max(f0_5, f5^d + k_P e + I),   I' = k_I e,   e = f5^d - f5.
 
     Where the other tendons' f0 asks for more internal tension than the wish does, (22) has its way and f5 stays above
-    the wish; the integral stops at its limit then. It lasts from sample to sample: one object for each simulation.
+    the wish; the integral stops at f0_5 or at its limit. It lasts from sample to sample: one object, one simulation.
 
     Attributes:
         controller: The controller whose internal tension is set.
@@ -44,8 +44,11 @@ class PassiveTensionLoop(MeasuringController):
 
     def sense(self, tension: Array, elapsed: float) -> None:
         """Take measured tensions, shape (t,), N, of which the passive ones count, and the time since the last, s."""
-        error = self.wish - tension[self.controller.routing.actuated :]
-        self._sum = np.clip(self._sum + self.integral * elapsed * error, -self.limit, self.limit)
+        actuated = self.controller.routing.actuated
+        error = self.wish - tension[actuated:]
+        # Below its own f0 a wish has no effect, and an integral that went there would take time to come back.
+        lowest = np.clip(self.controller.minimum[actuated:] - self.wish, -self.limit, 0.0)
+        self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)
         self.correction = self.proportional * error + self._sum
 
     def command(

@@ -45,6 +45,14 @@ def test_the_integral_stops_at_its_limit_and_leaves_it_at_once():
     assert controller.correction[0] == pytest.approx(0.6)
 
 
+def test_the_integral_does_not_go_below_what_has_an_effect():
+    """f0 of T5 is 1 N and the wish 5 N: less than -4 N would change nothing but the time to come back."""
+    controller = loop(integral=10.0, limit=100.0)
+    for _ in range(50):
+        controller.sense(measured(9.0), 0.1)
+    assert controller.correction[0] == pytest.approx(-4.0)
+
+
 def test_the_wish_and_its_correction_are_what_is_planned_for_the_passive_tendon():
     """Without a torque all tensions are internal, in the ratio (1, 1, 4.32, 3.02, 3.20), here for 5 N and for 6 N."""
     controller = loop(proportional=0.5, integral=0.0)
