@@ -97,14 +97,14 @@ class Routing:
         """Rows of H_c2 of the distal halves of the passive tendons, shape (p, n), m."""
         return self.strand_coupling[self.actuated + 1 :: 2]
 
+    def force_closure(self) -> ForceClosure:
+        """Report whether tensions exist that are all positive and turn no joint."""
+        return ForceClosure.of(self.coupling, self.tendons)
+
     def tendon_tension(self, strands: Array) -> Array:
         """Return the delivered tension of every tendon, shape (..., t), of strands (..., s): a passive one's distal."""
         distal = strands[..., self.actuated + 1 :: 2]
         return np.concatenate([strands[..., : self.actuated], distal], axis=-1)
-
-    def force_closure(self) -> ForceClosure:
-        """Report whether tensions exist that are all positive and turn no joint."""
-        return ForceClosure.of(self.coupling, self.tendons)
 
 
 @dataclass(frozen=True, eq=False)
