@@ -22,6 +22,16 @@ if TYPE_CHECKING:
         self_locking_margin,
         tension_for_force,
     )
+    from finger_pin.controllers import (
+        CompensatedController,
+        JointCompensation,
+        PassiveTensionLoop,
+        PseudoInverse,
+        TendonFeedforward,
+        TorqueLaw,
+        build_controller,
+    )
+    from finger_pin.controllers.limited_distribution import LimitedDistribution
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
@@ -33,6 +43,14 @@ if TYPE_CHECKING:
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
+    "CompensatedController": "controllers",
+    "JointCompensation": "controllers",
+    "LimitedDistribution": "controllers.limited_distribution",
+    "PassiveTensionLoop": "controllers",
+    "PseudoInverse": "controllers",
+    "TendonFeedforward": "controllers",
+    "TorqueLaw": "controllers",
+    "build_controller": "controllers",
     "Finger": "finger",
     "LiveView": "viewer",
     "Simulator": "simulator",
@@ -58,15 +76,23 @@ _LATER = {
 }
 
 __all__ = [
+    "CompensatedController",
     "Finger",
     "FingerDescription",
     "FingerPinError",
     "InputError",
     "IntegrationError",
     "Interrupted",
+    "JointCompensation",
+    "LimitedDistribution",
     "LiveView",
+    "PassiveTensionLoop",
+    "PseudoInverse",
     "Scenario",
     "Simulator",
+    "TendonFeedforward",
+    "TorqueLaw",
+    "build_controller",
     "critical_friction",
     "draw_all",
     "force_polytope",

@@ -10,6 +10,7 @@ import numpy as np
 from finger_pin.blocks.controller import Controller, ControlSignals
 from finger_pin.blocks.reference import ReferenceSignals
 from finger_pin.blocks.rigid_body import Motion
+from finger_pin.controllers import build_controller
 from finger_pin.finger import Finger, FingerSignals
 from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
@@ -67,7 +68,7 @@ class ClosedLoop:
         finger = Finger(scenario.finger)
         return cls(
             finger=finger,
-            controller=controller or scenario.build_controller(finger.routing),
+            controller=controller or build_controller(scenario, finger),
             reference=reference or scenario.build_reference(finger.routing),
             fingertip_force=np.array(scenario.environment.fingertip_force),
             dynamics=finger,

@@ -95,7 +95,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     finger, tendons, joints, state = signals.finger, signals.finger.tendons, signals.finger.joints, signals.finger.state
     actuated, passive = loop.finger.routing.actuated, loop.finger.routing.passive
     halves = tendons.strands[..., actuated:]
-    tension = np.concatenate([tendons.strands[..., :actuated], halves[..., 1::2]], axis=-1)
+    tension = loop.finger.routing.tendon_tension(tendons.strands)
     error = signals.reference.position - state.position
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
@@ -120,6 +120,9 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
+    if signals.control.shortfall is not None:
+        text = "desired torque that tension limits keep from being planned"
+        table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)
     if passive:
         shared = {
             "passive_tension_proximal": (halves[..., 0::2], "N", "tension of the proximal half", "12"),

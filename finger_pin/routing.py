@@ -106,6 +106,11 @@ class Routing:
         """Report whether tensions exist that are all positive and turn no joint."""
         return ForceClosure.of(self.coupling, self.tendons)
 
+    def tendon_tension(self, strands: Array) -> Array:
+        """Return the delivered tension of every tendon, shape (..., t), of strands (..., s): a passive one's distal."""
+        distal = strands[..., self.actuated + 1 :: 2]
+        return np.concatenate([strands[..., : self.actuated], distal], axis=-1)
+
 
 @dataclass(frozen=True, eq=False)
 class ForceClosure:

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from finger_pin.blocks.controller import ProportionalController
 from finger_pin.blocks.reference import HarmonicReference, PassiveCoupling
+from finger_pin.controller_settings import ControllerSettings, check_controller
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
 from finger_pin.routing import Array, Routing
 from finger_pin.validation import (
     Description,
     Name,
-    Numbers,
-    check_size,
     choice,
     expand,
     problem,
     quantity,
     real,
-    reals,
     vector,
 )
 
@@ -31,23 +29,6 @@ from finger_pin.validation import (
 METHODS_IN_NUMPY = ("Radau", "BDF", "LSODA")
 METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
 MOST_SAMPLES = 5_000_000
-
-
-class ControllerSettings(Description):
-    """The paper's controller (19)-(22)."""
-
-    kind: Annotated[Literal["proportional"], choice("proportional")] = quantity(
-        "proportional", unit="1", source="(19)", doc="Which controller."
-    )
-    gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
-        1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
-    )
-    minimum_tension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
-        1.0, unit="N", source="chosen", doc="f0, one number or one per tendon."
-    )
-    passive_tension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
-        1.0, unit="N", source="chosen", doc="f5^d, one number or one per passive tendon."
-    )
 
 
 class JointReference(Description):
@@ -111,10 +92,8 @@ class Scenario(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        finger, control = self.finger, self.controller
-        check_size(control.gain, tuple(finger.joints), "controller.gain", "joint")
-        check_size(control.minimum_tension, tuple(finger.tendons), "controller.minimum_tension", "tendon")
-        check_size(control.passive_tension, finger.passive_names, "controller.passive_tension", "passive tendon")
+        finger = self.finger
+        check_controller(self.controller, finger)
         routing = Routing.from_description(finger)
         closure = routing.force_closure()
         if not closure.holds:
@@ -143,7 +122,10 @@ class Scenario(Description):
         )
 
     def build_controller(self, routing: Routing) -> ProportionalController:
-        """Return the controller block for this scenario's finger."""
+        """Return the paper's controller block (19)-(22) for this scenario's finger, without what is built around it.
+
+        `controllers.build_controller` returns the whole.
+        """
         gain = expand(self.controller.gain, len(routing.joints))
         minimum = expand(self.controller.minimum_tension, len(routing.tendons))
         return ProportionalController.from_routing(routing, gain, minimum)

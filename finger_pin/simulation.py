@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,6 +12,8 @@ import xarray as xr
 from finger_pin.blocks.controller import Controller, ProportionalController
 from finger_pin.blocks.reference import HarmonicReference
 from finger_pin.closed_loop import ClosedLoop, LoopSignals, Reference
+from finger_pin.controller_settings import SamplingSettings
+from finger_pin.controllers.measurement import MeasuringController
 from finger_pin.core.finger import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
 from finger_pin.core.plant import Control, build_control, held_control
@@ -40,16 +43,18 @@ def simulate(
 ) -> xr.Dataset:
     """Simulate a scenario from rest on its reference.
 
-    The compiled methods run without Python inside as long as controller and reference are the scenario's own. A
-    controller or reference of one's own is Python: with a ``control_period`` it is sampled and held, and the compiled
-    core runs between the samples; without one it acts continuously, which calls it at every evaluation of scipy's
-    Radau method and is much slower.
+    The compiled methods run without Python inside as long as controller and reference are the paper's. A controller or
+    reference of one's own is Python, and so is what a scenario adds to the paper's controller: with a
+    ``control_period``, or ``controller.sampling`` in the scenario, it is sampled and held, and the compiled core runs
+    between the samples; without one it acts continuously, which calls it at every evaluation of scipy's Radau method:
+    that takes seconds for a simulated second.
 
     Args:
         scenario: What to simulate, from `load_scenario`.
         controller: Replaces the scenario's controller.
         reference: Replaces the scenario's reference.
-        control_period: Sampling period of the controller, s; by default it is continuous. Compiled methods only.
+        control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
+            without either it is continuous. Compiled methods only.
         progress: Called with the simulated time, s, now and then.
         observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
@@ -58,22 +63,21 @@ def simulate(
         Every signal of the model at the scenario's sample rate, and the energy account.
 
     Raises:
-        InputError: If the control period is not positive, or the method cannot sample.
+        InputError: If the control period is not positive, the method cannot sample, or the controller must be sampled.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
     """
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
-    if control_period is not None:
-        if not control_period > 0.0:
-            raise InputError("control_period", "must be above 0", control_period)
-        if method not in TABLEAUS:
-            raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
-        loop = replace(loop, controller=SampledController(loop, control_period))
-    elif method in TABLEAUS and _control(loop) is None:
+    sampling = _sampling(scenario, control_period)
+    if sampling is None and isinstance(loop.controller, MeasuringController):
+        raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
+    if sampling is None and method in TABLEAUS and _control(loop) is None:
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
         loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
+    if sampling is not None:
+        loop = replace(loop, controller=SampledController(loop, sampling))
 
     def watch(time: float, x: Array) -> None:
         if progress is not None:
@@ -112,6 +116,18 @@ def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
     return result, excess
 
 
+def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:
+    """Return how the controller is sampled, or None if it is continuous."""
+    settings, method = scenario.controller.sampling, scenario.simulation.method
+    if period is not None and not 0.0 < period < math.inf:
+        raise InputError("control_period", "must be above 0", period)
+    if (settings is not None or period is not None) and method not in TABLEAUS:
+        raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
+    if period is None:
+        return settings
+    return (settings or SamplingSettings()).model_copy(update={"period": float(period)})
+
+
 def _control(loop: ClosedLoop) -> Control | None:
     """Return the loop's controller and reference as arrays, or None if they are Python."""
     controller, reference = loop.controller, loop.reference
@@ -127,13 +143,11 @@ def _integrate(
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
         plant = loop.dynamics.plant
-        sampled = controller if isinstance(controller, SampledController) else None
         return integrate_compiled(
             Stepper(plant, _control(loop) or held_control(plant), start, TABLEAUS[method](), settings.rtol, atol),
             settings.duration,
             loop.finger.layout.names,
-            period=sampled.period if sampled else None,
-            sample=sampled.sample if sampled else None,
+            held=controller if isinstance(controller, SampledController) else None,
             watch=watch,
             chunk=chunk,
             stop=stop,

@@ -28,10 +28,12 @@ class ControlSignals:
     Attributes:
         torque: tau^d, shape (..., n), N m.
         tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
+        shortfall: What tension limits keep from being exerted of tau^d, shape (..., n), N m; None without limits.
     """
 
     torque: Array
     tension: Array
+    shortfall: Array | None = None
 
 
 class Controller(Protocol):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -20,6 +21,17 @@ TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": roda
 _FIRST_STEP = 1e-6
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
+
+
+class Held(Protocol):
+    """A controller that sets tensions at instants of its own and holds them in between."""
+
+    @property
+    def instant(self) -> float:
+        """The next time at which it is to act, s; later after every act."""
+
+    def act(self, x: Array) -> Array:
+        """Return the tensions from this instant on, shape (a,), at the packed state."""
 
 
 class Stepper:
@@ -134,8 +146,7 @@ def integrate_compiled(
     duration: float,
     names: tuple[str, ...],
     *,
-    period: float | None = None,
-    sample: Callable[[float, Array], Array] | None = None,
+    held: Held | None = None,
     watch: Watch | None = None,
     chunk: int = 256,
     stop: Stop | None = None,
@@ -146,8 +157,7 @@ def integrate_compiled(
         stepper: Where to start, with which method and tolerances.
         duration: s.
         names: Names of the numbers of the state, for messages.
-        period: Sampling period of a controller that holds its tensions in between, s.
-        sample: That controller: maps time and state to tensions, shape (a,).
+        held: A controller that holds its tensions in between.
         watch: Called with the simulated time and the state after every chunk of steps.
         chunk: Most steps between two calls.
         stop: Asked now and then; true ends the integration there.
@@ -158,15 +168,14 @@ def integrate_compiled(
     start, size = stepper.x.copy(), len(stepper.x)
     record = (np.zeros(chunk), np.zeros((chunk, size)), np.zeros((chunk, len(stepper.tableau.dense), size)))
     kept: tuple[list[Array], list[Array], list[Array]] = ([np.zeros(1)], [start[None]], [])
-    reason, interrupted, samples, taken = "", False, 0, 0
+    reason, interrupted, taken = "", False, 0
     most = int(_MOST_BYTES / (8 * size * (1 + len(stepper.tableau.dense))))
     while stepper.time < duration and not reason and not interrupted:
         end = duration
-        if period is not None and sample is not None:
-            if stepper.time >= samples * period:
-                stepper.control.tension[:] = sample(samples * period, stepper.x)
-                samples += 1
-            end = min(duration, samples * period)
+        if held is not None:
+            if stepper.time >= held.instant:
+                stepper.control.tension[:] = held.act(stepper.x)
+            end = min(duration, held.instant)
         status, steps = stepper.advance(end, record)
         for store, block in zip(kept, record, strict=True):
             store.append(block[:steps].copy())
