@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         self_locking_margin,
         tension_for_force,
     )
+    from finger_pin.convergence import Convergence, check_convergence
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
@@ -33,9 +34,11 @@ if TYPE_CHECKING:
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
+    "Convergence": "convergence",
     "Finger": "finger",
     "LiveView": "viewer",
     "Simulator": "simulator",
+    "check_convergence": "convergence",
     "critical_friction": "analysis",
     "draw_all": "plots",
     "force_polytope": "analysis",
@@ -58,6 +61,7 @@ _LATER = {
 }
 
 __all__ = [
+    "Convergence",
     "Finger",
     "FingerDescription",
     "FingerPinError",
@@ -67,6 +71,7 @@ __all__ = [
     "LiveView",
     "Scenario",
     "Simulator",
+    "check_convergence",
     "critical_friction",
     "draw_all",
     "force_polytope",
