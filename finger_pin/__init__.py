@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         build_controller,
     )
     from finger_pin.controllers.limited_distribution import LimitedDistribution
+    from finger_pin.convergence import Convergence, check_convergence
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
@@ -51,9 +52,11 @@ _LATER = {
     "TendonFeedforward": "controllers",
     "TorqueLaw": "controllers",
     "build_controller": "controllers",
+    "Convergence": "convergence",
     "Finger": "finger",
     "LiveView": "viewer",
     "Simulator": "simulator",
+    "check_convergence": "convergence",
     "critical_friction": "analysis",
     "draw_all": "plots",
     "force_polytope": "analysis",
@@ -77,6 +80,7 @@ _LATER = {
 
 __all__ = [
     "CompensatedController",
+    "Convergence",
     "Finger",
     "FingerDescription",
     "FingerPinError",
@@ -93,6 +97,7 @@ __all__ = [
     "TendonFeedforward",
     "TorqueLaw",
     "build_controller",
+    "check_convergence",
     "critical_friction",
     "draw_all",
     "force_polytope",

@@ -56,7 +56,10 @@ class Stage:
             "new": [each.relative_to(self.path).as_posix() for each in new],
             "earlier": [each.relative_to(self.folder).as_posix() for each in earlier],
         }
-        (self.path / _MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
+        with open(self.path / _MANIFEST, "w", encoding="utf-8") as file:
+            json.dump(manifest, file)
+            file.flush()
+            os.fsync(file.fileno())
         decided = self.folder / _DECIDED
         os.rename(self.path, decided)
         done: list[tuple[Path, Path]] = []

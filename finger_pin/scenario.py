@@ -29,6 +29,7 @@ from finger_pin.validation import (
 METHODS_IN_NUMPY = ("Radau", "BDF", "LSODA")
 METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
 MOST_SAMPLES = 5_000_000
+LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
 
 
 class JointReference(Description):
@@ -62,10 +63,10 @@ class SimulationSettings(Description):
         1000.0, unit="Hz", source="chosen", doc="Of the saved signals."
     )
     method: Annotated[str, choice(*METHODS)] = quantity("Rodas5P", unit="1", source="benchmark", doc="Integrator.")
-    rtol: Annotated[float, real(1e-12, 0.1)] = quantity(
+    rtol: Annotated[float, real(LEAST_RTOL, 0.1)] = quantity(
         1e-6, unit="1", source="energy account", doc="Relative tolerance."
     )
-    atol_scale: Annotated[float, real(1e-15, 0.1)] = quantity(
+    atol_scale: Annotated[float, real(LEAST_ATOL_SCALE, 0.1)] = quantity(
         1e-6, unit="1", source="energy account", doc="Absolute tolerance over the scale of each kind of state."
     )
 

@@ -26,6 +26,9 @@ from finger_pin.sampling import SampledController
 from finger_pin.scenario import METHODS_IN_NUMPY, Scenario
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
+# Where tolerances are tight already, it is rounding that an integrator cannot get below.
+_TIGHT = 1e-8
+_ADVICE_TIGHT = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
 _CONTINUOUS = "Radau"
 # Steps between two looks at a compiled simulation: rarely for a progress bar, often for an observer.
 _CHUNK, _CHUNK_OBSERVED = 256, 4
@@ -93,7 +96,8 @@ def simulate(
         result = record(scenario, loop, trajectory, method)
     result, excess = _finite_part(result)
     if trajectory.failure:
-        raise IntegrationError(reached, trajectory.failure, _ADVICE, result)
+        tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT
+        raise IntegrationError(reached, trajectory.failure, _ADVICE_TIGHT if tight else _ADVICE, result)
     if excess:
         raise IntegrationError(float(result.attrs["end_time"]), f"{excess} is not finite after that", _ADVICE, result)
     if trajectory.interrupted:

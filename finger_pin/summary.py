@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,7 +21,7 @@ def summarize(result: xr.Dataset) -> str:
     Args:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
-    blocks = [_head(result), _tracking(result), _tension(result), _energy(result), _cost(result)]
+    blocks = [_head(result), _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
@@ -77,6 +78,19 @@ def _energy(result: xr.Dataset) -> list[str]:
     entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
     rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]
     return ["Energy, and its share of what was supplied or drawn from store", *_table(("", "mJ", "share"), rows)]
+
+
+def _convergence(result: xr.Dataset) -> list[list[str]]:
+    """Return a block about a convergence check if there was one."""
+    if "convergence_difference" not in result:
+        return []
+    difference = np.abs(np.asarray(result["convergence_difference"].transpose("time", "joint")))
+    rows = [
+        (str(joint), f"{column:.1e}")
+        for joint, column in zip(result["joint"].values, np.nanmax(difference, axis=0), strict=True)
+    ]
+    verdict = textwrap.wrap(str(result.attrs["convergence"]), 80)
+    return [["Difference from the run at a tighter tolerance, rad", *_table(("", "largest"), rows), *verdict]]
 
 
 def _cost(result: xr.Dataset) -> list[str]:

@@ -64,6 +64,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--view", action=flag, default=False, help="open the viewer and play the result")
     add("--live", action="store_true", help="watch in the viewer while it computes, at most in real time")
     add("--figures", action=flag, default=True, help="draw the figures")
+    add("--check", action="store_true", help="repeat the run at a tighter tolerance, and report where the two part")
     add("--quiet", action="store_true", help="print errors only")
     add("--list", action="store_true", help="list scenarios, fingers and methods, and exit")
     options, surplus = parser.parse_known_args(arguments)
@@ -104,6 +105,7 @@ def shorthand(key: str) -> Callable[[str], tuple[str, Any]]:
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Load, simulate, write, show; return the exit code."""
     from finger_pin.console import print_text
+    from finger_pin.convergence import tightened
     from finger_pin.exceptions import InputError
     from finger_pin.loading import load_scenario
     from finger_pin.results import ResultFolder
@@ -112,11 +114,15 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     try:
         scenario = load_scenario(options.scenario, dict(options.set))
         output = options.output or Path("results", scenario.name)
+        if options.check:
+            tightened(scenario)
         with ResultFolder(output) as folder:
             code, result, problem = simulate(scenario, interrupts, options)
             if result is None:
                 complain(f"{problem}; nothing was computed")
                 return code
+            if options.check and code == DONE:
+                code, result, problem = check(scenario, result, interrupts, options)
             with interrupts.patient():
                 folder.write(result)
             if interrupts.requested:
@@ -165,6 +171,26 @@ def simulate(
             return FAILED, error.result, str(error)
         except Interrupted as error:
             return INTERRUPTED, error.result, str(error)
+
+
+def check(
+    scenario: Scenario, result: xr.Dataset, interrupts: Interrupts, options: argparse.Namespace
+) -> tuple[int, xr.Dataset, str]:
+    """Return the exit code, the result with its convergence if that could be checked, and what went wrong."""
+    from finger_pin.console import progress_bar
+    from finger_pin.convergence import check_convergence
+    from finger_pin.exceptions import IntegrationError, Interrupted
+
+    shown = sys.stderr.isatty() and not options.quiet
+    bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
+    with bar as progress, interrupts.patient():
+        try:
+            found = check_convergence(scenario, result, progress=progress, stop=lambda: interrupts.requested)
+            return DONE, found.attach(result), ""
+        except IntegrationError as error:
+            return DONE, result, f"convergence could not be checked: {error}"
+        except Interrupted:
+            return INTERRUPTED, result, "interrupted before convergence was checked"
 
 
 def live_view(scenario: Scenario, wanted: bool) -> AbstractContextManager[LiveView | None]:

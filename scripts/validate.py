@@ -42,6 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
 
         from finger_pin.console import print_text
 
+        options.output.mkdir(parents=True, exist_ok=True)
         families = validate(options.only)
         whole = report.Report.now(families)
         report.write(whole, options.output)
@@ -81,6 +82,7 @@ def chosen(names: str) -> tuple[str, ...]:
 
 def validate(names: tuple[str, ...]) -> tuple[Family, ...]:
     """Return what the named families of checks found; on a terminal, show how far it is."""
+    from validation.check import Section, failed
     from validation.progress import bar
     from validation.report import Family
 
@@ -90,7 +92,12 @@ def validate(names: tuple[str, ...]) -> tuple[Family, ...]:
             module = import_module(f"validation.{FAMILIES[name]}")
             advance(len(found), module.TITLE)
             about = " ".join((module.__doc__ or "").strip().split("\n\n")[0].split())
-            found.append(Family(name, module.TITLE, about, module.measure()))
+            try:
+                section = module.measure()
+            except Exception as error:
+                # One family that breaks is a failure to report, and no reason to lose the others.
+                section = Section.of([failed(module.TITLE, f"{type(error).__name__}: {error}")])
+            found.append(Family(name, module.TITLE, about, section))
     return tuple(found)
 
 

@@ -374,6 +374,40 @@ def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, mo
     assert "flexor_distal" in out
 
 
+#: A rope as stiff and a mass as small as may be, without friction, at a tolerance that rounding errors exceed.
+TOO_STIFF = {
+    "finger.passive_tendon.stiffness": 1e10,
+    "finger.passive_tendon.mass": 1e-18,
+    "finger.tendon_friction.coulomb": 0.0,
+    "finger.tendon_friction.viscous": 0.0,
+    "simulation.rtol": 1e-9,
+    "simulation.atol_scale": 1e-9,
+}
+
+
+def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_try_and_saves_what_it_has(
+    run, here, quick
+):
+    sets = [part for key, value in TOO_STIFF.items() for part in ("--set", f"{key}={value}")]
+    code, out, lines = run("fig6", "--output", "out", "--duration", "1", *sets)
+    assert (code, len(lines)) == (3, 1)
+    said = re.fullmatch(
+        r"simulate.py: the integration stopped at t = ([\d.e-]+) s: .* largest in passive_velocity\[T5\]; "
+        r"try a larger simulation.rtol and simulation.atol_scale, .*; what was computed is in out",
+        lines[0],
+    )
+    assert said
+    kept, scenario = fp.load_result("out/trajectory.nc"), load_scenario("out/scenario.toml")
+    assert 0.0 < kept.attrs["end_time"] < 1.0 == scenario.simulation.duration
+    assert kept.attrs["end_time"] == pytest.approx(float(said[1]), rel=1e-5)
+    assert len(kept.time) > 10 and kept.time[-1] <= kept.attrs["end_time"]
+    assert all(np.isfinite(values).all() for values in kept.data_vars.values())
+    assert "Tension" in out
+    # What it says helps.
+    loose = ("--set", "simulation.rtol=1e-7", "--set", "simulation.atol_scale=1e-7")
+    assert run("out/scenario.toml", "--output", "out", *loose)[::2] == (0, [])
+
+
 def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monkeypatch):
     assert run("s.toml", "--output", "out")[0] == 0
     before = contents(here)

@@ -28,9 +28,9 @@ class Check:
     Attributes:
         what: What is compared.
         source: Where the expected value comes from.
-        expected: The value of the source; None if the check was skipped.
-        measured: Ours; None if the check was skipped.
-        tolerance: How far apart they may be.
+        expected: The value of the source; None if it did not come to a comparison.
+        measured: Ours; None likewise.
+        tolerance: How far apart they may be; None likewise.
         unit: Of all three.
         verdict: The outcome.
         note: What a reader should know, such as why a known difference is there.
@@ -77,6 +77,11 @@ def compare(
 def skipped(what: str, source: str, why: str) -> Check:
     """Return a check that could not be made."""
     return Check(what, source, None, None, None, "", Verdict.SKIPPED, why)
+
+
+def failed(what: str, why: str) -> Check:
+    """Return a check that broke before it came to a number."""
+    return Check(what, "", None, None, None, "", Verdict.FAIL, why)
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,7 +124,7 @@ def plot(errors: dict[str, Array]) -> Figure:
     for index, (method, each) in enumerate(errors.items()):
         line = series(index)
         axes.loglog(steps, each, marker="o", markersize=4, label=f"{method}, order {ORDER[method]}", **line)
-        slope = 0.5 * each[0] * (steps / steps[0]) ** ORDER[method]
+        slope = 0.4 * each[-1] * (steps / steps[-1]) ** ORDER[method]
         axes.loglog(steps, slope, color=line["color"], linestyle=":", linewidth=1.0)
     axes.set_xticks(steps, [f"{step:g}" for step in steps])
     axes.minorticks_off()

@@ -29,6 +29,7 @@ th { text-align: left; color: var(--soft); font-weight: 500; border-bottom: 2px 
 th, td { padding: .35rem .8rem .35rem 0; vertical-align: top; }
 td { border-bottom: 1px solid var(--line); }
 tr:last-child td { border-bottom: 0; }
+.checks td:nth-child(2) { min-width: 13rem; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 th:last-child, td:last-child { padding-right: 0; white-space: nowrap; }
 .verdict { display: inline-block; min-width: 4.2rem; text-align: center; padding: 0 .5rem; border-radius: .75rem;
@@ -91,7 +92,7 @@ def _family(family: Family) -> str:
     pictures = "".join(map(_picture, family.section.pictures))
     return (
         f'<section id="{family.name}"><h2>{escape(family.title)}</h2><p class="soft">{escape(family.about)}</p>'
-        f"<table>{head}{rows}</table>{pictures}</section>"
+        f'<table class="checks">{head}{rows}</table>{pictures}</section>'
     )
 
 

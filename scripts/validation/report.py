@@ -113,7 +113,7 @@ def _tally(family: Family) -> str:
 
 
 def _told(check: Check) -> str:
-    if check.verdict is Verdict.SKIPPED:
+    if check.measured is None:
         return f"{check.verdict}: {check.what}: {check.note}"
     said = f"{check.verdict}: {check.what}: {check.measured:.6g} {check.unit}, {check.source}: {check.expected:.6g}"
     return f"{said} {check.unit}, tolerance {check.tolerance:.1g}. {check.note}".rstrip()
@@ -127,12 +127,11 @@ def records(report: Report) -> Iterator[dict[str, object]]:
 
 
 def write(report: Report, folder: Path) -> None:
-    """Write the page and the data, each whole or not at all.
+    """Write the page and the data into a folder that exists, each whole or not at all.
 
     Raises:
         OSError: If they cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     whole = {
         "date": report.date,
         "versions": report.versions,
