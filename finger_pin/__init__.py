@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted
+from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, SelfLockingWarning
 from finger_pin.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
 from finger_pin.parameters import FingerDescription
 from finger_pin.scenario import Scenario
@@ -66,6 +66,7 @@ __all__ = [
     "Interrupted",
     "LiveView",
     "Scenario",
+    "SelfLockingWarning",
     "Simulator",
     "critical_friction",
     "draw_all",

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
 import numpy as np
 import xarray as xr
 
+from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.core.compilation import CACHE_FOLDER
-from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 
-_PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time")
+_PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 
 
 def simulate_many(
@@ -41,6 +43,9 @@ def simulate_many(
 
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
+
+    Warns:
+        SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
     """
     runs = list(scenarios)
     if not runs:
@@ -61,7 +66,7 @@ def simulate_many(
             results[index] = _run(runs[index], keep)
             if progress is not None:
                 progress(index + 1, len(runs))
-        return _stack(runs, results)
+        return _finished(runs, results)
     with ProcessPoolExecutor(count, mp_context=_context()) as pool:
         pending = {pool.submit(_run, run, keep): index for index, run in enumerate(runs) if index > 0}
         try:
@@ -73,7 +78,18 @@ def simulate_many(
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return _stack(runs, results)
+    return _finished(runs, results)
+
+
+def _finished(runs: Sequence[Scenario], results: Sequence[xr.Dataset | None]) -> xr.Dataset:
+    stacked = _stack(runs, results)
+    margins = stacked["self_locking_margin"].values
+    advice = locking_advice(float(margins.min()))
+    if advice:
+        close = sum(bool(locking_advice(float(margin))) for margin in margins)
+        message = f"{close} of {len(runs)} runs come close to self-locking; in the closest {advice}"
+        warnings.warn(message, SelfLockingWarning, stacklevel=3)
+    return stacked
 
 
 def _context() -> multiprocessing.context.BaseContext:
@@ -91,7 +107,10 @@ def _context() -> multiprocessing.context.BaseContext:
 def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
-        result = simulate(scenario)
+        with warnings.catch_warnings():
+            # Other processes cannot warn here, and a hundred runs should not warn a hundred times.
+            warnings.simplefilter("ignore", SelfLockingWarning)
+            result = simulate(scenario)
     except IntegrationError as error:
         assert error.result is not None
         failure, result = str(error), error.result

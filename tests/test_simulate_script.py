@@ -481,6 +481,7 @@ def test_wrong_options_are_told_without_importing_anything_heavy(here):
     code = (
         "import runpy, sys\n"
         f"sys.argv = ['simulate.py', '--no-such-option']\n"
+        f"sys.path.insert(0, {str(SCRIPT.parent)!r})\n"
         "try:\n"
         f"    runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n"
         "except SystemExit as end:\n"
@@ -495,6 +496,7 @@ def test_listing_imports_neither_matplotlib_nor_meshcat(here):
     code = (
         "import runpy, sys\n"
         f"sys.argv = ['simulate.py', '--list']\n"
+        f"sys.path.insert(0, {str(SCRIPT.parent)!r})\n"
         "try:\n"
         f"    runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n"
         "finally:\n"

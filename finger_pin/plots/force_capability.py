@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-from finger_pin.analysis.force_capability import Friction, force_polytope, largest_force, tension_for_force
+from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
 from finger_pin.finger import Finger
 from finger_pin.plots.lines import series
 from finger_pin.plots.reach import flexion_section
