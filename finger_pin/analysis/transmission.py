@@ -94,8 +94,7 @@ def workspace_postures(finger: Finger, samples: int = 9) -> Array:
         finger: Any finger.
         samples: Angles per free joint.
     """
-    routing, limiter = finger.routing, finger.stroke_limiter
-    coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
+    limiter, coupling = finger.stroke_limiter, _inextensible(finger)
     low, high = limiter.lower, limiter.upper
     axes = [
         [0.0] if index in coupling.followers else np.linspace(a, b, samples)
@@ -104,6 +103,26 @@ def workspace_postures(finger: Finger, samples: int = 9) -> Array:
     postures = np.array(list(product(*axes))) @ coupling.matrix.T
     inside = np.all((postures >= low - 1e-9) & (postures <= high + 1e-9), axis=1)
     return np.asarray(postures[inside])
+
+
+def flexion_postures(finger: Finger, samples: int = 41) -> Array:
+    """Return postures over the ranges of the last two free joints, rad, shape (samples, samples, n); others near zero.
+
+    A finger of one free joint moves that one alone along the first axis. (4) holds, ranges of driven joints are not
+    looked at.
+
+    Args:
+        finger: Any finger.
+        samples: Angles per joint.
+    """
+    limiter, coupling = finger.stroke_limiter, _inextensible(finger)
+    low, high = limiter.lower, limiter.upper
+    postures = np.tile(np.clip(np.zeros(len(low)), low, high), (samples, samples, 1))
+    free = [index for index in range(len(low)) if index not in coupling.followers]
+    for axis, joint in enumerate(free[-2:]):
+        angles = np.linspace(low[joint], high[joint], samples)
+        postures[..., joint] = angles[:, None] if axis == 0 else angles
+    return np.asarray(postures @ coupling.matrix.T)
 
 
 def transmission_in_motion(finger: Finger, result: xr.Dataset) -> TransmissionInMotion:
@@ -152,3 +171,8 @@ def _since_reversal(time: Array, speed: Array) -> Array:
     )
     turned = np.concatenate([np.ones((1, speed.shape[1]), dtype=bool), np.sign(speed[1:]) != np.sign(speed[:-1])])
     return np.asarray(path - np.maximum.accumulate(np.where(turned, path, 0.0), axis=0))
+
+
+def _inextensible(finger: Finger) -> PassiveCoupling:
+    passive = finger.routing.passive
+    return PassiveCoupling.from_routing(finger.routing, np.zeros(passive), np.ones(passive))

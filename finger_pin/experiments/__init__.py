@@ -5,18 +5,34 @@ Every experiment takes a scenario, so that the same questions can be put to any 
 
 from __future__ import annotations
 
-from finger_pin.experiments.findings import Finding, write_findings
-from finger_pin.experiments.friction_influence import FrictionInfluence, friction_influence
-from finger_pin.experiments.passive_delivery import PassiveDelivery, passive_delivery
-from finger_pin.experiments.transmission import Transmission, transmission
+from finger_pin.experiments.findings import Finding, Verdict, findings_table, write_findings
+from finger_pin.experiments.friction_influence import (
+    INFLUENCE_RUNS,
+    FrictionInfluence,
+    check_influence,
+    friction_influence,
+)
+from finger_pin.experiments.passive_delivery import DELIVERY_RUNS, PassiveDelivery, check_delivery, passive_delivery
+from finger_pin.experiments.transmission import TRANSMISSION_RUNS, Transmission, transmission
+from finger_pin.experiments.verdicts import delivery_findings, influence_findings, transmission_findings
 
 __all__ = [
+    "DELIVERY_RUNS",
+    "INFLUENCE_RUNS",
+    "TRANSMISSION_RUNS",
     "Finding",
     "FrictionInfluence",
     "PassiveDelivery",
     "Transmission",
+    "Verdict",
+    "check_delivery",
+    "check_influence",
+    "delivery_findings",
+    "findings_table",
     "friction_influence",
+    "influence_findings",
     "passive_delivery",
     "transmission",
+    "transmission_findings",
     "write_findings",
 ]

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis import self_locking_margin
+from finger_pin.exceptions import InputError
 from finger_pin.experiments.runs import Measures, Progress, measured, simulated
 from finger_pin.experiments.variations import (
     lasting,
@@ -32,8 +33,12 @@ from finger_pin.scenario import Scenario
 _SETTLING = 1.0
 _DURATION, _SAMPLES = 5.0, 2500
 _STEP = 1.1
+_FACTORS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
+_TENSIONS = (0.1, 0.3, 1.0, 2.0, 4.0)
 _SHARES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
 _EXTRAPOLATED = slice(3, 5)
+#: Number of runs of the experiment.
+INFLUENCE_RUNS = 4 * len(_FACTORS) + 7 * len(_TENSIONS) + len(_SHARES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +107,8 @@ class FrictionInfluence:
 def friction_influence(
     scenario: Scenario,
     *,
-    factors: tuple[float, ...] = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0),
-    tensions: tuple[float, ...] = (0.1, 0.3, 1.0, 2.0, 4.0),
+    factors: tuple[float, ...] = _FACTORS,
+    tensions: tuple[float, ...] = _TENSIONS,
     progress: Progress | None = None,
 ) -> FrictionInfluence:
     """Vary joint friction, tendon friction and least tension of a scenario.
@@ -115,8 +120,10 @@ def friction_influence(
         progress: Called with the number of further runs that have been finished.
 
     Raises:
+        InputError: If nothing moves, or nothing that moves can lock.
         IntegrationError: If a run could not be finished.
     """
+    check_influence(scenario)
     base = lasting(scenario, _DURATION, _SAMPLES)
     smooth_joints, smooth_tendons = with_joint_friction(base, 0.0), with_tendon_friction(base, 0.0)
     up, down = _STEP, 1.0 / _STEP
@@ -144,13 +151,26 @@ def friction_influence(
         sweeps.append(Sweep(np.array(values), runs.part(slice(first, first + len(values)))))
         first += len(values)
     joint_up, joint_down, tendon_up, tendon_down = (np.log(sweep.runs.error) for sweep in sweeps[7:])
+    joint, tendon, joint_alone, tendon_alone, minimum, minimum_without_joint, minimum_without_tendon = sweeps[:7]
     return FrictionInfluence(
-        scenario,
-        *sweeps[:7],
+        scenario=scenario,
+        joint=joint,
+        tendon=tendon,
+        joint_alone=joint_alone,
+        tendon_alone=tendon_alone,
+        minimum=minimum,
+        minimum_without_joint=minimum_without_joint,
+        minimum_without_tendon=minimum_without_tendon,
         elasticity_joint=(joint_up - joint_down) / np.log(up / down),
         elasticity_tendon=(tendon_up - tendon_down) / np.log(up / down),
         gripping=gripping(scenario, progress=progress),
     )
+
+
+def check_influence(scenario: Scenario) -> None:
+    """Raise InputError if a scenario does not lend itself to the experiment."""
+    if not np.isfinite(self_locking_margin(scenario).margin):
+        raise InputError("reference.joints", "must move joints whose friction could lock the finger")
 
 
 def gripping(scenario: Scenario, *, progress: Progress | None = None) -> Gripping:

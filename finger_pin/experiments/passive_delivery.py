@@ -32,7 +32,10 @@ from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
 
 _SETTLING, _DURATION, _SAMPLES = 0.2, 5.0, 2500
-#: Loss above which a plan is called broken.
+_SPEEDS, _FACTORS = (0.25, 1.0, 2.0, 4.0, 8.0, 16.0), (0.0, 0.25, 0.5, 1.0, 1.5, 2.0)
+#: Number of runs of the experiment: the grid, four causes, and the scenario as it is.
+DELIVERY_RUNS = len(_SPEEDS) * len(_FACTORS) + 5
+#: Deviation above which a plan is called broken.
 BROKEN = 0.25
 
 
@@ -80,8 +83,8 @@ class PassiveDelivery:
 def passive_delivery(
     scenario: Scenario,
     *,
-    speeds: tuple[float, ...] = (0.25, 1.0, 2.0, 4.0, 8.0, 16.0),
-    factors: tuple[float, ...] = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0),
+    speeds: tuple[float, ...] = _SPEEDS,
+    factors: tuple[float, ...] = _FACTORS,
     progress: Progress | None = None,
 ) -> PassiveDelivery:
     """Vary speed and friction of a scenario, and switch on one by one what spoils the plan.
@@ -96,8 +99,7 @@ def passive_delivery(
         InputError: If the finger has no passive tendon.
         IntegrationError: If a run could not be finished.
     """
-    if not scenario.finger.passive_names:
-        raise InputError("finger.tendons", "has no passive tendon whose tension could be planned")
+    check_delivery(scenario)
     base = lasting(scenario, _DURATION, _SAMPLES)
     consistent = with_passive_tension(base, internal_passive_tension(base))
     ideal = weightless(consistent)
@@ -132,6 +134,12 @@ def passive_delivery(
         planned=planned[0],
         delivered=delivered[0],
     )
+
+
+def check_delivery(scenario: Scenario) -> None:
+    """Raise InputError if a scenario does not lend itself to the experiment."""
+    if not scenario.finger.passive_names:
+        raise InputError("finger.tendons", "has no passive tendon whose tension could be planned, conclusion c")
 
 
 def crossing(values: Array, deviations: Array, level: float = BROKEN) -> float:

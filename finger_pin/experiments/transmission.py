@@ -19,6 +19,9 @@ from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 
+#: Number of runs of the experiment.
+TRANSMISSION_RUNS = 1
+
 
 @dataclass(frozen=True, eq=False)
 class Transmission:
@@ -50,15 +53,18 @@ class Transmission:
         The one whose compensation errs as much either way, exp(mu_e (phi_max - phi_min) / 2) - 1.
         """
         pulling = self.workspace.pulling
-        return np.sqrt(np.max(pulling, axis=0) / np.min(pulling, axis=0)) - 1.0
+        return np.asarray(np.sqrt(np.max(pulling, axis=0) / np.min(pulling, axis=0)) - 1.0)
 
     @property
     def unsettled(self) -> Array:
-        """Relative deviation of sliding tendons from steady sliding, rms along the motion, shape (t,)."""
+        """Relative deviation of sliding tendons from steady sliding, rms along the motion, shape (t,); NaN if none."""
         motion = self.motion
         with np.errstate(divide="ignore", invalid="ignore"):
             gap = np.where(motion.sliding, motion.ratio / motion.settled - 1.0, np.nan)
-        return np.sqrt(np.nanmean(gap**2, axis=0))
+        slid = np.any(np.isfinite(gap), axis=0)
+        found = np.full(gap.shape[1], np.nan)
+        found[slid] = np.sqrt(np.nanmean(gap[:, slid] ** 2, axis=0))
+        return found
 
 
 def transmission(scenario: Scenario, *, progress: Progress | None = None) -> Transmission:
