@@ -40,11 +40,11 @@ def run(name: str, output: Path) -> int:
     try:
         scenario = fp.load_scenario(name)
         finger, margin = scenario.finger, fp.self_locking_margin(scenario)
-        print_text("Joint friction at which the finger locks, mm")
+        lines = ["Joint friction at which the finger locks, mm"]
         for joint in finger.joints:
-            print_text(f"  {joint:12} {1e3 * fp.critical_friction(finger, joints=[joint]).coefficient:8.3f}")
-        print_text(f"  {'all joints':12} {1e3 * fp.critical_friction(finger).coefficient:8.3f}")
-        print_text(
+            lines.append(f"  {joint:12} {1e3 * fp.critical_friction(finger, joints=[joint]).coefficient:8.3f}")
+        lines.append(f"  {'all joints':12} {1e3 * fp.critical_friction(finger).coefficient:8.3f}")
+        lines.append(
             f"On its reference, {scenario.name} stays a factor {margin.margin:.3g} below, least at {margin.time:.3g} s"
         )
         figures = {
@@ -71,7 +71,7 @@ def run(name: str, output: Path) -> int:
     except OSError as error:
         complain(PROGRAM, f"--output = {output}: cannot be written: {error.strerror or error}")
         return NOT_WRITTEN
-    print_text(f"Figures are in {output}")
+    print_text("\n".join([*lines, f"Figures are in {output}"]))
     return DONE
 
 

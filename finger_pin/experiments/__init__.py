@@ -5,15 +5,15 @@ Every experiment takes a scenario, so that the same questions can be put to any 
 
 from __future__ import annotations
 
+from finger_pin.experiments.delivery import DELIVERY_RUNS, PassiveDelivery, check_delivery, passive_delivery
 from finger_pin.experiments.findings import Finding, Verdict, findings_table, write_findings
-from finger_pin.experiments.friction_influence import (
+from finger_pin.experiments.influence import (
     INFLUENCE_RUNS,
     FrictionInfluence,
     check_influence,
     friction_influence,
 )
-from finger_pin.experiments.passive_delivery import DELIVERY_RUNS, PassiveDelivery, check_delivery, passive_delivery
-from finger_pin.experiments.transmission import TRANSMISSION_RUNS, Transmission, transmission
+from finger_pin.experiments.posture import TRANSMISSION_RUNS, Transmission, transmission
 from finger_pin.experiments.verdicts import delivery_findings, influence_findings, transmission_findings
 
 __all__ = [

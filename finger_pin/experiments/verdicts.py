@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from finger_pin.experiments.delivery import BROKEN, PassiveDelivery, crossing
 from finger_pin.experiments.findings import Finding, Verdict
-from finger_pin.experiments.friction_influence import FrictionInfluence, Sweep, error_at_work
-from finger_pin.experiments.passive_delivery import BROKEN, PassiveDelivery, crossing
-from finger_pin.experiments.transmission import Transmission
+from finger_pin.experiments.influence import FrictionInfluence, Sweep, error_at_work
+from finger_pin.experiments.posture import Transmission
 from finger_pin.routing import Array
 from finger_pin.validation import expand
 

@@ -10,7 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from finger_pin.experiments.friction_influence import FrictionInfluence, Sweep
+from finger_pin.experiments.influence import FrictionInfluence, Sweep
 from finger_pin.experiments.runs import Measures
 from finger_pin.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 from finger_pin.routing import Array

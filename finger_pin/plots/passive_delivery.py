@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.experiments.passive_delivery import BROKEN, PassiveDelivery
+from finger_pin.experiments.delivery import BROKEN, PassiveDelivery
 from finger_pin.plots.lines import series, trace
 from finger_pin.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.analysis.transmission import flexion_postures, transmission_efficiency
 from finger_pin.blocks.tendons import Tendons
-from finger_pin.experiments.transmission import Transmission
+from finger_pin.experiments.posture import Transmission
 from finger_pin.finger import Finger
 from finger_pin.plots.reach import flexion_section
 from finger_pin.plots.style import BLACK, BLUE, COLOURS, GREY, VERMILLION, new_figure, styled

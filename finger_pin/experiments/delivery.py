@@ -106,7 +106,7 @@ def passive_delivery(
     deviations, least = [], []
     for speed in speeds:
         quick = at_speed(ideal, speed)
-        found, *_ = _delivered([_with_friction(quick, factor) for factor in factors], progress)
+        found, *_ = delivered_tensions([_with_friction(quick, factor) for factor in factors], progress)
         deviations.append(found.deviation)
         least.append(found.least)
     slow = at_speed(base, speeds[0])
@@ -118,8 +118,8 @@ def passive_delivery(
         "joint friction": with_tendon_friction(calm, 0.0),
         "tendon friction": with_joint_friction(calm, 0.0),
     }
-    alone, *_ = _delivered(list(single.values()), progress)
-    given, time, planned, delivered = _delivered([base], progress)
+    alone, *_ = delivered_tensions(list(single.values()), progress)
+    given, time, planned, delivered = delivered_tensions([base], progress)
     grid = np.array(deviations)
     causes = {"none": float(grid[0, 0]), **dict(zip(single, map(float, alone.deviation), strict=True))}
     causes["speed"] = float(grid[speeds.index(1.0), 0])
@@ -158,8 +158,15 @@ def _with_friction(scenario: Scenario, factor: float) -> Scenario:
     return with_tendon_friction(with_joint_friction(scenario, factor), factor)
 
 
-def _delivered(scenarios: list[Scenario], progress: Progress | None) -> tuple[Delivery, Array, Array, Array]:
-    """Return deviations, time, and traces of planned and delivered tensions, shape (run, time, p)."""
+def delivered_tensions(scenarios: list[Scenario], progress: Progress | None) -> tuple[Delivery, Array, Array, Array]:
+    """Return what passive tendons deliver in runs of one duration.
+
+    Returns:
+        Deviations of the m runs; time, shape (k,), s; planned and delivered tensions, shape (m, k, p), N.
+
+    Raises:
+        IntegrationError: If a run could not be finished.
+    """
     runs = simulated(scenarios, ("tendon_command", "tendon_tension"), progress)
     actuated = len(scenarios[0].finger.actuated_names)
     planned, delivered = (
