@@ -25,11 +25,23 @@ if TYPE_CHECKING:
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
-    from finger_pin.plots import draw_all, plot_energy, plot_fig6, plot_friction_law, plot_losses, plot_workspace
+    from finger_pin.plots import (
+        draw_all,
+        plot_critical_friction,
+        plot_energy,
+        plot_fig6,
+        plot_force_polytope,
+        plot_friction_law,
+        plot_losses,
+        plot_radius_sensitivity,
+        plot_runaway,
+        plot_self_locking_map,
+        plot_workspace,
+    )
     from finger_pin.recording import load_result, save
     from finger_pin.simulation import simulate
     from finger_pin.simulator import Simulator
-    from finger_pin.viewer import LiveView, view, write_animation
+    from finger_pin.viewer import LiveView, view, view_forces, write_animation
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
@@ -41,10 +53,15 @@ _LATER = {
     "force_polytope": "analysis",
     "largest_force": "analysis",
     "load_result": "recording",
+    "plot_critical_friction": "plots",
     "plot_energy": "plots",
     "plot_fig6": "plots",
+    "plot_force_polytope": "plots",
     "plot_friction_law": "plots",
     "plot_losses": "plots",
+    "plot_radius_sensitivity": "plots",
+    "plot_runaway": "plots",
+    "plot_self_locking_map": "plots",
     "plot_workspace": "plots",
     "save": "recording",
     "self_locking_map": "analysis",
@@ -54,6 +71,7 @@ _LATER = {
     "tension_for_force": "analysis",
     "to_mjcf": "mjcf",
     "view": "viewer",
+    "view_forces": "viewer",
     "write_animation": "viewer",
 }
 
@@ -77,10 +95,15 @@ __all__ = [
     "load_finger",
     "load_result",
     "load_scenario",
+    "plot_critical_friction",
     "plot_energy",
     "plot_fig6",
+    "plot_force_polytope",
     "plot_friction_law",
     "plot_losses",
+    "plot_radius_sensitivity",
+    "plot_runaway",
+    "plot_self_locking_map",
     "plot_workspace",
     "save",
     "self_locking_map",
@@ -91,6 +114,7 @@ __all__ = [
     "to_mjcf",
     "to_toml",
     "view",
+    "view_forces",
     "write_animation",
 ]
 

@@ -42,9 +42,10 @@ def run(options: argparse.Namespace) -> int:
         posture = limiter.lower + (limiter.upper - limiter.lower) / 3.0
         if options.posture:
             posture = np.deg2rad(options.posture)
-        needed = {
-            each: fp.tension_for_force(finger, posture, options.force, friction=each).largest for each in Friction
-        }
+        if len(posture) != len(finger.routing.joints):
+            allowed = f"must be {len(finger.routing.joints)} angles, one per joint ({', '.join(finger.routing.joints)})"
+            raise fp.InputError("--posture", allowed, options.posture)
+        needed = {each: fp.tension_for_force(finger, posture, options.force, friction=each) for each in Friction}
         polytope = fp.force_polytope(finger, posture, options.limit)
         figures = {
             "forces": plot_force_polytope(finger, posture, options.limit),
@@ -59,10 +60,10 @@ def run(options: argparse.Namespace) -> int:
         complain(PROGRAM, f"--output = {options.output}: cannot be written: {error.strerror or error}")
         return NOT_WRITTEN
     lines = [f"Largest tension for a force of {np.linalg.norm(options.force):g} N, N"]
-    lines += [f"  friction {friction.value:10} {largest:8.3f}" for friction, largest in needed.items()]
+    lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
     print_text("\n".join([*lines, f"Figures are in {options.output}"]))
     if options.view:
-        fp.view_forces(finger.description, polytope)
+        fp.view_forces(finger.description, polytope, tension=needed[Friction.NONE].strands)
     return DONE
 
 

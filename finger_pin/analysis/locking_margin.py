@@ -104,5 +104,5 @@ def locking_advice(margin: float) -> str:
     """Return what to say about a margin, in one line; nothing where it is wide."""
     if margin >= CLOSE_TO_LOCKING:
         return ""
-    effect = "it can lock or its tension run away" if margin < 1.0 else "tensions rise several times over"
-    return f"joint friction is at {1.0 / margin:.2f} of what locks the finger on this reference: {effect}"
+    effect = "tensions run away" if margin < 1.0 else "tensions multiply"
+    return f"joint friction is at {1.0 / margin:.2f} of what locks the finger: {effect}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,41 @@ class ForcePolytope:
     def support(self, direction: Sequence[float] | Array) -> float:
         """Return the largest component of E along a direction, shape (3,), N times its length."""
         return float(np.max(self.vertices @ np.asarray(direction, dtype=float)))
+
+    def triangles(self) -> Any:
+        """Return indices of vertices, shape (., 3): triangles on the surface, or on the set itself where it is flat.
+
+        On a surface their corners run counter-clockwise as seen from outside. There are none where the set is a line.
+        """
+        rank = self.basis.shape[1]
+        if not len(self.faces) or rank < 2:
+            return np.zeros((0, 3), dtype=int)
+        if rank == 2:
+            around = self._around()
+            return np.array([(around[0], a, b) for a, b in pairwise(around[1:])])
+        corners = self.vertices[self.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inwards = np.einsum("fi,fi->f", across, self.normals) < 0.0
+        return np.where(inwards[:, None], self.faces[:, ::-1], self.faces)
+
+    def ridges(self) -> list[tuple[int, int]]:
+        """Return pairs of vertices: the edges between faces that do not lie in one plane; the outline of a flat set."""
+        rank = self.basis.shape[1]
+        if not len(self.faces):
+            return [(int(np.argmin(line)), int(np.argmax(line))) for line in (self.vertices @ self.basis).T[:1]]
+        if rank == 2:
+            return [(int(first), int(second)) for first, second in self.faces]
+        beside: dict[tuple[int, int], list[int]] = {}
+        for index, face in enumerate(self.faces):
+            for first, second in ((0, 1), (1, 2), (2, 0)):
+                low, high = sorted((int(face[first]), int(face[second])))
+                beside.setdefault((low, high), []).append(index)
+        return [edge for edge, (one, other) in beside.items() if self.normals[one] @ self.normals[other] < 1.0 - 1e-6]
+
+    def _around(self) -> Any:
+        """Return the vertices of a flat set in their order around its middle."""
+        plane = (self.vertices - self.vertices.mean(axis=0)) @ self.basis
+        return np.argsort(np.arctan2(plane[:, 1], plane[:, 0]))
 
 
 def force_polytope(

@@ -67,6 +67,7 @@ class PassiveDelivery:
         time: Of the traces, s, shape (k,).
         planned: f_hat of the passive tendons, shape (k, p), N, of the scenario as it is.
         delivered: Their distal halves, likewise.
+        broken: Deviation above which a plan is called broken.
     """
 
     scenario: Scenario
@@ -78,6 +79,7 @@ class PassiveDelivery:
     time: Array
     planned: Array
     delivered: Array
+    broken: float = BROKEN
 
 
 def passive_delivery(

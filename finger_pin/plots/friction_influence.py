@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,10 +11,12 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from finger_pin.experiments.influence import FrictionInfluence, Sweep
-from finger_pin.experiments.runs import Measures
 from finger_pin.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 from finger_pin.routing import Array
+
+if TYPE_CHECKING:
+    from finger_pin.experiments.influence import FrictionInfluence, Sweep
+    from finger_pin.experiments.runs import Measures
 
 _MILLI = 1e3
 _JOINTS, _TENDONS = VERMILLION, BLUE

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.analysis.transmission import flexion_postures, transmission_efficiency
 from finger_pin.blocks.tendons import Tendons
-from finger_pin.experiments.posture import Transmission
 from finger_pin.finger import Finger
 from finger_pin.plots.reach import flexion_section
 from finger_pin.plots.style import BLACK, BLUE, COLOURS, GREY, VERMILLION, new_figure, styled
+
+if TYPE_CHECKING:
+    from finger_pin.experiments.posture import Transmission
 
 _MILLI = 1e3
 _AXES = "xyz"

@@ -191,7 +191,7 @@ def test_simulated_finger_moves_just_below_the_critical_coefficient_and_locks_ju
     third, way = 125, np.deg2rad(35.0)
     growth, moved = {}, {}
     for share in (0.9, 1.1):
-        with pytest.warns(fp.SelfLockingWarning, match="can lock" if share > 1.0 else "rise several times"):
+        with pytest.warns(fp.SelfLockingWarning, match="run away" if share > 1.0 else "multiply"):
             result = fp.simulate(steps(share * 0.7418e-3))
         tension = result["tendon_command"].max("tendon").values
         growth[share] = tension[-1] / tension[third]
