@@ -19,8 +19,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from finger_pin import friction
+from finger_pin.analysis.directions import sliding_velocity
 from finger_pin.blocks.reference import PassiveCoupling
-from finger_pin.blocks.tendons import capstan_coefficient
+from finger_pin.blocks.tendons import Tendons, capstan_coefficient
 from finger_pin.finger import Finger
 from finger_pin.routing import Array
 
@@ -82,6 +83,26 @@ def transmission_efficiency(finger: Finger, position: Array) -> TransmissionEffi
     with np.errstate(divide="ignore"):
         pulling, least = (1.0 - kinetic) / (1.0 + kinetic), (1.0 - static) / (1.0 + static)
         return TransmissionEfficiency(curvature, pulling, 1.0 / pulling, least, 1.0 / least)
+
+
+def coupling_in_motion(tendons: Tendons, position: Array, velocity: Array) -> Array:
+    """Return the joint torques per unit of command, of a passive tendon per unit of its mean tension, shape (t, n), m.
+
+    All tendons slide steadily as the joints move, fast enough for mu^d. Where the rows of H_c balance each other under
+    positive tensions, force closure, so may these: then friction of the tendons alone cannot lock the finger.
+
+    Args:
+        tendons: The tendon layer.
+        position: theta, shape (n,), rad.
+        velocity: theta', shape (n,), rad/s; signs and ratios matter.
+    """
+    routing, actuated = tendons.routing, tendons.routing.actuated
+    curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
+    loss = np.sign(sliding_velocity(tendons, velocity)) * capstan_coefficient(tendons.surface, curvature)
+    share = ((1.0 - loss) / (1.0 + loss))[:actuated, None]
+    part = loss[actuated:, None]
+    passive = (1.0 + part) * routing.proximal_coupling + (1.0 - part) * routing.distal_coupling
+    return np.concatenate([share * routing.actuated_coupling, passive])
 
 
 def workspace_postures(finger: Finger, samples: int = 9) -> Array:

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis import self_locking_margin
+from finger_pin.analysis.transmission import coupling_in_motion
+from finger_pin.blocks.tendons import Tendons
 from finger_pin.exceptions import InputError
 from finger_pin.experiments.runs import Measures, Progress, measured, simulated
 from finger_pin.experiments.variations import (
@@ -27,7 +29,7 @@ from finger_pin.experiments.variations import (
     with_minimum_tension,
     with_tendon_friction,
 )
-from finger_pin.routing import Array
+from finger_pin.routing import Array, ForceClosure
 from finger_pin.scenario import Scenario
 
 _SETTLING = 1.0
@@ -37,6 +39,8 @@ _FACTORS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
 _TENSIONS = (0.1, 0.3, 1.0, 2.0, 4.0)
 _SHARES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
 _EXTRAPOLATED = slice(3, 5)
+#: Largest factor of tendon friction that is looked at for locking.
+MOST_TENDON_FRICTION = 10.0
 #: Number of runs of the experiment.
 INFLUENCE_RUNS = 4 * len(_FACTORS) + 7 * len(_TENSIONS) + len(_SHARES)
 
@@ -64,6 +68,8 @@ class Gripping:
         followed: Travel over that of the reference, of the joint that follows least, shape (m,).
         predicted: Margin of the swing: critical over actual M^c.
         extrapolated: Share of critical at which 1 / tension, extrapolated from below, reaches zero.
+        tendons_lock: Factor of tendon friction at which it undoes force closure without joint friction, either way of
+            the swing; infinite if it does not up to the largest that was looked at.
     """
 
     shares: Array
@@ -71,6 +77,7 @@ class Gripping:
     followed: Array
     predicted: float
     extrapolated: float
+    tendons_lock: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +202,25 @@ def gripping(scenario: Scenario, *, progress: Progress | None = None) -> Grippin
     followed = (travel / wanted.where(wanted > 0.0)).min("joint")
     below, inverse = shares[_EXTRAPOLATED], 1.0 / tension.values[_EXTRAPOLATED]
     slope = (inverse[1] - inverse[0]) / (below[1] - below[0])
-    return Gripping(shares, tension.values, followed.values, margin, float(below[1] - inverse[1] / slope))
+    return Gripping(
+        shares=shares,
+        tension=tension.values,
+        followed=followed.values,
+        predicted=margin,
+        extrapolated=float(below[1] - inverse[1] / slope),
+        tendons_lock=_tendons_lock(swing),
+    )
+
+
+def _tendons_lock(swing: Scenario) -> float:
+    for factor in np.arange(1.0, MOST_TENDON_FRICTION + 1.0):
+        tendons = Tendons.from_description(with_tendon_friction(swing, float(factor)).finger)
+        motion = swing.build_reference(tendons.routing).at(0.5 * swing.simulation.duration)
+        for way in (1.0, -1.0):
+            coupling = coupling_in_motion(tendons, motion.position, way * motion.velocity)
+            if not ForceClosure.of(coupling, tendons.routing.tendons).holds:
+                return float(factor)
+    return float("inf")
 
 
 def error_at_work(sweep: Sweep, work: Array, lost: float) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from finger_pin.experiments.delivery import BROKEN, PassiveDelivery, crossing
 from finger_pin.experiments.findings import Finding, Verdict
-from finger_pin.experiments.influence import FrictionInfluence, Sweep, error_at_work
+from finger_pin.experiments.influence import MOST_TENDON_FRICTION, FrictionInfluence, Sweep, error_at_work
 from finger_pin.experiments.posture import Transmission
 from finger_pin.routing import Array
 from finger_pin.validation import expand
@@ -169,7 +169,6 @@ def _senses(found: FrictionInfluence) -> list[tuple[str, str, bool]]:
     works = found.joint_alone.runs.joint_work, found.tendon_alone.runs.tendon_work
     alone = [error_at_work(s, w, work) for s, w in zip((found.joint_alone, found.tendon_alone), works, strict=True)]
     high = [sweep.runs.error[_row(sweep, _HIGH)] for sweep in (found.joint, found.tendon)]
-    most = found.tendon.values[-1]
     followed = bool(found.gripping.followed[-1] < 0.5)
     return [
         (
@@ -196,9 +195,9 @@ def _senses(found: FrictionInfluence) -> list[tuple[str, str, bool]]:
         ),
         (
             "only it can stop the finger",
-            f"joints lock at {found.gripping.predicted:.2f} times their friction; with {most:g} times the tendons' "
-            f"friction the error is {_degrees(found.tendon.runs.error[-1])}",
-            followed and bool(found.tendon.runs.error[-1] < found.joint.runs.error[-1]),
+            f"joints lock at {found.gripping.predicted:.2f} times their friction, tendons at "
+            f"{_times(found.gripping.tendons_lock, MOST_TENDON_FRICTION)} theirs, by the statics",
+            followed and bool(found.gripping.tendons_lock > found.gripping.predicted),
         ),
     ]
 

@@ -6,11 +6,13 @@ import xarray as xr
 
 import finger_pin as fp
 from finger_pin.analysis.transmission import (
+    coupling_in_motion,
     flexion_postures,
     transmission_efficiency,
     transmission_in_motion,
     workspace_postures,
 )
+from finger_pin.routing import ForceClosure
 
 
 def curvature_by_hand(theta):
@@ -104,3 +106,14 @@ def test_a_tendon_slides_only_some_bristle_lengths_after_its_reversal(finger):
     assert time[np.argmax(sliding[:, 0])] == pytest.approx(0.080, abs=0.002)
     assert not sliding[(time > 0.2) & (time < 0.275)].any()
     assert sliding[time > 0.285].all()
+
+
+def test_tendon_friction_scales_the_rows_of_the_coupling_and_leaves_force_closure(finger):
+    """T3 pulls, exp(-mu phi), T4 is drawn out, exp(mu phi); T5's proximal half pulls, 1 + mu, the distal one yields."""
+    theta, velocity = np.array([0.1, 0.5, 0.6, 0.42]), np.array([0.0, 1.0, 1.0, 0.7])
+    phi, mu = curvature_by_hand(theta), np.tanh(0.055 * 0.58)
+    found = coupling_in_motion(finger.tendons, theta, velocity)
+    np.testing.assert_allclose(found[2], [0, 0, 6.3e-3 * np.exp(-0.11 * phi[2]), 0], atol=1e-15)
+    np.testing.assert_allclose(found[3], np.array([0, -1, -1, -1]) * 5.3e-3 * np.exp(0.11 * phi[3]), atol=1e-15)
+    np.testing.assert_allclose(found[4], [0, 0, -3.5e-3 * (1 + mu), 5e-3 * (1 - mu)], atol=1e-15)
+    assert ForceClosure.of(found, finger.routing.tendons).holds

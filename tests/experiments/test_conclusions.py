@@ -107,6 +107,7 @@ def test_a_simulated_finger_grips_itself_where_the_statics_say():
     assert 0.35e-3 * grip.predicted == pytest.approx(0.7418e-3, rel=1e-3)
     assert grip.extrapolated == pytest.approx(1.0, abs=0.03)
     assert grip.followed[0] > 0.9 and grip.followed[-1] < 0.25
+    assert grip.tendons_lock == np.inf
 
 
 def resting_passive_tension(finger, gain, minimum, desired):
