@@ -123,7 +123,9 @@ class FrictionLoop:
             balance, friction_torque = balance / rows, friction_torque / rows
             regular = finite & (np.abs(np.linalg.det(balance)) > _SINGULAR)
             balance = np.where(regular[..., None, None], balance, np.eye(len(torque[0])))
-            values, vectors = np.linalg.eig(np.linalg.solve(balance, friction_torque))
+            turn = np.linalg.solve(balance, friction_torque)
+            regular &= np.isfinite(turn).all(axis=(2, 3))
+            values, vectors = np.linalg.eig(np.where(regular[..., None, None], turn, 0.0))
             real = regular[..., None] & (values.real > 0.0) & (np.abs(values.imag) <= _REAL * np.abs(values))
             for sign in (1.0, -1.0):
                 # Rows: case, cell, eigenvector; then the joint.

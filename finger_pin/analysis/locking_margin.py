@@ -102,7 +102,7 @@ def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
 
 def locking_advice(margin: float) -> str:
     """Return what to say about a margin, in one line; nothing where it is wide."""
-    if margin >= CLOSE_TO_LOCKING:
+    if not margin < CLOSE_TO_LOCKING:
         return ""
     effect = "tensions run away" if margin < 1.0 else "tensions multiply"
     return f"joint friction is at {1.0 / margin:.2f} of what locks the finger: {effect}"
