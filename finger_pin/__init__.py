@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted
+from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, SelfLockingWarning
 from finger_pin.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
 from finger_pin.parameters import FingerDescription
 from finger_pin.scenario import Scenario
@@ -36,11 +36,23 @@ if TYPE_CHECKING:
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
-    from finger_pin.plots import draw_all, plot_energy, plot_fig6, plot_friction_law, plot_losses, plot_workspace
+    from finger_pin.plots import (
+        draw_all,
+        plot_critical_friction,
+        plot_energy,
+        plot_fig6,
+        plot_force_polytope,
+        plot_friction_law,
+        plot_losses,
+        plot_radius_sensitivity,
+        plot_runaway,
+        plot_self_locking_map,
+        plot_workspace,
+    )
     from finger_pin.recording import load_result, save
     from finger_pin.simulation import simulate
     from finger_pin.simulator import Simulator
-    from finger_pin.viewer import LiveView, view, write_animation
+    from finger_pin.viewer import LiveView, view, view_forces, write_animation
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
@@ -62,10 +74,15 @@ _LATER = {
     "force_polytope": "analysis",
     "largest_force": "analysis",
     "load_result": "recording",
+    "plot_critical_friction": "plots",
     "plot_energy": "plots",
     "plot_fig6": "plots",
+    "plot_force_polytope": "plots",
     "plot_friction_law": "plots",
     "plot_losses": "plots",
+    "plot_radius_sensitivity": "plots",
+    "plot_runaway": "plots",
+    "plot_self_locking_map": "plots",
     "plot_workspace": "plots",
     "save": "recording",
     "self_locking_map": "analysis",
@@ -75,6 +92,7 @@ _LATER = {
     "tension_for_force": "analysis",
     "to_mjcf": "mjcf",
     "view": "viewer",
+    "view_forces": "viewer",
     "write_animation": "viewer",
 }
 
@@ -93,6 +111,7 @@ __all__ = [
     "PassiveTensionLoop",
     "PseudoInverse",
     "Scenario",
+    "SelfLockingWarning",
     "Simulator",
     "TendonFeedforward",
     "TorqueLaw",
@@ -107,10 +126,15 @@ __all__ = [
     "load_finger",
     "load_result",
     "load_scenario",
+    "plot_critical_friction",
     "plot_energy",
     "plot_fig6",
+    "plot_force_polytope",
     "plot_friction_law",
     "plot_losses",
+    "plot_radius_sensitivity",
+    "plot_runaway",
+    "plot_self_locking_map",
     "plot_workspace",
     "save",
     "self_locking_map",
@@ -121,6 +145,7 @@ __all__ = [
     "to_mjcf",
     "to_toml",
     "view",
+    "view_forces",
     "write_animation",
 ]
 

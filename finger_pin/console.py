@@ -62,6 +62,18 @@ def progress_bar(duration: float) -> Iterator[Callable[[float], None]]:
         yield lambda time: bar.update(task, completed=time)
 
 
+@contextmanager
+def runs_bar(total: int) -> Iterator[Callable[[int], None]]:
+    """Show a bar on standard error, and give a function that takes the number of further runs that are finished."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("runs"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda further: bar.advance(task, further)
+
+
 def print_text(text: str) -> None:
     """Print to standard output, whose reader may have gone and whose encoding may lack characters."""
     encoding = sys.stdout.encoding or "utf-8"

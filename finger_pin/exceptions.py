@@ -15,6 +15,10 @@ class FingerPinError(Exception):
     """Root of the project's exceptions."""
 
 
+class SelfLockingWarning(UserWarning):
+    """A scenario comes close to the joint friction at which its finger locks itself, or exceeds it."""
+
+
 class InputError(FingerPinError, ValueError):
     """An entry of the input is wrong; the message is one line that a person can act on.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -11,14 +12,15 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 import numpy as np
 import xarray as xr
 
+from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.core.compilation import CACHE_FOLDER
-from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 
 # Runs that are handed to each process ahead of time, so that none waits for the next.
 _IN_FLIGHT = 2
-_PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time")
+_PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 
 
 def simulate_many(
@@ -44,6 +46,9 @@ def simulate_many(
 
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
+
+    Warns:
+        SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
     """
     runs = list(scenarios)
     if not runs:
@@ -58,7 +63,14 @@ def simulate_many(
         results[index] = result
         if progress is not None:
             progress(done, len(runs))
-    return _stack(runs, results)
+    stacked = _stack(runs, results)
+    margins = stacked["self_locking_margin"].values
+    advice = locking_advice(float(margins.min()))
+    if advice:
+        close = sum(bool(locking_advice(float(margin))) for margin in margins)
+        message = f"{close} of {len(runs)} runs come close to self-locking; in the closest {advice}"
+        warnings.warn(message, SelfLockingWarning, stacklevel=2)
+    return stacked
 
 
 def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: int) -> Iterator[tuple[int, xr.Dataset]]:
@@ -117,7 +129,10 @@ def _context() -> multiprocessing.context.BaseContext:
 def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
-        result = simulate(scenario)
+        with warnings.catch_warnings():
+            # Other processes cannot warn here, and a hundred runs should not warn a hundred times.
+            warnings.simplefilter("ignore", SelfLockingWarning)
+            result = simulate(scenario)
     except IntegrationError as error:
         assert error.result is not None
         failure, result = str(error), error.result

@@ -17,6 +17,9 @@ from finger_pin.parameters import FingerDescription
 
 Array = NDArray[np.float64]
 
+# Below this share of the largest, an internal tension counts as none.
+_SLACK = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Routing:
@@ -135,8 +138,9 @@ class ForceClosure:
         count = null_space.shape[1]
         tension = np.zeros(len(tendons))
         if count == 1:
-            vector = null_space[:, 0]
-            tension = vector / vector[np.argmax(np.abs(vector))]
+            vector = _largest_one(null_space[:, 0])
+            # Where signs are mixed, any multiple but zero would make some tendon push.
+            tension = vector if vector.min() >= -_SLACK else np.zeros(len(tendons))
         elif count > 1:
             tension = _tautest(null_space)
         return cls(null_space, tension, tendons)
@@ -144,7 +148,7 @@ class ForceClosure:
     @property
     def holds(self) -> bool:
         """Whether every internal tension is positive."""
-        return bool(np.all(self.tension > 1e-9))
+        return bool(np.all(self.tension > _SLACK))
 
     def __str__(self) -> str:
         """Say in one line what holds or what is missing."""
@@ -153,8 +157,15 @@ class ForceClosure:
             return f"force closure: internal tensions in the ratio {listed}"
         if self.null_space.shape[1] == 0:
             return "no force closure: no tensions balance each other at zero torque (too few tendons)"
-        worst = [n for n, f in zip(self.tendons, self.tension, strict=True) if f <= 1e-9]
+        balance = self.tension
+        if self.null_space.shape[1] == 1:
+            balance = _largest_one(self.null_space[:, 0])
+        worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
+
+
+def _largest_one(vector: Array) -> Array:
+    return np.asarray(vector / vector[np.argmax(np.abs(vector))])
 
 
 def _tautest(null_space: Array) -> Array:
@@ -168,7 +179,7 @@ def _tautest(null_space: Array) -> Array:
         b_ub=np.append(np.zeros(size), np.ones(size)),
         bounds=[(None, None)] * count + [(None, 1.0)],
     )
-    if solution.x[-1] <= 1e-9:
+    if solution.x[-1] <= _SLACK:
         # Not all can be taut: most entries e_i in [0, 1] with N y >= e; a tendon that can be taut reaches 1.
         solution = scipy.optimize.linprog(
             np.append(np.zeros(count), -np.ones(size)),
@@ -177,4 +188,4 @@ def _tautest(null_space: Array) -> Array:
             bounds=[(None, None)] * count + [(0.0, 1.0)] * size,
         )
     tension = np.asarray(null_space @ solution.x[:count])
-    return tension / tension.max() if tension.max() > 1e-9 else np.zeros(size)
+    return tension / tension.max() if tension.max() > _SLACK else np.zeros(size)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from finger_pin.analysis.locking_margin import warn_of_self_locking
 from finger_pin.blocks.controller import Controller, ProportionalController
 from finger_pin.blocks.reference import HarmonicReference
 from finger_pin.closed_loop import ClosedLoop, LoopSignals, Reference
@@ -69,9 +70,17 @@ def simulate(
         InputError: If the control period is not positive, the method cannot sample, or the controller must be sampled.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
+
+    Warns:
+        SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
+            the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
+            there is neither.
     """
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
+    # The margin is that of the paper's controller on the scenario's reference.
+    own = controller is None and reference is None
+    margin = warn_of_self_locking(scenario) if own else None
     sampling = _sampling(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
@@ -94,6 +103,8 @@ def simulate(
     # A motion at the edge of what numbers hold has energies beyond it: that is told below, in one line.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         result = record(scenario, loop, trajectory, method)
+    if margin is not None:
+        result.attrs["self_locking_margin"] = margin
     result, excess = _finite_part(result)
     if trajectory.failure:
         tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.routing import Array
 
 _SETTLING = 1.0
@@ -21,7 +22,8 @@ def summarize(result: xr.Dataset) -> str:
     Args:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
-    blocks = [_head(result), _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
+    head = [*_head(result), *_locking(result)]
+    blocks = [head, _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
@@ -30,6 +32,11 @@ def _head(result: xr.Dataset) -> list[str]:
     title = " ".join(str(attributes["title"]).split())
     tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
     return [title, f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"]
+
+
+def _locking(result: xr.Dataset) -> list[str]:
+    advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
+    return [f"Warning: {advice}"] if advice else []
 
 
 def _tracking(result: xr.Dataset) -> list[str]:

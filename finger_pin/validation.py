@@ -123,6 +123,18 @@ def expand(value: Numbers, size: int) -> NDArray[np.float64]:
     return np.broadcast_to(np.asarray(value, dtype=float), (size,)).copy()
 
 
+def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Return an argument as an array of ``size`` numbers.
+
+    Raises:
+        InputError: If it has another shape or a number is not finite; ``name`` names the argument.
+    """
+    found = np.asarray(value, dtype=float)
+    if found.shape != (size,) or not np.isfinite(found).all():
+        raise InputError(name, f"must be {size} finite numbers", found.tolist())
+    return found
+
+
 def check_size(value: Numbers, names: Sequence[str], entry: str, what: str) -> None:
     """Raise the error of an entry whose list does not have one number per name."""
     if isinstance(value, tuple) and len(value) != len(names):

@@ -7,43 +7,64 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from command_line import DONE, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain, number, positive
 
-import finger_pin as fp
-from finger_pin.analysis import Friction, tension_for_force
-from finger_pin.plots import save_figure
-from finger_pin.plots.force_capability import plot_force_polytope, plot_radius_sensitivity
+PROGRAM = "force_capability.py"
 
 
-def main() -> int:
-    """Do what the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("finger", nargs="?", default="ub", help="name or path; default ub")
-    parser.add_argument("--posture", type=float, nargs="+", metavar="DEG", help="joint angles; default a third of each")
-    parser.add_argument("--limit", type=float, default=20.0, metavar="N", help="greatest tension; default 20")
-    parser.add_argument("--force", type=float, nargs=3, default=(0.0, 0.0, 1.0), metavar="N", help="default 0 0 1")
-    parser.add_argument("--output", type=Path, default=Path("results/force_capability"), help="where figures go")
-    options = parser.parse_args()
+def main(arguments: list[str] | None = None) -> int:
+    """Do what a command line says; return the exit code."""
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
+    add = parser.add_argument
+    add("finger", nargs="?", default="ub", metavar="FINGER", help="name or path of a .toml file; default ub")
+    add("--posture", type=number, nargs="+", metavar="DEG", help="joint angles; default a third of each range")
+    add("--limit", type=positive, default=20.0, metavar="N", help="greatest tension; default %(default)s")
+    add("--force", type=number, nargs=3, default=(0.0, 0.0, 1.0), metavar="N", help="x y z; default 0 0 1")
+    add("--output", type=Path, default=Path("results/force_capability"), metavar="DIR", help="default %(default)s")
+    add("--view", action="store_true", help="show the set of forces at the fingertip in the viewer")
+    try:
+        return run(parser.read(arguments))
+    except KeyboardInterrupt:
+        complain(PROGRAM, "interrupted")
+        return INTERRUPTED
+
+
+def run(options: argparse.Namespace) -> int:
+    """Report, draw and show; return the exit code."""
+    import finger_pin as fp
+    from finger_pin.analysis import Friction
+    from finger_pin.console import print_text
+    from finger_pin.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
+
     try:
         finger = fp.Finger(fp.load_finger(options.finger))
         limiter = finger.stroke_limiter
         posture = limiter.lower + (limiter.upper - limiter.lower) / 3.0
         if options.posture:
             posture = np.deg2rad(options.posture)
-        print(f"Largest tension for a force of {np.linalg.norm(options.force):g} N, N")
-        for friction in Friction:
-            needed = tension_for_force(finger, posture, options.force, friction=friction)
-            print(f"  friction {friction.value:10} {needed.largest:8.3f}")
+        if len(posture) != len(finger.routing.joints):
+            allowed = f"must be {len(finger.routing.joints)} angles, one per joint ({', '.join(finger.routing.joints)})"
+            raise fp.InputError("--posture", allowed, options.posture)
+        needed = {each: fp.tension_for_force(finger, posture, options.force, friction=each) for each in Friction}
+        polytope = fp.force_polytope(finger, posture, options.limit)
         figures = {
             "forces": plot_force_polytope(finger, posture, options.limit),
             "sensitivity": plot_radius_sensitivity(finger, posture, options.force),
         }
+        for name, figure in figures.items():
+            save_figure(figure, options.output / f"{name}.png")
     except fp.InputError as error:
-        print(f"force_capability.py: {error}", file=sys.stderr)
-        return 2
-    for name, figure in figures.items():
-        save_figure(figure, options.output / f"{name}.png")
-    print(f"Figures are in {options.output}")
-    return 0
+        complain(PROGRAM, str(error))
+        return WRONG_INPUT
+    except OSError as error:
+        complain(PROGRAM, f"--output = {options.output}: cannot be written: {error.strerror or error}")
+        return NOT_WRITTEN
+    lines = [f"Largest tension for a force of {np.linalg.norm(options.force):g} N, N"]
+    lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
+    print_text("\n".join([*lines, f"Figures are in {options.output}"]))
+    if options.view:
+        fp.view_forces(finger.description, polytope, tension=needed[Friction.NONE].strands)
+    return DONE
 
 
 if __name__ == "__main__":

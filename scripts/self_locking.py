@@ -2,49 +2,83 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain
 
-import finger_pin as fp
-from finger_pin.analysis import critical_friction, self_locking_map, self_locking_margin
-from finger_pin.plots import save_figure
-from finger_pin.plots.self_locking import plot_critical_friction, plot_runaway, plot_self_locking_map
+if TYPE_CHECKING:
+    import finger_pin as fp
 
+PROGRAM = "self_locking.py"
 SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
 
 
-def main() -> int:
-    """Do what the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenario", nargs="?", default="fig6", help="name or path; default fig6")
-    parser.add_argument("--output", type=Path, default=Path("results/self_locking"), help="where figures go")
-    options = parser.parse_args()
+def main(arguments: list[str] | None = None) -> int:
+    """Do what a command line says; return the exit code."""
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
+    add = parser.add_argument
+    add("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path of a .toml file; default fig6")
+    add("--output", type=Path, default=Path("results/self_locking"), metavar="DIR", help="default %(default)s")
+    options = parser.read(arguments)
     try:
-        scenario = fp.load_scenario(options.scenario)
+        return run(options.scenario, options.output)
+    except KeyboardInterrupt:
+        complain(PROGRAM, "interrupted")
+        return INTERRUPTED
+
+
+def run(name: str, output: Path) -> int:
+    """Report and draw; return the exit code."""
+    import finger_pin as fp
+    from finger_pin.console import print_text
+    from finger_pin.plots import plot_critical_friction, plot_runaway, plot_self_locking_map, save_figure
+
+    try:
+        scenario = fp.load_scenario(name)
+        finger, margin = scenario.finger, fp.self_locking_margin(scenario)
+        lines = ["Joint friction at which the finger locks, mm"]
+        for joint in finger.joints:
+            lines.append(f"  {joint:12} {1e3 * fp.critical_friction(finger, joints=[joint]).coefficient:8.3f}")
+        lines.append(f"  {'all joints':12} {1e3 * fp.critical_friction(finger).coefficient:8.3f}")
+        lines.append(
+            f"On its reference, {scenario.name} stays a factor {margin.margin:.3g} below, least at {margin.time:.3g} s"
+        )
+        figures = {
+            "critical_friction": plot_critical_friction(finger),
+            "map": plot_self_locking_map(fp.self_locking_map(fp.Finger(finger))),
+        }
+        if np.isfinite(margin.margin):
+            with warnings.catch_warnings():
+                # Runs on both sides are the point.
+                warnings.simplefilter("ignore", fp.SelfLockingWarning)
+                runs = {
+                    f"{share:g} of critical": fp.simulate(scaled(name, scenario, share * margin.margin))
+                    for share in SHARES
+                }
+            figures["runs"] = plot_runaway(runs)
+        for title, figure in figures.items():
+            save_figure(figure, output / f"{title}.png")
     except fp.InputError as error:
-        print(f"self_locking.py: {error}", file=sys.stderr)
-        return 2
-    finger = scenario.finger
-    print("Joint friction at which the finger locks, mm")
-    for joint in finger.joints:
-        print(f"  {joint:12} {1e3 * critical_friction(finger, joints=[joint]).coefficient:8.3f}")
-    print(f"  {'all joints':12} {1e3 * critical_friction(finger).coefficient:8.3f}")
-    margin = self_locking_margin(scenario)
-    print(f"On its reference, {scenario.name} stays a factor {margin.margin:.3g} below, least at {margin.time:.3g} s")
-    save_figure(plot_critical_friction(finger), options.output / "critical_friction.png")
-    save_figure(plot_self_locking_map(self_locking_map(fp.Finger(finger))), options.output / "map.png")
-    if np.isfinite(margin.margin):
-        runs = {f"{share:g} of critical": scaled(options.scenario, scenario, share * margin.margin) for share in SHARES}
-        save_figure(plot_runaway({label: fp.simulate(run) for label, run in runs.items()}), options.output / "runs.png")
-    print(f"Figures are in {options.output}")
-    return 0
+        complain(PROGRAM, str(error))
+        return WRONG_INPUT
+    except fp.IntegrationError as error:
+        complain(PROGRAM, str(error))
+        return FAILED
+    except OSError as error:
+        complain(PROGRAM, f"--output = {output}: cannot be written: {error.strerror or error}")
+        return NOT_WRITTEN
+    print_text("\n".join([*lines, f"Figures are in {output}"]))
+    return DONE
 
 
 def scaled(name: str, scenario: fp.Scenario, factor: float) -> fp.Scenario:
     """Return the scenario with M^c of the joints times a factor, and M^d alike: sliding is no easier than starting."""
+    import finger_pin as fp
+
     static = (factor * np.asarray(scenario.finger.joint_friction.stiction)).tolist()
     return fp.load_scenario(name, {f"finger.joint_friction.{key}": static for key in ("coulomb", "stiction")})
 

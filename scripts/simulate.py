@@ -6,11 +6,13 @@ import argparse
 import re
 import sys
 import tomllib
+import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
+
+from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,18 +22,9 @@ if TYPE_CHECKING:
     from finger_pin.scenario import Scenario
     from finger_pin.viewer import LiveView
 
-DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+PROGRAM = "simulate.py"
 # A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
 BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print one line and exit."""
-        complain(message)
-        self.exit(WRONG_INPUT)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -47,13 +40,13 @@ def main(arguments: list[str] | None = None) -> int:
         with console.Interrupts() as interrupts:
             return run(options, interrupts)
     except KeyboardInterrupt:
-        complain("interrupted")
+        complain(PROGRAM, "interrupted")
         return INTERRUPTED
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Parse a command line, or exit."""
-    parser = Parser(prog="simulate.py", description=__doc__, allow_abbrev=False)
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
     add: Callable[..., Any] = parser.add_argument
     flag = argparse.BooleanOptionalAction
     add("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path of a .toml file; default fig6")
@@ -67,14 +60,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--check", action="store_true", help="repeat the run at a tighter tolerance, and report where the two part")
     add("--quiet", action="store_true", help="print errors only")
     add("--list", action="store_true", help="list scenarios, fingers and methods, and exit")
-    options, surplus = parser.parse_known_args(arguments)
-    if surplus:
-        wrong = next((each for each in surplus if each.startswith("-")), surplus[0])
-        known = [name for action in parser._actions for name in action.option_strings]
-        near = get_close_matches(wrong.split("=")[0], known, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        parser.error(f"{wrong}: no such argument; there are one SCENARIO, {', '.join(known)}{hint}")
-    return options
+    return parser.read(arguments)
 
 
 def override(text: str) -> tuple[str, Any]:
@@ -119,7 +105,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
         with ResultFolder(output) as folder:
             code, result, problem = simulate(scenario, interrupts, options)
             if result is None:
-                complain(f"{problem}; nothing was computed")
+                complain(PROGRAM, f"{problem}; nothing was computed")
                 return code
             if options.check and code == DONE:
                 code, result, problem = check(scenario, result, interrupts, options)
@@ -134,13 +120,13 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
             with interrupts.patient():
                 folder.publish()
     except InputError as error:
-        complain(str(error))
+        complain(PROGRAM, str(error))
         return WRONG_INPUT
     except OSError as error:
-        complain(f"the results cannot be written, earlier ones are as they were: {error}")
+        complain(PROGRAM, f"the results cannot be written, earlier ones are as they were: {error}")
         return NOT_WRITTEN
     if problem:
-        complain(f"{problem}; what was computed is in {output}")
+        complain(PROGRAM, f"{problem}; what was computed is in {output}")
     if not options.quiet:
         print_text(f"{summarize(result)}\n\nResults are in {output}")
     if options.view and code == DONE:
@@ -156,16 +142,18 @@ def simulate(
     """Return the exit code, the result as far as it goes, and what went wrong if anything did."""
     from finger_pin.console import progress_bar
     from finger_pin.core.compilation import is_cached
-    from finger_pin.exceptions import IntegrationError, Interrupted
+    from finger_pin.exceptions import IntegrationError, Interrupted, SelfLockingWarning
     from finger_pin.simulation import simulate
 
     shown = sys.stderr.isatty() and not options.quiet
     if shown and not is_cached():
         print("Compiling the model, once for this version: about half a minute ...", file=sys.stderr)
     bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
-    with bar as progress, live_view(scenario, options.live) as live, interrupts.patient():
+    with bar as progress, live_view(scenario, options.live) as live, interrupts.patient(), warnings.catch_warnings():
         observe = live.observe if live else None
         try:
+            # The summary says what it would say.
+            warnings.simplefilter("ignore", SelfLockingWarning)
             return DONE, simulate(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested), ""
         except IntegrationError as error:
             return FAILED, error.result, str(error)
@@ -232,11 +220,6 @@ def listing() -> str:
     tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Methods": dict.fromkeys(METHODS, "")}
     rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}
     return "\n\n".join("\n".join([title, *lines]) for title, lines in rows.items())
-
-
-def complain(message: str) -> None:
-    """Print one line on standard error."""
-    print("simulate.py:", "".join(c if c.isprintable() else repr(c)[1:-1] for c in message), file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,8 @@ from finger_pin.validation import validate
 
 # A run of so short a time takes a second or two even where steps are as small as they may be.
 LONGEST = 1e-4
+# An energy, J, that only rounding makes, in a finger that rests without any.
+NOTHING = 1e-30
 FEW = settings(
     derandomize=True,
     database=None,
@@ -173,6 +175,7 @@ def says_what_to_try(error: IntegrationError) -> None:
     assert "t = " in str(error) and error.reason and error.advice in str(error)
 
 
+@pytest.mark.filterwarnings("ignore::finger_pin.SelfLockingWarning")
 @FEW
 @given(scenarios())
 def test_a_run_ends_finite_and_accounted_for_or_says_why_it_stopped(table):
@@ -190,7 +193,7 @@ def test_a_run_ends_finite_and_accounted_for_or_says_why_it_stopped(table):
     energies = [result[name].values for name in result if name.startswith("energy_") and name != "energy_residual"]
     exchanged = sum(np.abs(each - each[0]).max() for each in energies)
     total = sum(np.abs(each).max() for each in energies)
-    assert float(abs(result["energy_residual"]).max()) <= 5e-3 * exchanged + 1e-12 * total
+    assert float(abs(result["energy_residual"]).max()) <= 5e-3 * exchanged + 1e-12 * total + NOTHING
 
 
 @FEW

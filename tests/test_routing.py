@@ -121,6 +121,17 @@ def test_a_null_vector_of_mixed_signs_is_no_force_closure_and_names_the_tendons_
     closure = Routing.from_description(description).force_closure()
     assert not closure.holds
     assert str(closure) == "no force closure: T1, T2 cannot be kept taut at zero joint torque"
+    np.testing.assert_allclose(closure.null_space[[0, 3], 0] @ [2 * 8.0, 5.3], 0.0, atol=1e-9)
+    np.testing.assert_array_equal(closure.tension, 0.0)
+
+
+def test_a_single_null_vector_may_leave_a_tendon_slack(network):
+    """B balances A; C alone turns joint k, so that it cannot pull at zero torque, while A and B can."""
+    description = network("jk", {"A": {"j": 6}, "B": {"j": -3}, "C": {"k": 5}})
+    closure = Routing.from_description(description).force_closure()
+    assert not closure.holds
+    np.testing.assert_allclose(closure.tension, [0.5, 1.0, 0.0], atol=1e-12)
+    assert str(closure) == "no force closure: C cannot be kept taut at zero joint torque"
 
 
 def test_with_two_internal_directions_the_weakest_tendon_is_kept_as_taut_as_possible(network):

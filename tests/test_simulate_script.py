@@ -135,6 +135,18 @@ def test_without_figures_those_of_an_earlier_run_are_gone_and_the_animation_is_n
     assert set(contents(here / "out")) == ALL
 
 
+def test_a_finger_that_locks_itself_is_told_in_one_line_of_the_summary_and_nowhere_else(run, quick):
+    stuck = ("fig6", "--duration", "0.01")
+    for name in ("coulomb", "stiction"):
+        stuck += ("--set", f"finger.joint_friction.{name}=5e-3")
+    code, out, lines = run(*stuck)
+    assert (code, lines) == (0, [])
+    (told,) = [line for line in out.splitlines() if line.startswith("Warning:")]
+    assert "of what locks the finger: tensions run away" in told and len(told) <= 80
+    assert run(*stuck, "--quiet") == (0, "", [])
+    assert "Warning" not in run("fig6", "--duration", "0.01")[1]
+
+
 def test_quiet_prints_nothing(run, quick):
     assert run("s.toml", "--quiet") == (0, "", [])
 
@@ -515,6 +527,7 @@ def test_wrong_options_are_told_without_importing_anything_heavy(here):
     code = (
         "import runpy, sys\n"
         f"sys.argv = ['simulate.py', '--no-such-option']\n"
+        f"sys.path.insert(0, {str(SCRIPT.parent)!r})\n"
         "try:\n"
         f"    runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n"
         "except SystemExit as end:\n"
@@ -529,6 +542,7 @@ def test_listing_imports_neither_matplotlib_nor_meshcat(here):
     code = (
         "import runpy, sys\n"
         f"sys.argv = ['simulate.py', '--list']\n"
+        f"sys.path.insert(0, {str(SCRIPT.parent)!r})\n"
         "try:\n"
         f"    runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n"
         "finally:\n"

@@ -5,24 +5,19 @@ It reads descriptions, fingers, scenarios and results, and nothing of the simula
 
 from __future__ import annotations
 
-from finger_pin.analysis.force_capability import (
-    ForcePolytope,
-    Friction,
-    RequiredTension,
-    force_polytope,
-    largest_force,
-    tension_for_force,
+from finger_pin.analysis.locking import CriticalFriction, critical_friction
+from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
+from finger_pin.analysis.locking_margin import (
+    SelfLockingMargin,
+    locking_advice,
+    self_locking_margin,
+    warn_of_self_locking,
 )
 from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
+from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.reaction import JointReactions, ReactionDifference, fingertip_loads, joint_reactions
-from finger_pin.analysis.self_locking import (
-    CriticalFriction,
-    SelfLockingMap,
-    SelfLockingMargin,
-    critical_friction,
-    self_locking_map,
-    self_locking_margin,
-)
+from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
+from finger_pin.analysis.tip_statics import Friction
 
 __all__ = [
     "CriticalFriction",
@@ -39,8 +34,10 @@ __all__ = [
     "force_polytope",
     "joint_reactions",
     "largest_force",
+    "locking_advice",
     "pin_wrench",
     "self_locking_map",
     "self_locking_margin",
     "tension_for_force",
+    "warn_of_self_locking",
 ]

@@ -1,4 +1,4 @@
-"""Figures: the workspace and the friction law of the paper, and what a result holds.
+"""Figures: the workspace and the friction law of the paper, what a result holds, what analyses and experiments say.
 
 Every function returns a matplotlib ``Figure`` that belongs to no window: save it with ``figure.savefig(path)``.
 Figures of a result are drawn from its Dataset alone.
@@ -14,16 +14,29 @@ from matplotlib.figure import Figure
 from finger_pin.files import replacing
 from finger_pin.plots.energy import plot_energy
 from finger_pin.plots.fig6 import plot_fig6
+from finger_pin.plots.force_capability import plot_force_polytope, plot_radius_sensitivity
+from finger_pin.plots.friction_influence import plot_friction_influence
 from finger_pin.plots.friction_law import plot_friction_law
 from finger_pin.plots.losses import plot_losses
+from finger_pin.plots.passive_delivery import plot_passive_delivery
+from finger_pin.plots.self_locking import plot_critical_friction, plot_runaway, plot_self_locking_map
+from finger_pin.plots.transmission import plot_transmission
 from finger_pin.plots.workspace import plot_workspace
 
 __all__ = [
     "draw_all",
+    "plot_critical_friction",
     "plot_energy",
     "plot_fig6",
+    "plot_force_polytope",
+    "plot_friction_influence",
     "plot_friction_law",
     "plot_losses",
+    "plot_passive_delivery",
+    "plot_radius_sensitivity",
+    "plot_runaway",
+    "plot_self_locking_map",
+    "plot_transmission",
     "plot_workspace",
     "save_figure",
 ]

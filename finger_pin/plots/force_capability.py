@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-from finger_pin.analysis.force_capability import Friction, force_polytope, largest_force, tension_for_force
+from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
 from finger_pin.finger import Finger
 from finger_pin.plots.lines import series
 from finger_pin.plots.reach import flexion_section
@@ -42,9 +42,9 @@ def plot_force_polytope(finger: Finger, position: Sequence[float] | Array, limit
     if polytope.basis.shape[1] == 3 and len(polytope.faces):
         space = figure.add_axes((0.01, 0.03, 0.44, 0.86), projection="3d")
         assert isinstance(space, Axes3D)
-        triangles = polytope.vertices[np.asarray(polytope.faces)]
+        triangles = polytope.vertices[polytope.triangles()]
         space.add_collection3d(Poly3DCollection(triangles, facecolors=BLUE, alpha=0.18, edgecolors="none"))
-        for first, second in _ridges(np.asarray(polytope.faces), polytope.normals):
+        for first, second in polytope.ridges():
             space.plot(*polytope.vertices[[first, second]].T, color=BLUE, linewidth=0.9)
         space.scatter(0.0, 0.0, 0.0, color=BLACK, s=14)
         low, high = polytope.vertices.min(axis=0), polytope.vertices.max(axis=0)
@@ -103,13 +103,3 @@ def _section(axes: Axes, finger: Finger, position: Sequence[float] | Array, limi
     axes.set_xlabel(f"{_AXES[plane[0]]} (N)")
     axes.set_ylabel(f"{_AXES[plane[1]]} (N)")
     axes.legend(loc="best")
-
-
-def _ridges(faces: Array, normals: Array) -> list[tuple[int, int]]:
-    """Return the edges between faces that do not lie in one plane."""
-    beside: dict[tuple[int, int], list[int]] = {}
-    for index, face in enumerate(faces):
-        for first, second in ((0, 1), (1, 2), (2, 0)):
-            low, high = sorted((int(face[first]), int(face[second])))
-            beside.setdefault((low, high), []).append(index)
-    return [edge for edge, (one, other) in beside.items() if normals[one] @ normals[other] < 1.0 - 1e-6]

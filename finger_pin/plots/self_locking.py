@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.analysis.self_locking import SelfLockingMap, critical_friction
+from finger_pin.analysis import SelfLockingMap, critical_friction
 from finger_pin.parameters import FingerDescription
 from finger_pin.plots.lines import series
 from finger_pin.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled

@@ -6,6 +6,6 @@ listens on every network interface, while this one is bound to the loopback addr
 """
 
 from finger_pin.viewer.animation import write_animation
-from finger_pin.viewer.serving import LiveView, Viewing, view
+from finger_pin.viewer.serving import LiveView, Viewing, view, view_forces
 
-__all__ = ["LiveView", "Viewing", "view", "write_animation"]
+__all__ = ["LiveView", "Viewing", "view", "view_forces", "write_animation"]

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.analysis import ForcePolytope
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.parameters import FingerDescription
@@ -26,7 +27,7 @@ FRAME_RATE, MOST_FRAMES = 60.0, 3000
 _POSITIONS_IN_VIEW = 40
 
 
-def write_animation(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces: ForcePolytope | None = None) -> Path:
     """Write a result as one HTML file that plays it, without a network.
 
     The file appears whole or not at all; an earlier one is replaced.
@@ -34,6 +35,7 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Args:
         result: What `simulate` returned or saved.
         path: Of the file.
+        forces: Drawn at the fingertip of its posture, if given.
 
     Returns:
         The path of the file.
@@ -41,14 +43,14 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    target, text = Path(path), animation_page(result)
+    target, text = Path(path), animation_page(result, forces)
     with replacing(target) as temporary:
         Path(temporary).write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def animation_page(result: xr.Dataset) -> str:
-    """Return the page that plays a result."""
+def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None) -> str:
+    """Return the page that plays a result, with a set of fingertip forces if given."""
     scenario = _scenario(result)
     scene = Scene(FingerDescription.model_validate(scenario["finger"]))
     time = _variable(result, "time")
@@ -63,8 +65,24 @@ def animation_page(result: xr.Dataset) -> str:
             raise InputError(f"result.{name}", "must be finite")
     in_view = position[:: max(1, len(position) // _POSITIONS_IN_VIEW)]
     title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
-    header = scene.header(title, in_view, float(tension.max()), live=False)
+    header = scene.header(title, in_view, float(tension.max()), live=False, forces=forces)
     return render({**header, "chunks": [scene.chunk(time, position, tension)]})
+
+
+def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
+    """Return the page of a finger at rest in the posture of its fingertip forces.
+
+    Args:
+        description: The finger.
+        forces: Its forces.
+        strands: Tensions to show, shape (s,), N; none by default.
+    """
+    scene = Scene(description)
+    tension = np.zeros((1, len(scene.strands))) if strands is None else np.asarray(strands, dtype=float)[None]
+    position = forces.position[None]
+    title = description.title or description.name
+    header = scene.header(title, position, float(tension.max()), live=False, forces=forces)
+    return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
 
 
 def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:

@@ -11,10 +11,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from finger_pin.analysis import ForcePolytope
 from finger_pin.description import TIP_FRAME, to_urdf
 from finger_pin.geometry import BASE_LEAD, LinkPoses, TendonGeometry
 from finger_pin.parameters import FingerDescription
 from finger_pin.routing import Array
+from finger_pin.viewer.force_set import ForceSet
 from finger_pin.viewer.solids import link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
@@ -43,12 +45,20 @@ class Scene:
         self.strands = (*description.actuated_names, *halves)
         links = [joint.link for joint in description.joints.values() if joint.link is not None]
         self._widths = [link.width for link in links]
-        size = BASE_LEAD * links[0].width + sum(link.length for link in links)
+        size = self._size = BASE_LEAD * links[0].width + sum(link.length for link in links)
         # Points travel as 16-bit integers; this is their unit, a few micrometres.
         self._quantum = 1.5 * size / _LARGEST
         self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
-    def header(self, title: str, joint_positions: ArrayLike, largest_tension: float, *, live: bool) -> dict[str, Any]:
+    def header(
+        self,
+        title: str,
+        joint_positions: ArrayLike,
+        largest_tension: float,
+        *,
+        live: bool,
+        forces: ForcePolytope | None = None,
+    ) -> dict[str, Any]:
         """Return what the page needs to know before the first frame.
 
         Args:
@@ -56,18 +66,24 @@ class Scene:
             joint_positions: That the camera must have in view, shape (m, n), rad.
             largest_tension: That the legend must reach, N.
             live: Whether frames will come from the server.
+            forces: Drawn at the fingertip of its posture, if given.
         """
         geometry, widths = self.geometry, self._widths
         tube = min(_TUBE_IN_LANE * geometry.lanes.spacing, _TUBE_IN_LINK * min(widths))
         poses = geometry.poses(joint_positions)
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self._view()
+        shown = ForceSet.of(forces, self._size) if forces is not None else None
         seen = [poses.translation, self._tips(poses)[:, None, :], *(path.points for path in paths)]
+        if shown is not None:
+            seen.append(shown.corners)
         corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
+        drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
             "live": live,
-            "commands": [root_command(turn), *solid_commands(geometry, self._urdf, tube)],
+            "commands": [root_command(turn), *solid_commands(geometry, self._urdf, tube), *drawn],
+            "forces": shown.note if shown is not None else "",
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
             "strands": list(self.strands),

@@ -14,11 +14,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.analysis import ForcePolytope
 from finger_pin.closed_loop import LoopSignals
 from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
 from finger_pin.routing import Array
-from finger_pin.viewer.animation import animation_page
+from finger_pin.viewer.animation import animation_page, posture_page
 from finger_pin.viewer.page import render
 from finger_pin.viewer.scene import Scene
 from finger_pin.viewer.server import PageServer
@@ -61,11 +62,18 @@ class Viewing:
         self.close()
 
 
-def view(result: xr.Dataset, *, open_browser: bool = True, block: bool | None = None) -> Viewing:
+def view(
+    result: xr.Dataset,
+    *,
+    forces: ForcePolytope | None = None,
+    open_browser: bool = True,
+    block: bool | None = None,
+) -> Viewing:
     """Show a result in meshcat: the finger moves, its tendons run along their paths in the colour of their tension.
 
     Args:
         result: What `simulate` returned or saved.
+        forces: What `force_polytope` returned, drawn translucent at the fingertip of its posture.
         open_browser: Whether to open the page in the user's browser.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
@@ -75,7 +83,34 @@ def view(result: xr.Dataset, *, open_browser: bool = True, block: bool | None = 
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    viewing = Viewing(PageServer(animation_page(result)))
+    return _served(animation_page(result, forces), open_browser, block)
+
+
+def view_forces(
+    finger: FingerDescription,
+    forces: ForcePolytope,
+    *,
+    tension: ArrayLike | None = None,
+    open_browser: bool = True,
+    block: bool | None = None,
+) -> Viewing:
+    """Show the forces that a fingertip can exert: a translucent body at the tip of the finger at rest.
+
+    Args:
+        finger: The finger.
+        forces: What `force_polytope` returned.
+        tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
+        open_browser: Whether to open the page in the user's browser.
+        block: Whether to serve until Ctrl-C; by default where Python is not interactive.
+
+    Returns:
+        The page in service, with its address; already closed if the call has blocked.
+    """
+    return _served(posture_page(finger, forces, tension), open_browser, block)
+
+
+def _served(page: str, open_browser: bool, block: bool | None) -> Viewing:
+    viewing = Viewing(PageServer(page))
     if open_browser:
         webbrowser.open(viewing.url, new=2)
     if block is None:

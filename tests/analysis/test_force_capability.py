@@ -4,6 +4,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+import scipy.spatial
 
 import finger_pin as fp
 from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
@@ -148,6 +149,25 @@ def test_straight_finger_has_no_force_along_itself_in_its_set(finger):
     assert found.basis.shape == (3, 2)
     np.testing.assert_allclose(found.basis[0], 0.0, atol=1e-9)
     assert largest_force(finger, [0.0] * 4, [1.0, 0, 0], 20.0) == np.inf
+
+
+def test_triangles_of_the_surface_enclose_the_volume_of_the_hull_and_its_ridges_are_those_of_a_polyhedron(polytope):
+    """Divergence theorem: the sum of signed volumes over outward triangles; and Euler's V - E + F = 2."""
+    corners = polytope.vertices[polytope.triangles()]
+    volume = np.sum(np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+    assert volume == pytest.approx(scipy.spatial.ConvexHull(polytope.vertices).volume, rel=1e-9)
+    planes = np.unique(np.column_stack([polytope.normals, polytope.offsets]).round(5), axis=0)
+    assert len(polytope.vertices) - len(polytope.ridges()) + len(planes) == 2
+
+
+def test_a_flat_set_is_covered_once_and_outlined():
+    """The planar finger's hexagon: four triangles, six sides; its area by the shoelace formula."""
+    found = force_polytope(fp.Finger(fp.load_finger("planar")), [0.4, 0.9], 10.0)
+    corners = found.vertices[found.triangles()]
+    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+    assert len(areas) == 4 and len(found.ridges()) == 6
+    assert abs(areas.sum()) == pytest.approx(np.abs(areas).sum())
+    assert abs(areas.sum()) == pytest.approx(scipy.spatial.ConvexHull(found.vertices[:, :2]).volume, rel=1e-9)
 
 
 def test_wrong_arguments_are_named(finger):

@@ -140,6 +140,9 @@ class Player {
     const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
+    const forces = document.getElementById("forces");
+    forces.hidden = !this.config.forces;
+    forces.lastElementChild.textContent = this.config.forces;
     document.querySelector(".grid-note").textContent = ` · grid ${1000 * this.config.grid} mm`;
     this.rows = this.config.strands.map((name) => {
       const row = document.getElementById("tensions").insertRow();

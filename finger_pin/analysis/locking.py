@@ -1,0 +1,103 @@
+"""The joint friction at which a finger locks itself, at a posture or at any."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.analysis.directions import directions_of_motion, sliding_velocity
+from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.blocks.tendons import Tendons
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.parameters import FingerDescription
+from finger_pin.routing import Array
+from finger_pin.validation import expand, finite_vector
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalFriction:
+    """The least joint friction at which a finger locks, over the directions that were asked about.
+
+    Attributes:
+        coefficient: M_crit, m: friction coefficient times pin radius, alike at all joints that move; infinite where
+            no friction locks the finger.
+        joints: Names of the joints that move.
+        directions: Direction of every joint in the worst case, -1, 0 (at rest) or 1, shape (n,).
+        torque: Demand tau^d that runs away, shape (n,), N m, largest entry 1; zero where nothing locks.
+        tension: Command f_hat that runs away with it, shape (t,), N.
+    """
+
+    coefficient: float
+    joints: tuple[str, ...]
+    directions: Array
+    torque: Array
+    tension: Array
+
+
+def critical_friction(
+    finger: Finger | FingerDescription,
+    position: Sequence[float] | Array | None = None,
+    *,
+    joints: Sequence[str] | None = None,
+    velocity: Sequence[float] | Array | None = None,
+    gain: float | tuple[float, ...] | None = None,
+) -> CriticalFriction:
+    """Return the joint friction at which a finger locks.
+
+    Args:
+        finger: A finger, or the description of one, with force closure.
+        position: theta, shape (n,), rad; it matters to the friction of the tendons, which is left out without it.
+        joints: The joints that move; all by default. The others count as free of friction.
+        velocity: theta', shape (n,), whose signs and ratios say which way joints and tendons move; joints not in
+            ``joints`` count as at rest. By default the worst of all directions in which all ``joints`` move.
+        gain: K_P, N m/rad. With it passive tendons are elastic, and the finger lags behind its reference by
+            tau / K_P; by default they carry what the controller plans.
+
+    Raises:
+        InputError: If an argument has the wrong size, a joint does not exist, or there is no force closure.
+    """
+    tendons = _tendons(finger)
+    routing = tendons.routing
+    moving = _moving(routing.joints, joints)
+    size = len(moving)
+    if velocity is None and position is None:
+        signs = np.array(
+            [sign for sign in product((-1.0, 0.0, 1.0), repeat=size) if ((np.array(sign) != 0) == moving).all()]
+        )
+        sliding = np.zeros((len(signs), len(routing.tendons)))
+    elif velocity is None:
+        signs, sliding = directions_of_motion(tendons, moving)
+    else:
+        given = np.where(moving, finite_vector("velocity", velocity, size), 0.0)
+        signs, sliding = np.sign(given)[None], np.sign(sliding_velocity(tendons, given))[None]
+    if position is None:
+        theta, sliding = np.zeros(size), np.zeros_like(sliding)
+    else:
+        theta = finite_vector("position", position, size)
+    stiffness = None if gain is None else finite_vector("gain", expand(gain, size), size)
+    cases = np.broadcast_to(theta, (len(signs), size))
+    kappa, torque, command = FrictionLoop.of(tendons, stiffness).critical(cases, signs, sliding)
+    worst = int(np.argmin(kappa))
+    return CriticalFriction(
+        coefficient=float(kappa[worst]),
+        joints=tuple(name for name, moves in zip(routing.joints, moving, strict=True) if moves),
+        directions=signs[worst],
+        torque=torque[worst],
+        tension=command[worst],
+    )
+
+
+def _tendons(finger: Finger | FingerDescription) -> Tendons:
+    return finger.tendons if isinstance(finger, Finger) else Tendons.from_description(finger)
+
+
+def _moving(names: tuple[str, ...], joints: Sequence[str] | None) -> NDArray[np.bool_]:
+    for name in joints or ():
+        if name not in names:
+            raise InputError("joints", f"must be among {', '.join(names)}", name)
+    return np.array([joints is None or name in joints for name in names])

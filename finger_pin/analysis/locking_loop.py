@@ -1,0 +1,222 @@
+"""Self-locking: the joint friction at which the tensions that overcome it are what makes it insuperable.
+
+The loop. A joint that moves needs a torque against its friction, M_j R_j. The controller (21), (22) supplies it by
+tensions, which it raises until every tendon pulls. The tensions load the joints, (17), and the load makes the friction.
+Slowly moving, with tensions so large that f0, f_5^d, weight and fingertip force no longer count, all of this is
+linear but for the maximum in (22) and for slack passive tendons; it is positively homogeneous:
+
+    f_hat = P tau + k max_i(-P_i tau / k_i),     P = pinv(H_c^T), k = f^k                    (21), (22)
+    f^a_i -> f_i = f^a_i (1 - sigma_i mu_i) / (1 + sigma_i mu_i),   mu_i = mu_i^d(theta)      (14), (16)
+    f5_3, f5_4 = (1 +- sigma_5 mu_5) m,          m the mean tension of a passive tendon      (13), (14)
+    H_c2^T f = M s R,   R = loads f                                                          (17), (18)
+
+with sigma the directions of the tendons, s those of the joints, and M_j = kappa w_j. The ratio in the second line is
+exp(-sigma mu_e phi), the capstan law. Within a cell, in which one tendon i attains the maximum of (22) and each passive
+tendon is either taut or slack, f = V tau, so that the balance is an eigenvalue problem,
+
+    H_c2^T V tau = kappa diag(w s) loads V tau,
+
+and an eigenvector counts if it lies in its cell. The critical scale is the least positive kappa over all cells. Below
+it the loop has a solution whatever the offset (f0, weight, fingertip force): a continuous, positively homogeneous map
+without a zero but the origin keeps its degree, and without friction this one is the identity in tau. At kappa_crit the
+solution runs off to infinity along the eigenvector. f0, weight and fingertip force do not shift the critical scale;
+they set how large tensions are on this side of it. The posture enters through the curvature of the tendons only.
+
+With the passive tension as planned the same has a plain meaning: the tensions f >= 0 that balance friction,
+(H_c2^T D - kappa diag(w s) loads D) f = 0, fill the kernel of a matrix, at kappa = 0 with a positive vector, force
+closure. Critical is where an entry of it reaches zero: friction undoes force closure. With one tendon more than
+joints no other distribution of tensions locks later.
+
+What a passive tendon carries, m, is settled in one of two ways. *Planned*: what the controller plans, m = f_hat_5.
+*Elastic*: what its stretch makes it, m = max(0, -K_t H_c theta), in a finger that lags behind a reference which
+satisfies (20) by theta^d - theta = tau / K_P, so that m = max(0, K_t H_c tau / K_P).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from finger_pin.blocks.tendons import Tendons, capstan_coefficient
+from finger_pin.exceptions import InputError
+from finger_pin.routing import Array
+
+_REAL = 1e-9
+_SINGULAR = 1e-12
+_INSIDE = 1e-9
+_SETTLED = 1e-10
+_RUNAWAY = 1e6
+_ITERATIONS = 5000
+_TURNS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionLoop:
+    """The loop of a finger in matrices; cells first, then what a cell's f = V tau needs.
+
+    Attributes:
+        command: f_hat = command[i] @ tau where tendon i attains the maximum of (22), shape (t, t, n).
+        levels: -P_i / k_i, shape (t, n); the maximum of (22) is that of levels @ tau.
+        passive: Mean tension of the passive tendons over tau when taut, shape (t, p, n).
+        tendons: The tendon layer.
+    """
+
+    command: Array
+    levels: Array
+    passive: Array
+    tendons: Tendons
+
+    @classmethod
+    def of(cls, tendons: Tendons, gain: Array | None) -> FrictionLoop:
+        """Build the loop.
+
+        Args:
+            tendons: The tendon layer of a finger with force closure.
+            gain: K_P, shape (n,), N m/rad, for passive tendons that are elastic; None for passive tendons as planned.
+
+        Raises:
+            InputError: If there is no force closure.
+        """
+        routing = tendons.routing
+        closure = routing.force_closure()
+        if not closure.holds:
+            raise InputError("finger.tendons", f"{closure}; self-locking is a matter of fingers that can be taut")
+        inverse = np.linalg.pinv(routing.coupling.T)
+        levels = -inverse / closure.tension[:, None]
+        command = inverse + closure.tension[None, :, None] * levels[:, None, :]
+        if gain is None:
+            passive = command[:, routing.actuated :]
+        else:
+            elastic = 0.5 * tendons.half_stiffness[:, None] * routing.coupling[routing.actuated :] / gain
+            passive = np.broadcast_to(elastic, (len(levels), *elastic.shape))
+        return cls(command, levels, passive, tendons)
+
+    def critical(self, position: Array, weights: Array, sliding: Array) -> tuple[Array, Array, Array]:
+        """Return kappa_crit and its eigenvectors for m cases at once.
+
+        Args:
+            position: theta, shape (m, n), rad.
+            weights: s w, signed friction coefficients of the joints, shape (m, n), m; 0 for a joint at rest.
+            sliding: sigma, shape (m, t), -1, 0 or 1; 0 leaves out the tendon's friction.
+
+        Returns:
+            kappa, shape (m,); tau, shape (m, n); and f_hat, shape (m, t).
+        """
+        routing, size, actuated = self.tendons.routing, len(position), self.tendons.routing.actuated
+        scale = self._shares(position, sliding)
+        worst, torque = np.full(size, np.inf), np.zeros((size, routing.coupling.shape[1]))
+        command = np.zeros((size, len(self.levels)))
+        for taut in product((True, False), repeat=routing.passive):
+            halves = np.repeat(self.passive * np.array(taut, dtype=float)[:, None], 2, axis=1)
+            strands = np.concatenate([self.command[:, :actuated], halves], axis=1)
+            delivered = scale[:, None, :, None] * strands
+            balance = routing.strand_coupling.T @ delivered
+            friction_torque = weights[:, None, :, None] * (routing.loads @ delivered)
+            # A canal so curved that nothing arrives, or everything stays, leaves no balance to look at.
+            finite = np.isfinite(balance).all(axis=(2, 3)) & np.isfinite(friction_torque).all(axis=(2, 3))
+            balance = np.where(finite[..., None, None], balance, np.eye(len(torque[0])))
+            friction_torque = np.where(finite[..., None, None], friction_torque, 0.0)
+            lengths = np.linalg.norm(balance, axis=3, keepdims=True)
+            rows = np.where(lengths > 0.0, lengths, 1.0)
+            balance, friction_torque = balance / rows, friction_torque / rows
+            regular = finite & (np.abs(np.linalg.det(balance)) > _SINGULAR)
+            balance = np.where(regular[..., None, None], balance, np.eye(len(torque[0])))
+            turn = np.linalg.solve(balance, friction_torque)
+            regular &= np.isfinite(turn).all(axis=(2, 3))
+            values, vectors = np.linalg.eig(np.where(regular[..., None, None], turn, 0.0))
+            real = regular[..., None] & (values.real > 0.0) & (np.abs(values.imag) <= _REAL * np.abs(values))
+            for sign in (1.0, -1.0):
+                # Rows: case, cell, eigenvector; then the joint.
+                rays = sign * np.swapaxes(vectors.real, 2, 3)
+                levels = rays @ self.levels.T
+                attained = np.diagonal(levels, axis1=1, axis2=3).swapaxes(1, 2)
+                span = np.max(np.abs(levels), axis=-1)
+                inside = real & (attained >= levels.max(axis=-1) - _INSIDE * span)
+                for index, is_taut in enumerate(taut):
+                    mean = np.einsum("cj,mcej->mce", self.passive[:, index], rays)
+                    slack = _INSIDE * np.max(np.abs(self.passive[:, index]))
+                    inside &= (mean >= -slack) if is_taut else (mean <= slack)
+                found = np.where(inside, 1.0 / np.where(real, values.real, 1.0), np.inf).reshape(size, -1)
+                best = np.argmin(found, axis=1)
+                case = np.arange(size)
+                better = found[case, best] < worst
+                worst[better] = found[case, best][better]
+                cell = best // rays.shape[2]
+                ray = rays.reshape(size, -1, rays.shape[3])[case, best]
+                ray = ray / np.max(np.abs(ray), axis=1, keepdims=True)
+                torque[better] = ray[better]
+                command[better] = np.einsum("mtj,mj->mt", self.command[cell], ray)[better]
+        return worst, torque, command
+
+    def growth(self, position: Array, weights: Array, sliding: Array) -> Array:
+        """Return by how much a torque grows on its way around the loop, of m cases, shape (m,): a cheap ranking.
+
+        A few turns of the loop without offsets and with passive tendons as planned, from the internal tensions. The
+        closer a case is to self-locking the more it grows; 1 and above is no proof of locking, nor below 1 of none.
+
+        Args:
+            position: theta, shape (m, n), rad.
+            weights: s M, signed friction coefficients of the joints, shape (m, n), m.
+            sliding: sigma, shape (m, t).
+        """
+        routing, scale = self.tendons.routing, self._shares(position, sliding)
+        inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
+        tension = np.broadcast_to(internal, (len(position), len(internal)))
+        growth = np.zeros(len(position))
+        torque = np.zeros_like(weights)
+        for _ in range(_TURNS):
+            halves = np.repeat(tension[:, routing.actuated :], 2, axis=1)
+            strands = scale * np.concatenate([tension[:, : routing.actuated], halves], axis=1)
+            torque = torque + weights * (strands @ routing.loads.T) - strands @ routing.strand_coupling
+            size = np.maximum(np.max(np.abs(torque), axis=1, keepdims=True), np.finfo(float).tiny)
+            growth, torque = size[:, 0], torque / size
+            minimal = torque @ inverse.T
+            tension = minimal + np.max(-minimal / internal, axis=1, keepdims=True) * internal
+        return growth
+
+    def command_to_move(self, position: Array, weights: Array, sliding: Array, minimum: Array, weight: Array) -> Array:
+        """Return f_hat, shape (m, t), N, in slow motion with passive tendons as planned; infinite where it locks.
+
+        The balance H_c2^T f = M s R + G in the demand tau differs from tau itself by friction alone, so tau is
+        corrected by its residual until that vanishes, which it does as fast as powers of the loop's gain.
+
+        Args:
+            position: theta, shape (m, n), rad.
+            weights: s M, signed friction coefficients of the joints, shape (m, n), m.
+            sliding: sigma, shape (m, t).
+            minimum: f0, shape (t,), N.
+            weight: G, shape (m, n), N m.
+        """
+        routing, scale = self.tendons.routing, self._shares(position, sliding)
+        inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
+        torque, command = np.array(weight), np.full((len(position), len(internal)), np.inf)
+        going = np.arange(len(position))
+        for _ in range(_ITERATIONS):
+            minimal = torque[going] @ inverse.T
+            level = np.max((minimum - minimal) / internal, axis=1, keepdims=True)
+            tension = minimal + level * internal
+            halves = np.repeat(tension[:, routing.actuated :], 2, axis=1)
+            strands = scale[going] * np.concatenate([tension[:, : routing.actuated], halves], axis=1)
+            residual = strands @ routing.strand_coupling - weights[going] * (strands @ routing.loads.T)
+            residual -= weight[going]
+            span = np.max(np.abs(tension), axis=1)
+            arm = np.max(np.abs(routing.strand_coupling))
+            done = np.max(np.abs(residual), axis=1) <= _SETTLED * arm * span
+            command[going[done]] = tension[done]
+            keep = ~done & (span < _RUNAWAY * (1.0 + np.max(minimum)))
+            torque[going] -= residual
+            going = going[keep]
+            if not going.size:
+                break
+        return command
+
+    def _shares(self, position: Array, sliding: Array) -> Array:
+        """Return the tension of every strand over the command or the mean tension of its tendon, shape (m, s)."""
+        routing, actuated = self.tendons.routing, self.tendons.routing.actuated
+        curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
+        friction = sliding * capstan_coefficient(self.tendons.surface, curvature)
+        share = (1.0 - friction[:, :actuated]) / (1.0 + friction[:, :actuated])
+        pairs = np.stack([1.0 + friction[:, actuated:], 1.0 - friction[:, actuated:]], axis=-1)
+        return np.concatenate([share, pairs.reshape(len(position), -1)], axis=1)

@@ -1,0 +1,110 @@
+"""Where in the workspace a finger locks itself, and what tension it needs to move slowly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.analysis.directions import directions_of_motion
+from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.blocks.reference import PassiveCoupling
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.routing import Array
+from finger_pin.validation import expand
+
+
+@dataclass(frozen=True, eq=False)
+class SelfLockingMap:
+    """Critical coefficients over two joint angles.
+
+    Attributes:
+        joints: Names of the two joints.
+        first: Angles of the first one, shape (a,), rad.
+        second: Angles of the second one, shape (b,), rad.
+        coefficient: M_crit, shape (a, b), m. It varies only where the friction of a passive tendon does, so for
+            passive tendons whose canals no joint bends it is the same everywhere.
+        tension: Largest tension that the controller commands while the finger moves slowly, under its own friction
+            and weight, in the direction that needs most, shape (a, b), N; infinite where it locks.
+        tip: Fingertip position, shape (a, b, 3), m, base frame.
+        actual: The finger's largest stiction coefficient M^c, m.
+    """
+
+    joints: tuple[str, str]
+    first: Array
+    second: Array
+    coefficient: Array
+    tension: Array
+    tip: Array
+    actual: float
+
+
+def self_locking_map(
+    finger: Finger,
+    joints: tuple[str, str] | None = None,
+    *,
+    fixed: Mapping[str, float] | None = None,
+    minimum_tension: float | tuple[float, ...] = 1.0,
+    samples: int = 21,
+) -> SelfLockingMap:
+    """Return the critical coefficient over the ranges of two joints, all joints moving in their worst directions.
+
+    Joints that passive tendons drive follow the others as inextensible tendons demand, (4).
+
+    Args:
+        finger: A finger with force closure.
+        joints: Names of the two joints; by default the last two that no passive tendon drives.
+        fixed: Angles of the others, rad; the angle of their range nearest to zero by default.
+        minimum_tension: f0, N, one number or one per tendon, for the tensions of the map.
+        samples: Angles along either axis.
+
+    Raises:
+        InputError: If a joint does not exist or is driven by a passive tendon, or there is no force closure.
+    """
+    routing, limiter = finger.routing, finger.stroke_limiter
+    coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
+    free = [name for index, name in enumerate(routing.joints) if index not in coupling.followers]
+    first, second = joints or (free[0], free[-1]) if len(free) < 3 else joints or (free[-2], free[-1])
+    for name in (first, second, *(fixed or {})):
+        if name not in free:
+            raise InputError("joints", f"must be among {', '.join(free)}", name)
+    base = np.clip(np.zeros(len(routing.joints)), limiter.lower, limiter.upper)
+    for name, angle in (fixed or {}).items():
+        base[routing.joints.index(name)] = angle
+    columns = [routing.joints.index(name) for name in (first, second)]
+    axes = [np.linspace(limiter.lower[j], limiter.upper[j], samples) for j in columns]
+    postures = np.tile(base, (samples, samples, 1))
+    postures[..., columns[0]], postures[..., columns[1]] = np.meshgrid(*axes, indexing="ij")
+    postures = postures @ coupling.matrix.T
+    flat = postures.reshape(-1, len(base))
+    signs, sliding = directions_of_motion(finger.tendons, np.ones(len(base), dtype=bool))
+    weight = np.array([finger.rigid_body.gravity_torque(theta) for theta in flat])
+    minimum = expand(minimum_tension, len(routing.tendons))
+    loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
+    coefficient, tension = np.full(len(flat), np.inf), np.zeros(len(flat))
+    # The friction of actuated tendons scales columns of the balance in f, and leaves where f_i = 0 as it was.
+    passive = np.where(np.arange(len(routing.tendons)) < routing.actuated, 0.0, sliding)
+    locking = np.unique(np.hstack([signs, passive]), axis=0)
+    curved = np.abs(flat) @ routing.curvature_matrix[routing.actuated :].T
+    _, first_of, same = np.unique(curved.round(12), axis=0, return_index=True, return_inverse=True)
+    for case in locking:
+        sign = np.broadcast_to(case[: len(base)], flat.shape)
+        slide = np.broadcast_to(case[len(base) :], (len(flat), len(routing.tendons)))
+        kappa = loop.critical(flat[first_of], sign[first_of], slide[first_of])[0]
+        coefficient = np.minimum(coefficient, kappa[same.reshape(-1)])
+    for sign, slide in zip(signs, sliding, strict=True):
+        cases = np.broadcast_to(slide, (len(flat), len(slide)))
+        command = loop.command_to_move(flat, np.broadcast_to(sign * static, flat.shape), cases, minimum, weight)
+        tension = np.maximum(tension, command[:, : routing.actuated].max(axis=1))
+    tips = [finger.rigid_body.tip_position(theta) for theta in flat]
+    return SelfLockingMap(
+        joints=(first, second),
+        first=axes[0],
+        second=axes[1],
+        coefficient=coefficient.reshape(samples, samples),
+        tension=tension.reshape(samples, samples),
+        tip=np.array(tips).reshape(samples, samples, 3),
+        actual=float(np.max(static)),
+    )

@@ -1,0 +1,108 @@
+"""How far a scenario stays from self-locking on its reference."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.blocks.tendons import Tendons
+from finger_pin.exceptions import SelfLockingWarning
+from finger_pin.routing import Array
+from finger_pin.scenario import Scenario
+from finger_pin.validation import expand
+
+#: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
+CLOSE_TO_LOCKING = 1.2
+# What a simulation spends on its warning: combinations of directions times cases of slack passive tendons.
+_CASES = 48
+
+
+@dataclass(frozen=True, eq=False)
+class SelfLockingMargin:
+    """How far a scenario stays from self-locking.
+
+    Attributes:
+        margin: Factor by which every M^c could be raised until the finger locks somewhere on its reference; infinite
+            where nothing moves or nothing locks.
+        time: Where the margin is least, s.
+        position: theta^d there, shape (n,), rad.
+        directions: Directions of the joints there, shape (n,).
+    """
+
+    margin: float
+    time: float
+    position: Array
+    directions: Array
+
+
+def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None = None) -> SelfLockingMargin:
+    """Return how far a scenario stays from self-locking on its reference.
+
+    The stiction coefficients M^c are scaled in proportion, joints and tendons move as the reference does, tendons rub
+    with mu^d at its postures and passive tendons are elastic under the controller's gain. Every combination of
+    directions that occurs is looked at where the tendons that go with it are bent least and where they are bent most.
+    Against joints that keep sliding, whose friction is M^d, the margin is the larger by M^c / M^d.
+
+    Args:
+        scenario: The scenario.
+        samples: Instants of the reference; directions that last for less than their distance may be missed.
+        most: Greatest number of combinations to look at, those that seem closest to locking; all by default. A finger
+            of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
+    """
+    tendons = Tendons.from_description(scenario.finger)
+    routing = tendons.routing
+    # Midpoints: a reference that starts or ends at rest moves there.
+    times = scenario.simulation.duration * (np.arange(samples) + 0.5) / samples
+    motion = scenario.build_reference(routing).at(times)
+    size = len(routing.joints)
+    # What stands still but for rounding does not move.
+    speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)
+    directions = np.sign(np.hstack([speed, sliding_velocity(tendons, speed)]))
+    bend = (np.abs(motion.position) @ routing.curvature_matrix.T).sum(axis=1)
+    # Ordered by directions, then by bend: the first and the last of every combination.
+    order = np.lexsort((bend, *directions.T))
+    steps = np.flatnonzero(np.any(np.diff(directions[order], axis=0) != 0.0, axis=1))
+    chosen = order[np.unique(np.concatenate([[0], steps, steps + 1, [samples - 1]]))]
+    signs, sliding = directions[chosen, :size], directions[chosen, size:]
+    weights = signs * expand(scenario.finger.joint_friction.stiction, size)
+    gain = expand(scenario.controller.gain, size)
+    # Without gain there is no lag that would say what passive tendons carry: they count as planned.
+    loop = FrictionLoop.of(tendons, gain if np.all(gain > 0.0) else None)
+    if most is not None and len(chosen) > most:
+        worst_first = np.argsort(-loop.growth(motion.position[chosen], weights, sliding), kind="stable")[:most]
+        chosen, signs, sliding, weights = (each[worst_first] for each in (chosen, signs, sliding, weights))
+    kappa = loop.critical(motion.position[chosen], weights, sliding)[0]
+    worst = int(np.argmin(kappa))
+    where = chosen[worst]
+    return SelfLockingMargin(float(kappa[worst]), float(times[where]), motion.position[where], signs[worst])
+
+
+def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
+    """Warn if a scenario comes close to self-locking, at a cost that is bounded; return its margin.
+
+    Of many combinations of directions only those that seem closest to locking are looked at.
+
+    Args:
+        scenario: The scenario.
+        stacklevel: Of `warnings.warn`, as seen by the caller of this function.
+    """
+    most = max(1, _CASES // 2 ** len(scenario.finger.passive_names))
+    # Parameters at the edge of what numbers hold have no margin; they shall not be told about arithmetic.
+    with np.errstate(all="ignore"):
+        margin = self_locking_margin(scenario, most=most).margin
+    text = locking_advice(margin)
+    if text:
+        warnings.warn(text, SelfLockingWarning, stacklevel=stacklevel + 1)
+    return margin
+
+
+def locking_advice(margin: float) -> str:
+    """Return what to say about a margin, in one line; nothing where it is wide."""
+    if not margin < CLOSE_TO_LOCKING:
+        return ""
+    effect = "tensions run away" if margin < 1.0 else "tensions multiply"
+    return f"joint friction is at {1.0 / margin:.2f} of what locks the finger: {effect}"

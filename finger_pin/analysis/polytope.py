@@ -1,0 +1,167 @@
+"""The set of forces that a fingertip can exert within tension limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.spatial
+
+from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.routing import Array
+
+_RANK = 1e-6
+_FLAT = 1e-7
+_NEW = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class ForcePolytope:
+    """The forces that a fingertip can exert, in the directions that its joints can move it.
+
+    Attributes:
+        position: theta, shape (n,), rad.
+        tip: Fingertip, shape (3,), m, base frame.
+        friction: What was assumed of friction.
+        basis: Orthonormal directions that the set spans, shape (3, r), base frame.
+        vertices: Shape (v, 3), N, base frame.
+        faces: Indices of vertices, shape (faces, r): triangles where r = 3, edges where r = 2; empty where r < 2 or the
+            set is flat.
+        normals: Outer unit normals of the faces, shape (faces, 3).
+        offsets: normals @ E <= offsets, shape (faces,), N.
+    """
+
+    position: Array
+    tip: Array
+    friction: Friction
+    basis: Array
+    vertices: Array
+    faces: Any
+    normals: Array
+    offsets: Array
+
+    def contains(self, force: Sequence[float] | Array, tolerance: float = 1e-6) -> bool:
+        """Return whether a force, shape (3,), N, lies in the set; its part outside the basis does not count."""
+        return bool(np.all(self.normals @ np.asarray(force, dtype=float) <= self.offsets + tolerance))
+
+    def support(self, direction: Sequence[float] | Array) -> float:
+        """Return the largest component of E along a direction, shape (3,), N times its length."""
+        return float(np.max(self.vertices @ np.asarray(direction, dtype=float)))
+
+    def triangles(self) -> Any:
+        """Return indices of vertices, shape (., 3): triangles on the surface, or on the set itself where it is flat.
+
+        On a surface their corners run counter-clockwise as seen from outside. There are none where the set is a line.
+        """
+        rank = self.basis.shape[1]
+        if not len(self.faces) or rank < 2:
+            return np.zeros((0, 3), dtype=int)
+        if rank == 2:
+            around = self._around()
+            return np.array([(around[0], a, b) for a, b in pairwise(around[1:])])
+        corners = self.vertices[self.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inwards = np.einsum("fi,fi->f", across, self.normals) < 0.0
+        return np.where(inwards[:, None], self.faces[:, ::-1], self.faces)
+
+    def ridges(self) -> list[tuple[int, int]]:
+        """Return pairs of vertices: the edges between faces that do not lie in one plane; the outline of a flat set."""
+        rank = self.basis.shape[1]
+        if not len(self.faces):
+            return [(int(np.argmin(line)), int(np.argmax(line))) for line in (self.vertices @ self.basis).T[:1]]
+        if rank == 2:
+            return [(int(first), int(second)) for first, second in self.faces]
+        beside: dict[tuple[int, int], list[int]] = {}
+        for index, face in enumerate(self.faces):
+            for first, second in ((0, 1), (1, 2), (2, 0)):
+                low, high = sorted((int(face[first]), int(face[second])))
+                beside.setdefault((low, high), []).append(index)
+        return [edge for edge, (one, other) in beside.items() if self.normals[one] @ self.normals[other] < 1.0 - 1e-6]
+
+    def _around(self) -> Any:
+        """Return the vertices of a flat set in their order around its middle."""
+        plane = (self.vertices - self.vertices.mean(axis=0)) @ self.basis
+        return np.argsort(np.arctan2(plane[:, 1], plane[:, 0]))
+
+
+def force_polytope(
+    finger: Finger,
+    position: Sequence[float] | Array,
+    limit: float | tuple[float, ...],
+    *,
+    minimum: float | tuple[float, ...] = 0.0,
+    friction: Friction = Friction.NONE,
+) -> ForcePolytope:
+    """Return the forces that the fingertip can exert within tension limits, weight included.
+
+    The projection is exact: facets of the hull of the vertices found so far are pushed out, by a linear programme
+    each, until none moves.
+
+    Args:
+        finger: A finger with force closure.
+        position: theta, shape (n,), rad.
+        limit: Greatest f^a, N, one number or one per actuated tendon.
+        minimum: Least f^a, N, likewise.
+        friction: NONE or HELPING.
+
+    Raises:
+        InputError: If an argument is wrong, or no tensions within the limits hold the finger without a contact or with
+            one.
+    """
+    if friction is Friction.HINDERING:
+        raise InputError("friction", "must be none or helping; what hinders depends on the direction", friction.value)
+    theta, bounds = posture(finger, position), command_bounds(finger, minimum, limit)
+    statics = TipStatics.of(finger, theta, friction, (), np.zeros(len(theta)))
+    left, values, _ = np.linalg.svd(statics.jacobian)
+    basis = left[:, : int(np.sum(values > _RANK * np.max(values)))]
+    extra = statics.jacobian.T @ basis
+    rank = basis.shape[1]
+
+    def extreme(direction: Array) -> Array:
+        cost = np.concatenate([-direction, np.zeros(sum(statics.sizes))])
+        found = statics.solve(cost, extra, [*[(None, None)] * rank, *bounds], np.zeros(len(theta)))
+        if found.status == UNBOUNDED:
+            raise InputError("finger.tendons", "the forces are unbounded: passive tendons alone balance some of them")
+        if found.status != 0:
+            raise InputError("limit", "no tensions within the limits balance the finger's weight", bounds)
+        return np.asarray(found.x[:rank])
+
+    points = np.array([extreme(sign * axis) for axis in np.eye(rank) for sign in (1.0, -1.0)])
+    hull, points = _grow(points, extreme)
+    tip = finger.rigid_body.tip_position(theta)
+    if hull is None:
+        empty = np.zeros((0, rank), dtype=int)
+        return ForcePolytope(theta, tip, friction, basis, points @ basis.T, empty, np.zeros((0, 3)), np.zeros(0))
+    used = np.unique(hull.simplices)
+    number = np.zeros(len(points), dtype=int)
+    number[used] = np.arange(len(used))
+    normals, offsets = hull.equations[:, :-1] @ basis.T, -hull.equations[:, -1]
+    return ForcePolytope(theta, tip, friction, basis, points[used] @ basis.T, number[hull.simplices], normals, offsets)
+
+
+def _grow(points: Array, extreme: Any) -> tuple[Any, Array]:
+    """Return the hull of all extreme points, None where it is flat or a line, and the points."""
+    scale = max(float(np.max(np.abs(points))), 1e-12)
+    rank = points.shape[1]
+    if rank < 2 or np.linalg.svd(points - points.mean(axis=0))[1][-1] < _FLAT * scale:
+        return None, points
+    asked: set[tuple[float, ...]] = set()
+    while True:
+        hull = scipy.spatial.ConvexHull(points)
+        fresh = []
+        for equation in hull.equations:
+            key = tuple(equation[:-1].round(9))
+            if key in asked:
+                continue
+            asked.add(key)
+            point = extreme(equation[:-1])
+            if equation[:-1] @ point + equation[-1] > _NEW * scale:
+                fresh.append(point)
+        if not fresh:
+            return hull, points
+        points = np.vstack([points, *fresh])

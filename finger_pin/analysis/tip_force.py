@@ -1,0 +1,139 @@
+"""One fingertip force: how large along a direction, and what tension it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.analysis.tip_statics import (
+    INFEASIBLE,
+    UNBOUNDED,
+    Friction,
+    TipStatics,
+    command_bounds,
+    posture,
+    slides,
+)
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.routing import Array
+from finger_pin.validation import finite_vector
+
+
+@dataclass(frozen=True, eq=False)
+class RequiredTension:
+    """The tensions that a fingertip force needs, those with the least maximum.
+
+    Attributes:
+        largest: The largest command, N.
+        command: f^a, shape (a,), N.
+        strands: Delivered tensions f, shape (s,), N.
+        by_radius: Derivative of ``largest`` with respect to every winding radius, shape (t, n), N/m; zero where a
+            tendon does not cross. One-sided where the solution is degenerate.
+    """
+
+    largest: float
+    command: Array
+    strands: Array
+    by_radius: Array
+
+
+def largest_force(
+    finger: Finger,
+    position: Sequence[float] | Array,
+    direction: Sequence[float] | Array,
+    limit: float | tuple[float, ...],
+    *,
+    minimum: float | tuple[float, ...] = 0.0,
+    friction: Friction = Friction.NONE,
+) -> float:
+    """Return the largest force that the fingertip can exert straight along a direction, N; negative if only backwards.
+
+    Args:
+        finger: A finger with force closure.
+        position: theta, shape (n,), rad.
+        direction: Of E, shape (3,), base frame; its length does not matter.
+        limit: Greatest f^a, N, one number or one per actuated tendon.
+        minimum: Least f^a, N, likewise.
+        friction: Of any kind.
+
+    Returns:
+        The force; infinite where the structure carries it, not a number where no force along this line can be held.
+
+    Raises:
+        InputError: If an argument is wrong.
+    """
+    theta, bounds = posture(finger, position), command_bounds(finger, minimum, limit)
+    along = _unit(direction)
+    worst = np.inf
+    for slide in slides(finger, friction):
+        signs = np.sign(_clean(finger.rigid_body.jacobian(theta).T @ along))
+        statics = TipStatics.of(finger, theta, friction, slide, signs)
+        extra = (statics.jacobian.T @ along)[:, None]
+        if friction is Friction.HINDERING:
+            extra = extra + (signs * finger.joint_friction.kinetic)[:, None]
+        cost = np.append(-1.0, np.zeros(sum(statics.sizes)))
+        found = statics.solve(cost, extra, [(None, None), *bounds], np.zeros(len(theta)))
+        if found.status == INFEASIBLE:
+            return float("nan")
+        worst = min(worst, np.inf if found.status == UNBOUNDED else float(found.x[0]))
+    return worst
+
+
+def tension_for_force(
+    finger: Finger,
+    position: Sequence[float] | Array,
+    force: Sequence[float] | Array,
+    *,
+    minimum: float | tuple[float, ...] = 0.0,
+    friction: Friction = Friction.NONE,
+) -> RequiredTension:
+    """Return the tensions with the least maximum at which the fingertip exerts a force.
+
+    Args:
+        finger: A finger with force closure.
+        position: theta, shape (n,), rad.
+        force: E = -F, shape (3,), N, base frame; zero holds the finger against its weight.
+        minimum: Least f^a, N, one number or one per actuated tendon.
+        friction: Of any kind; HELPING gives what holds at least, HINDERING what surely pushes.
+
+    Raises:
+        InputError: If an argument is wrong, or no tensions whatever give this force.
+    """
+    theta, bounds = posture(finger, position), command_bounds(finger, minimum, np.inf)
+    wanted = finite_vector("force", force, 3)
+    demand = finger.rigid_body.jacobian(theta).T @ wanted
+    signs = np.sign(_clean(demand))
+    if friction is Friction.HINDERING:
+        demand = demand + signs * finger.joint_friction.kinetic * np.linalg.norm(wanted)
+    needed: list[RequiredTension] = []
+    for slide in slides(finger, friction):
+        statics = TipStatics.of(finger, theta, friction, slide, signs)
+        a, s, n = statics.sizes
+        cost, largest = np.append(1.0, np.zeros(a + s + n)), [(0.0, None)]
+        # z is the largest command: an inequality for each.
+        below_largest = np.hstack([-np.ones((a, 1)), np.eye(a)])
+        found = statics.solve(cost, np.zeros((n, 1)), [*largest, *bounds], demand, below_largest)
+        if found.status != 0:
+            raise InputError("force", "no tensions, however large, exert it", wanted.tolist())
+        strands = found.x[1 + a : 1 + a + s]
+        # A radius r of a strand enters its joint's row as r f: d(value) = -(multiplier) f dr.
+        by_strand = -np.asarray(found.eqlin.marginals)[:n, None] * strands * (finger.routing.loads > 0.0)
+        halves = by_strand[:, a:].reshape(n, -1, 2).sum(axis=2)
+        by_radius = np.hstack([by_strand[:, :a], halves]).T
+        needed.append(RequiredTension(float(found.x[0]), found.x[1 : 1 + a], strands, by_radius))
+    return max(needed, key=lambda each: each.largest)
+
+
+def _unit(direction: Sequence[float] | Array) -> Array:
+    vector = finite_vector("direction", direction, 3)
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise InputError("direction", "must not be zero", vector.tolist())
+    return vector / length
+
+
+def _clean(torque: Array) -> Array:
+    return np.where(np.abs(torque) > 1e-12 * np.max(np.abs(torque), initial=0.0), torque, 0.0)

@@ -1,0 +1,161 @@
+"""What a fingertip can push with: the forces within tension limits, and the tensions that a force needs.
+
+At rest at theta, with E = -F the force that the fingertip exerts on what it touches, (18) reads
+
+    J^T E = H_c2^T f - G - tau^f,
+
+linear in E and the tensions f of the strands. With bounds on the commands f^a it describes a polytope of (E, f^a, f,
+tau^f), and the forces are its projection on E. Passive tendons carry whatever the balance asks of them, without
+limit, but never push. Friction enters in one of three ways.
+
+- NONE: f_i = f^a_i, halves of passive tendons alike, tau^f = 0.
+- HELPING: whatever stiction can hold. f_i / f^a_i and the ratio of the halves lie between exp(-mu_e phi) and
+  exp(mu_e phi), and |tau^f_j| <= M^d_j S_j. The set of forces that the finger can hold against a contact that pushes.
+- HINDERING: what is left when the finger pushes and everything slips against it. f_i = f^a_i exp(-mu_e phi_i) at all
+  actuated tendons, passive tendons lose to whichever side is worse, and tau^f_j = s_j M^d_j (S_j + |E|) with s_j the
+  sign of (J^T E)_j. It depends on the direction of E, so it is asked about direction by direction; no polytope.
+
+S_j is the sum of the tensions that cross joint j. The reaction (17) is |-e_j S_j - E|, at most S_j + |E|: so HINDERING
+is on the safe side, and HELPING leaves out what the contact itself adds to the friction.
+
+Directions in which no joint moves the fingertip are carried by the structure and are left out of the polytope.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import product
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.routing import Array
+from finger_pin.validation import expand, finite_vector
+
+#: What scipy's linear programmes report.
+INFEASIBLE, UNBOUNDED = 2, 3
+
+
+class Friction(Enum):
+    """How friction acts on a finger that pushes; see the module."""
+
+    NONE = "none"
+    HELPING = "helping"
+    HINDERING = "hindering"
+
+
+@dataclass(frozen=True, eq=False)
+class TipStatics:
+    """The linear constraints on x = (f^a, f, tau^f) that do not depend on E, and J^T.
+
+    Attributes:
+        jacobian: J, shape (3, n).
+        equal: Rows that vanish, shape (., a + s + n).
+        below: Rows that are at most zero, shape (., a + s + n).
+        torque: Rows (n) of H_c2^T f - tau^f.
+        weight: G, shape (n,), N m.
+        sizes: a, s, n.
+    """
+
+    jacobian: Array
+    equal: Array
+    below: Array
+    torque: Array
+    weight: Array
+    sizes: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, finger: Finger, theta: Array, friction: Friction, slide: tuple[float, ...], signs: Array) -> TipStatics:
+        """Collect the constraints; ``slide`` and ``signs`` serve HINDERING alone."""
+        routing, tendons = finger.routing, finger.tendons
+        a, (s, n) = routing.actuated, routing.strand_coupling.shape
+        curvature = np.abs(theta) @ routing.curvature_matrix.T + routing.curvature_offset
+        loss = np.exp(-tendons.surface * curvature)
+        command, strand, joint = np.split(np.eye(a + s + n), [a, a + s])
+        direct, proximal, distal = strand[:a], strand[a::2], strand[a + 1 :: 2]
+        reaction = finger.joint_friction.kinetic[:, None] * (routing.loads @ strand)
+        below: list[Array] = []
+        if friction is Friction.NONE:
+            equal = [direct - command, distal - proximal, joint]
+        elif friction is Friction.HINDERING:
+            ratio = loss[a:] ** np.array(slide)
+            equal = [direct - loss[:a, None] * command, distal - ratio[:, None] * proximal]
+            equal.append(joint - signs[:, None] * reaction)
+        else:
+            equal = []
+            pairs = ((command, direct, loss[:a]), (proximal, distal, loss[a:]))
+            below = [
+                row
+                for before, after, least in pairs
+                for row in (least[:, None] * before - after, least[:, None] * after - before)
+            ]
+            below += [joint - reaction, -joint - reaction]
+        torque = routing.strand_coupling.T @ strand - joint
+        width = a + s + n
+        return cls(
+            jacobian=finger.rigid_body.jacobian(theta),
+            equal=np.concatenate([np.zeros((0, width)), *equal]),
+            below=np.concatenate([np.zeros((0, width)), *below]),
+            torque=torque,
+            weight=finger.rigid_body.gravity_torque(theta),
+            sizes=(a, s, n),
+        )
+
+    def solve(
+        self,
+        cost: Array,
+        extra: Array,
+        bounds: list[tuple[float | None, float | None]],
+        offset: Array,
+        further: Array | None = None,
+    ) -> Any:
+        """Minimise over (z, x): the torque rows are extra @ z = torque @ x - weight - offset.
+
+        Args:
+            cost: Of z and x.
+            extra: Shape (n, z).
+            bounds: Of z and f^a.
+            offset: Shape (n,), N m.
+            further: Rows on z and f^a that are at most zero, shape (., z + a).
+        """
+        _, s, n = self.sizes
+        count = extra.shape[1]
+        zeros = np.zeros((len(self.equal), count))
+        below = np.hstack([np.zeros((len(self.below), count)), self.below])
+        if further is not None:
+            below = np.vstack([below, np.hstack([further, np.zeros((len(further), s + n))])])
+        return scipy.optimize.linprog(
+            cost,
+            A_ub=below if len(below) else None,
+            b_ub=np.zeros(len(below)) if len(below) else None,
+            A_eq=np.vstack([np.hstack([-extra, self.torque]), np.hstack([zeros, self.equal])]),
+            b_eq=np.concatenate([self.weight + offset, np.zeros(len(self.equal))]),
+            bounds=[*bounds, *[(0.0, None)] * s, *[(None, None)] * n],
+        )
+
+
+def slides(finger: Finger, friction: Friction) -> list[tuple[float, ...]]:
+    """Return the ways in which the passive tendons can slip that HINDERING must look at, signs by passive tendon."""
+    passive = finger.routing.passive
+    return list(product((1.0, -1.0), repeat=passive)) if friction is Friction.HINDERING else [(0.0,) * passive]
+
+
+def posture(finger: Finger, position: Sequence[float] | Array) -> Array:
+    """Return theta as an array of the right size."""
+    return finite_vector("position", position, len(finger.routing.joints))
+
+
+def command_bounds(
+    finger: Finger, minimum: float | tuple[float, ...], limit: float | tuple[float, ...]
+) -> list[tuple[float | None, float | None]]:
+    """Return least and greatest f^a of every actuated tendon, None where there is no limit."""
+    count = finger.routing.actuated
+    low, high = expand(minimum, count), expand(limit, count)
+    if not (np.all(low >= 0.0) and np.all(high > low)):
+        raise InputError("limit", "must be above the least tension, which must not be negative", high.tolist())
+    return [(float(a), None if np.isinf(b) else float(b)) for a, b in zip(low, high, strict=True)]

@@ -1,0 +1,199 @@
+"""What share of its command a tendon delivers, by posture: the capstan law that (9), (14) and (16) make.
+
+A tendon that slides at speed v settles where f = f^a - f^f, f^f = (f + f^a) M s + b v, with s the sign of v, so that
+
+    f / f^a = (1 - M s - b v / f^a) / (1 + M s).
+
+Fast enough for M = mu^d = tanh(mu_e phi / 2), and without viscous friction, this is exp(-mu_e phi) when pulling and
+exp(mu_e phi) when releasing. At rest anything between the ratios for M = mu^c, beyond which it breaks away, may occur.
+A passive tendon delivers to its distal half what reaches its mass from the proximal one, by the same equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from finger_pin import friction
+from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.blocks.reference import PassiveCoupling
+from finger_pin.blocks.tendons import Tendons, capstan_coefficient
+from finger_pin.finger import Finger
+from finger_pin.routing import Array
+
+# Since its last reversal a tendon has slid by this many bristle lengths F^n M / s0: exp(-5) from steady sliding.
+_SETTLED = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class TransmissionEfficiency:
+    """Delivered over commanded tension, f / f^a, of every tendon; shapes (..., t).
+
+    Attributes:
+        curvature: phi, rad, (15).
+        pulling: In steady sliding towards the actuator, exp(-mu_e phi).
+        releasing: In steady sliding away from it, exp(mu_e phi).
+        least: At rest, where it breaks away towards the actuator, (1 - mu^c) / (1 + mu^c).
+        greatest: At rest, where it breaks away from it, the inverse.
+    """
+
+    curvature: Array
+    pulling: Array
+    releasing: Array
+    least: Array
+    greatest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TransmissionInMotion:
+    """Delivered over commanded tension along a simulation; shapes (m, t), not a number where nothing is commanded.
+
+    Attributes:
+        curvature: phi, rad.
+        ratio: f / f^a; of a passive tendon f5_4 / f5_3.
+        settled: What steady sliding at this posture and speed would deliver.
+        sliding: Whether the tendon has slid far enough since its last reversal for that to be comparable.
+        direction: Sign of v: 1 towards the actuator.
+    """
+
+    curvature: Array
+    ratio: Array
+    settled: Array
+    sliding: NDArray[np.bool_]
+    direction: Array
+
+
+def transmission_efficiency(finger: Finger, position: Array) -> TransmissionEfficiency:
+    """Return what every tendon delivers in steady sliding and at rest.
+
+    Args:
+        finger: Any finger.
+        position: theta, shape (..., n), rad.
+    """
+    tendons = finger.tendons
+    routing = tendons.routing
+    curvature = np.abs(np.asarray(position, dtype=float)) @ routing.curvature_matrix.T + routing.curvature_offset
+    kinetic = capstan_coefficient(tendons.surface, curvature)
+    # rho mu^d above 1 leaves nothing to deliver: the tendon does not move.
+    static = np.minimum(tendons.stiction_ratio * kinetic, 1.0)
+    with np.errstate(divide="ignore"):
+        pulling, least = (1.0 - kinetic) / (1.0 + kinetic), (1.0 - static) / (1.0 + static)
+        return TransmissionEfficiency(curvature, pulling, 1.0 / pulling, least, 1.0 / least)
+
+
+def coupling_in_motion(tendons: Tendons, position: Array, velocity: Array) -> Array:
+    """Return the joint torques per unit of command, of a passive tendon per unit of its mean tension, shape (t, n), m.
+
+    All tendons slide steadily as the joints move, fast enough for mu^d. Where the rows of H_c balance each other under
+    positive tensions, force closure, so may these: then friction of the tendons alone cannot lock the finger.
+
+    Args:
+        tendons: The tendon layer.
+        position: theta, shape (n,), rad.
+        velocity: theta', shape (n,), rad/s; signs and ratios matter.
+    """
+    routing, actuated = tendons.routing, tendons.routing.actuated
+    curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
+    loss = np.sign(sliding_velocity(tendons, velocity)) * capstan_coefficient(tendons.surface, curvature)
+    share = ((1.0 - loss) / (1.0 + loss))[:actuated, None]
+    part = loss[actuated:, None]
+    passive = (1.0 + part) * routing.proximal_coupling + (1.0 - part) * routing.distal_coupling
+    return np.concatenate([share * routing.actuated_coupling, passive])
+
+
+def workspace_postures(finger: Finger, samples: int = 9) -> Array:
+    """Return a grid of postures over the ranges of all joints, shape (m, n), rad.
+
+    Joints that passive tendons drive follow the others as inextensible tendons demand, (4); postures in which one of
+    them would leave its range are left out.
+
+    Args:
+        finger: Any finger.
+        samples: Angles per free joint.
+    """
+    limiter, coupling = finger.stroke_limiter, _inextensible(finger)
+    low, high = limiter.lower, limiter.upper
+    axes = [
+        [0.0] if index in coupling.followers else np.linspace(a, b, samples)
+        for index, (a, b) in enumerate(zip(low, high, strict=True))
+    ]
+    postures = np.array(list(product(*axes))) @ coupling.matrix.T
+    inside = np.all((postures >= low - 1e-9) & (postures <= high + 1e-9), axis=1)
+    return np.asarray(postures[inside])
+
+
+def flexion_postures(finger: Finger, samples: int = 41) -> Array:
+    """Return postures over the ranges of the last two free joints, rad, shape (samples, samples, n); others near zero.
+
+    A finger of one free joint moves that one alone along the first axis. (4) holds, ranges of driven joints are not
+    looked at.
+
+    Args:
+        finger: Any finger.
+        samples: Angles per joint.
+    """
+    limiter, coupling = finger.stroke_limiter, _inextensible(finger)
+    low, high = limiter.lower, limiter.upper
+    postures = np.tile(np.clip(np.zeros(len(low)), low, high), (samples, samples, 1))
+    free = [index for index in range(len(low)) if index not in coupling.followers]
+    for axis, joint in enumerate(free[-2:]):
+        angles = np.linspace(low[joint], high[joint], samples)
+        postures[..., joint] = angles[:, None] if axis == 0 else angles
+    return np.asarray(postures @ coupling.matrix.T)
+
+
+def transmission_in_motion(finger: Finger, result: xr.Dataset) -> TransmissionInMotion:
+    """Return what every tendon delivered along a simulation, beside what steady sliding would.
+
+    Args:
+        finger: The finger that was simulated.
+        result: Dataset of `simulate`.
+    """
+    tendons = finger.tendons
+    actuated = tendons.routing.actuated
+    command, delivered, speed, normal, curvature = (
+        np.array(result[name].transpose("time", "tendon").values)
+        for name in (
+            "tendon_command",
+            "tendon_tension",
+            "tendon_velocity",
+            "tendon_normal_force",
+            "tendon_curvature",
+        )
+    )
+    if tendons.routing.passive:
+        proximal = result["passive_tension_proximal"].transpose("time", ...).values
+        command[:, actuated:] = proximal.reshape(len(command), -1)
+    kinetic = capstan_coefficient(tendons.surface, curvature)
+    coefficient = friction.friction_coefficient(
+        speed, kinetic, tendons.stiction_ratio * kinetic, tendons.stribeck_velocity, tendons.stribeck_exponent
+    )
+    signed = coefficient * np.sign(speed)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(command > 0.0, delivered / command, np.nan)
+        settled = np.maximum(0.0, (1.0 - signed - tendons.viscous * speed / command) / (1.0 + signed))
+    slid = _since_reversal(result["time"].values, speed)
+    bristle = np.maximum(normal * coefficient, tendons.floor) / tendons.stiffness
+    sliding = (slid > _SETTLED * bristle) & np.isfinite(ratio)
+    return TransmissionInMotion(curvature, ratio, settled, sliding, np.sign(speed))
+
+
+def _since_reversal(time: Array, speed: Array) -> Array:
+    """Return by how much each column has slid since its sign last changed, shape (m, t), m."""
+    path = np.concatenate(
+        [
+            np.zeros((1, speed.shape[1])),
+            np.cumsum(0.5 * np.abs(speed[1:] + speed[:-1]) * np.diff(time)[:, None], axis=0),
+        ]
+    )
+    turned = np.concatenate([np.ones((1, speed.shape[1]), dtype=bool), np.sign(speed[1:]) != np.sign(speed[:-1])])
+    return np.asarray(path - np.maximum.accumulate(np.where(turned, path, 0.0), axis=0))
+
+
+def _inextensible(finger: Finger) -> PassiveCoupling:
+    passive = finger.routing.passive
+    return PassiveCoupling.from_routing(finger.routing, np.zeros(passive), np.ones(passive))

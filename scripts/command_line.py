@@ -1,0 +1,56 @@
+"""Command lines whose errors are one line: what is wrong, what is allowed, and the nearest valid name."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NoReturn
+
+DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that complains in one line, and that knows what a misspelt option may have meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and exit."""
+        complain(self.prog, message)
+        self.exit(WRONG_INPUT)
+
+    def read(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
+        """Parse a command line, or exit."""
+        options, surplus = self.parse_known_args(arguments)
+        if surplus:
+            wrong = next((each for each in surplus if each.startswith("-")), surplus[0])
+            known = [name for action in self._actions for name in action.option_strings]
+            positional = [f"one {action.metavar}" for action in self._actions if not action.option_strings]
+            near = get_close_matches(wrong.split("=")[0], known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            self.error(f"{wrong}: no such argument; there are {', '.join([*positional, *known])}{hint}")
+        return options
+
+
+def number(text: str) -> float:
+    """Parse a finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text[:80]}: must be a finite number")
+    return value
+
+
+def positive(text: str) -> float:
+    """Parse a finite number above zero."""
+    value = number(text)
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"{text[:80]}: must be above 0")
+    return value
+
+
+def complain(program: str, message: str) -> None:
+    """Print one line on standard error."""
+    print(f"{program}:", "".join(c if c.isprintable() else repr(c)[1:-1] for c in message), file=sys.stderr)

@@ -1,0 +1,105 @@
+"""The scripts of the design questions and of the conclusions: what they write, and one clear line where they refuse."""
+
+import csv
+import importlib
+
+import pytest
+
+SCRIPTS = ("conclusions", "self_locking", "force_capability")
+
+
+@pytest.fixture
+def run(capsys, tmp_path, monkeypatch):
+    """Run a script in an empty folder; return its exit code, standard output and the lines of standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(name, *arguments):
+        try:
+            code = importlib.import_module(name).main([str(each) for each in arguments])
+        except SystemExit as end:
+            code = end.code
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err.splitlines()
+
+    return run
+
+
+def refused(answer, folder, *says):
+    code, out, lines = answer
+    assert (code, out) == (2, "")
+    assert len(lines) == 1 and lines[0].isprintable()
+    for each in says:
+        assert each in lines[0]
+    assert not any(folder.iterdir())
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_misspelt_option_is_told_the_nearest_one(run, tmp_path, name):
+    refused(run(name, "--ouput", "x"), tmp_path, f"{name}.py: --ouput: no such argument", "did you mean --output?")
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_an_option_without_its_value_and_a_second_name_are_refused(run, tmp_path, name):
+    refused(run(name, "--output"), tmp_path, "--output", "expected one argument")
+    refused(run(name, "ub", "fig6"), tmp_path, "fig6: no such argument; there are one")
+
+
+@pytest.mark.parametrize(
+    ("name", "given"), [("conclusions", "fig7"), ("self_locking", "fig7"), ("force_capability", "up")]
+)
+def test_an_unknown_name_is_told_in_one_line(run, tmp_path, name, given):
+    refused(run(name, given), tmp_path, f"{name}.py: ", given)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--limit", "many"), "--limit"),
+        (("--limit", "-3"), "must be above 0"),
+        (("--limit", "nan"), "must be a finite number"),
+        (("--force", "1", "2"), "--force"),
+        (("--force", "1", "2", "inf"), "must be a finite number"),
+        (("--posture", "1", "x"), "--posture"),
+        (("--posture", "10", "20"), "posture"),
+    ],
+)
+def test_wrong_numbers_of_the_force_script_are_named(run, tmp_path, arguments, says):
+    refused(run("force_capability", *arguments), tmp_path, "force_capability.py: ", says)
+
+
+def test_an_unknown_conclusion_is_told_which_there_are(run, tmp_path):
+    refused(run("conclusions", "--only", "d"), tmp_path, "--only", "'a', 'b', 'c'")
+
+
+def test_a_finger_without_passive_tendon_is_refused_before_anything_is_written(run, tmp_path):
+    (tmp_path / "s").mkdir()
+    scenario = tmp_path / "s" / "plain.toml"
+    scenario.write_text('finger = "planar"\n[reference.joints.proximal]\namplitude = 0.2\nfrequency = 1.0\n')
+    code, out, lines = run("conclusions", scenario)
+    assert (code, out) == (2, "") and len(lines) == 1 and "passive" in lines[0]
+    assert [each.name for each in tmp_path.iterdir()] == ["s"]
+
+
+def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
+    scenario = tmp_path / "short.toml"
+    scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.5\n')
+    code, out, lines = run("conclusions", scenario, "--only", "a", "--output", "out")
+    assert (code, lines) == (0, [])
+    assert {each.name for each in (tmp_path / "out").iterdir()} == {"transmission.png", "conclusions.csv"}
+    with (tmp_path / "out" / "conclusions.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["part"] for row in rows] == ["a", "a", "a"]
+    assert "holds in part" in out and "Figures and table are in out" in out
+    assert run("conclusions", scenario, "--only", "a", "--output", "quiet", "--quiet") == (0, "", [])
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ()), ("self_locking", ())]
+)
+def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, monkeypatch, name, arguments):
+    monkeypatch.setattr(importlib.import_module("self_locking"), "SHARES", (0.5,))
+    (tmp_path / "file").write_text("")
+    scenario = tmp_path / "short.toml"
+    scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')
+    code, _, lines = run(name, "ub" if name == "force_capability" else scenario, *arguments, "--output", "file/out")
+    assert code == 1 and len(lines) == 1 and "--output = file" in lines[0]
