@@ -54,7 +54,7 @@ def plot_force_polytope(finger: Finger, position: Sequence[float] | Array, limit
             getattr(space, f"set_{name}label")(f"{name} (N)")
             few = (high - low)[index] < 0.5 * np.max(high - low)
             getattr(space, f"{name}axis").set_major_locator(MaxNLocator(2 if few else 5, steps=[1, 2, 5, 10]))
-        space.set_box_aspect(tuple(high - low), zoom=0.9)
+        space.set_box_aspect(tuple(high - low), zoom=0.8)
         space.view_init(elev=20, azim=-55)
     figure.text(0.03, 0.95, "(a) forces within the tension limits, without friction", fontsize=10.5)
     plane = figure.add_axes((0.55, 0.12, 0.43, 0.78))
