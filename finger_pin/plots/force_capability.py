@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
@@ -51,7 +52,9 @@ def plot_force_polytope(finger: Finger, position: Sequence[float] | Array, limit
         for index, name in enumerate(_AXES):
             getattr(space, f"set_{name}lim")(low[index], high[index])
             getattr(space, f"set_{name}label")(f"{name} (N)")
-        space.set_box_aspect(tuple(high - low), zoom=0.9)
+            few = (high - low)[index] < 0.5 * np.max(high - low)
+            getattr(space, f"{name}axis").set_major_locator(MaxNLocator(2 if few else 5, steps=[1, 2, 5, 10]))
+        space.set_box_aspect(tuple(high - low), zoom=0.8)
         space.view_init(elev=20, azim=-55)
     figure.text(0.03, 0.95, "(a) forces within the tension limits, without friction", fontsize=10.5)
     plane = figure.add_axes((0.55, 0.12, 0.43, 0.78))
