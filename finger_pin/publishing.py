@@ -18,7 +18,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 _STAGE, _DECIDED = ".unfinished-", ".publishing"
-_LOCK, _MANIFEST, _EARLIER = ".lock", ".manifest", ".earlier"
+_MANIFEST, _EARLIER = ".manifest", ".earlier"
 
 
 class Stage:
@@ -39,8 +39,11 @@ class Stage:
         settle(folder)
         for stale in folder.glob(f"{_STAGE}*"):
             _remove_ownerless(stale)
-        self.path = Path(tempfile.mkdtemp(dir=folder, prefix=_STAGE))
-        self._lock = _locked(self.path, create=True)
+        self._lock: int | None = None
+        while self._lock is None:
+            self.path = Path(tempfile.mkdtemp(dir=folder, prefix=_STAGE))
+            # Before it is locked, another process may take it for one of the dead, and remove it.
+            self._lock = _locked(self.path)
 
     def publish(self, new: Iterable[Path], earlier: Iterable[Path]) -> None:
         """Move files into place and others out of the way; first all earlier ones go, then all new ones come.
@@ -91,13 +94,11 @@ def settle(folder: Path) -> None:
     decided = folder / _DECIDED
     while (lock := _locked(decided)) is not None:
         try:
-            # Otherwise its owner has just finished, and there may be another by now.
-            if _is_of(lock, decided):
-                earlier = _move(folder, [])
-                remains = tempfile.mkdtemp(dir=folder, prefix=_STAGE)
-                os.rename(decided, remains)
-                _remove_emptied(folder, earlier)
-                shutil.rmtree(remains, ignore_errors=True)
+            earlier = _move(folder, [])
+            remains = tempfile.mkdtemp(dir=folder, prefix=_STAGE)
+            os.rename(decided, remains)
+            _remove_emptied(folder, earlier)
+            shutil.rmtree(remains, ignore_errors=True)
         finally:
             os.close(lock)
 
@@ -137,27 +138,25 @@ def _remove_ownerless(stage: Path) -> None:
         os.close(lock)
 
 
-def _locked(stage: Path, *, create: bool = False, wait: bool = True) -> int | None:
-    """Return the open lock of a stage; None where there is none, or it is another's and not waited for.
+def _locked(stage: Path, *, wait: bool = True) -> int | None:
+    """Return the open lock of a stage; None where there is no stage, or it is another's and not waited for.
 
     Where locks are not supported one that is waited for is taken for granted, and no other.
     """
-    try:
-        lock = os.open(stage / _LOCK, os.O_RDWR | (os.O_CREAT if create else 0))
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    try:
-        # The system lets go of it when its owner dies, however that happens.
-        fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        if not wait:
-            os.close(lock)
+    while True:
+        try:
+            lock = os.open(stage, os.O_RDONLY | os.O_DIRECTORY)
+        except (FileNotFoundError, NotADirectoryError):
             return None
-    return lock
-
-
-def _is_of(lock: int, stage: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(lock), os.stat(stage / _LOCK))
-    except FileNotFoundError:
-        return False
+        try:
+            # The system lets go of it when its owner dies, however that happens.
+            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            if not wait:
+                os.close(lock)
+                return None
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock), os.stat(stage)):
+                return lock
+        # While we waited its owner renamed it, and there may be another of its name by now.
+        os.close(lock)
