@@ -26,7 +26,15 @@ if TYPE_CHECKING:
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
-    from finger_pin.plots import draw_all, plot_energy, plot_fig6, plot_friction_law, plot_losses, plot_workspace
+    from finger_pin.plots import (
+        draw_all,
+        plot_convergence,
+        plot_energy,
+        plot_fig6,
+        plot_friction_law,
+        plot_losses,
+        plot_workspace,
+    )
     from finger_pin.recording import load_result, save
     from finger_pin.simulation import simulate
     from finger_pin.simulator import Simulator
@@ -44,6 +52,7 @@ _LATER = {
     "force_polytope": "analysis",
     "largest_force": "analysis",
     "load_result": "recording",
+    "plot_convergence": "plots",
     "plot_energy": "plots",
     "plot_fig6": "plots",
     "plot_friction_law": "plots",
@@ -81,6 +90,7 @@ __all__ = [
     "load_finger",
     "load_result",
     "load_scenario",
+    "plot_convergence",
     "plot_energy",
     "plot_fig6",
     "plot_friction_law",
