@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from finger_pin.mjcf import to_mjcf
     from finger_pin.plots import (
         draw_all,
+        plot_convergence,
         plot_critical_friction,
         plot_energy,
         plot_fig6,
@@ -75,6 +76,7 @@ _LATER = {
     "largest_force": "analysis",
     "load_result": "recording",
     "plot_critical_friction": "plots",
+    "plot_convergence": "plots",
     "plot_energy": "plots",
     "plot_fig6": "plots",
     "plot_force_polytope": "plots",
@@ -126,6 +128,7 @@ __all__ = [
     "load_finger",
     "load_result",
     "load_scenario",
+    "plot_convergence",
     "plot_critical_friction",
     "plot_energy",
     "plot_fig6",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ import xarray as xr
 
 from finger_pin.blocks.controller import Controller
 from finger_pin.closed_loop import Reference
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, SelfLockingWarning
 from finger_pin.integration import Stop
 from finger_pin.loading import to_toml
 from finger_pin.routing import Array
@@ -154,7 +155,11 @@ def check_convergence(
             stop=stop,
         )
 
-    first, second = run(scenario) if result is None else result, run(tighter)
+    first = run(scenario) if result is None else result
+    with warnings.catch_warnings():
+        # The first run has said it.
+        warnings.simplefilter("ignore", SelfLockingWarning)
+        second = run(tighter)
     count = min(first.sizes["time"], second.sizes["time"])
     angles = [each["joint_position"].transpose("time", "joint").values[:count] for each in (first, second)]
     return Convergence(

@@ -1,5 +1,7 @@
 """The convergence check: what it measures, when it warns, and how the command line tells."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import simulate as script
@@ -8,6 +10,7 @@ from test_files import contents
 from test_loading import PLANAR
 
 import finger_pin as fp
+from finger_pin import plots
 from finger_pin.convergence import tightened
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.summary import summarize
@@ -142,6 +145,29 @@ def test_difference_and_verdict_are_in_the_dataset_survive_its_file_and_are_summ
         assert found.verdict in " ".join(lines)
         assert f"distal        {found.largest[3]:.1e}" in summarize(kept)
         assert "tighter" not in summarize(result)
+
+
+def test_the_figure_shows_the_greatest_differences_and_where_the_runs_part(hunting, calm, tmp_path):
+    for _, result, found in (hunting, calm):
+        checked = found.attach(result)
+        (axes,) = plots.plot_convergence(checked).axes
+        drawn = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
+        for joint, largest in zip(found.joints, found.largest, strict=True):
+            assert max(drawn[joint]) == largest
+        written = [text.get_text() for text in axes.texts]
+        assert written == ([] if found.converged else [f" parts at {found.parting_time:.3g} s"])
+        names = {path.name for path in plots.draw_all(checked, tmp_path)}
+        assert names == {"fig6.png", "losses.png", "energy.png", "convergence.png"}
+
+
+def test_an_interrupted_repetition_is_drawn_and_summed_up_as_far_as_it_goes(calm):
+    _, result, found = calm
+    part = replace(found, time=found.time[:100], difference=found.difference[:100])
+    checked = part.attach(result)
+    assert int(checked.convergence_difference.notnull().all("joint").sum()) == 100
+    assert f"{part.largest[0]:.1e}" in summarize(checked)
+    (axes,) = plots.plot_convergence(checked).axes
+    assert axes.get_lines()[0].get_xdata().max() <= found.time[99]
 
 
 @pytest.fixture

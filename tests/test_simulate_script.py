@@ -193,7 +193,7 @@ def test_help_tells_every_option(run):
     assert (code, lines) == (0, [])
     for option in ("--set", "--duration", "--method", "--output", "--view", "--no-view", "--figures", "--no-figures"):
         assert option in out
-    assert "--quiet" in out and "--list" in out
+    assert "--quiet" in out and "--list" in out and "--check" in out
 
 
 def test_view_is_shown_after_the_results_are_written_and_only_if_asked(run, here, quick, monkeypatch):

@@ -12,6 +12,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.files import replacing
+from finger_pin.plots.convergence import plot_convergence
 from finger_pin.plots.energy import plot_energy
 from finger_pin.plots.fig6 import plot_fig6
 from finger_pin.plots.force_capability import plot_force_polytope, plot_radius_sensitivity
@@ -25,6 +26,7 @@ from finger_pin.plots.workspace import plot_workspace
 
 __all__ = [
     "draw_all",
+    "plot_convergence",
     "plot_critical_friction",
     "plot_energy",
     "plot_fig6",
@@ -51,7 +53,10 @@ def draw_all(result: xr.Dataset, folder: str | Path) -> list[Path]:
         result: Dataset of `simulate`.
         folder: Where to write; a file of the same name is replaced whole or not at all.
     """
-    return [save_figure(draw(result), Path(folder) / f"{name}.png") for name, draw in _FIGURES.items()]
+    figures = dict(_FIGURES)
+    if "convergence_difference" in result:
+        figures["convergence"] = plot_convergence
+    return [save_figure(draw(result), Path(folder) / f"{name}.png") for name, draw in figures.items()]
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
