@@ -25,16 +25,32 @@ if TYPE_CHECKING:
     from finger_pin.finger import Finger
     from finger_pin.many import simulate_many
     from finger_pin.mjcf import to_mjcf
-    from finger_pin.plots import draw_all, plot_energy, plot_fig6, plot_friction_law, plot_losses, plot_workspace
+    from finger_pin.plots import (
+        draw_all,
+        plot_energy,
+        plot_fig6,
+        plot_friction_law,
+        plot_losses,
+        plot_sweep,
+        plot_workspace,
+    )
     from finger_pin.recording import load_result, save
     from finger_pin.simulation import simulate
     from finger_pin.simulator import Simulator
+    from finger_pin.studies import DaskCluster, Grid, LatinHypercube, Listing, LocalProcesses, Metric, Range, sweep
     from finger_pin.viewer import LiveView, view, write_animation
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
+    "DaskCluster": "studies",
     "Finger": "finger",
+    "Grid": "studies",
+    "LatinHypercube": "studies",
+    "Listing": "studies",
     "LiveView": "viewer",
+    "LocalProcesses": "studies",
+    "Metric": "studies",
+    "Range": "studies",
     "Simulator": "simulator",
     "critical_friction": "analysis",
     "draw_all": "plots",
@@ -45,12 +61,14 @@ _LATER = {
     "plot_fig6": "plots",
     "plot_friction_law": "plots",
     "plot_losses": "plots",
+    "plot_sweep": "plots",
     "plot_workspace": "plots",
     "save": "recording",
     "self_locking_map": "analysis",
     "self_locking_margin": "analysis",
     "simulate": "simulation",
     "simulate_many": "many",
+    "sweep": "studies",
     "tension_for_force": "analysis",
     "to_mjcf": "mjcf",
     "view": "viewer",
@@ -58,13 +76,20 @@ _LATER = {
 }
 
 __all__ = [
+    "DaskCluster",
     "Finger",
     "FingerDescription",
     "FingerPinError",
+    "Grid",
     "InputError",
     "IntegrationError",
     "Interrupted",
+    "LatinHypercube",
+    "Listing",
     "LiveView",
+    "LocalProcesses",
+    "Metric",
+    "Range",
     "Scenario",
     "Simulator",
     "critical_friction",
@@ -80,12 +105,14 @@ __all__ = [
     "plot_fig6",
     "plot_friction_law",
     "plot_losses",
+    "plot_sweep",
     "plot_workspace",
     "save",
     "self_locking_map",
     "self_locking_margin",
     "simulate",
     "simulate_many",
+    "sweep",
     "tension_for_force",
     "to_mjcf",
     "to_toml",

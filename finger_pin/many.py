@@ -62,7 +62,7 @@ def simulate_many(
             if progress is not None:
                 progress(index + 1, len(runs))
         return _stack(runs, results)
-    with ProcessPoolExecutor(count, mp_context=_context()) as pool:
+    with ProcessPoolExecutor(count, mp_context=process_context()) as pool:
         pending = {pool.submit(_run, run, keep): index for index, run in enumerate(runs) if index > 0}
         try:
             for future in as_completed(pending):
@@ -76,7 +76,7 @@ def simulate_many(
     return _stack(runs, results)
 
 
-def _context() -> multiprocessing.context.BaseContext:
+def process_context() -> multiprocessing.context.BaseContext:
     """Return how to start processes: from a clean server where the cache serves them, else as copies of this one."""
     methods = multiprocessing.get_all_start_methods()
     if CACHE_FOLDER is None and "fork" in methods:
