@@ -8,15 +8,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from finger_pin.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
 from finger_pin.routing import Array
 
 _MAP = "cividis"
+# Values that differ by more than this factor are coloured by their logarithm.
+_WIDE = 50.0
 # Parts of a key that tell a reader nothing.
 _SILENT = {"finger", "joints", "link", "tendons", "crossings"}
 
@@ -47,51 +51,48 @@ def short_key(key: str) -> str:
 
 
 def _lines(result: xr.Dataset, key: str) -> Figure:
-    names, figure, panels = _panels(result, 5.2, 2.3)
+    figure, panels = _panels(result, 4.6, 2.5)
     order = np.argsort(result[key].values)
     values = result[key].values[order]
     failed = result["status"].values[order] == "failed"
-    for axes, name in zip(panels, names, strict=True):
+    for name, axes in panels.items():
         found = result[name].values[order]
         axes.plot(values, found, color=BLUE, marker="o" if len(values) <= 40 else "", markersize=3.5)
-        _scale(axes.set_xscale, values)
+        _scale(axes.set_xscale, axes.xaxis, values)
         axes.margins(x=0.02)
         if not np.any(np.nan_to_num(found)):
             axes.set_ylim(0.0, 1.0)
-        axes.set_title(_wrapped(_title(result, name)))
-        axes.set_ylabel(result[name].attrs["units"])
+        axes.set_ylabel(_unit(result, name))
         if failed.any():
             low = np.full(int(failed.sum()), 0.03)
             marks: Any = axes.get_xaxis_transform()
             axes.plot(values[failed], low, "x", color=VERMILLION, transform=marks, clip_on=False, label="failed")
-    if failed.any():
-        panels[0].legend(loc="best")
-    figure.supxlabel(_label(result, key), fontsize=10.0)
+    _legend(figure, panels)
+    _name_axes(panels, _label(result, key), None)
     return figure
 
 
 def _maps(result: xr.Dataset, first: str, second: str) -> Figure:
-    names, figure, panels = _panels(result, 5.4, 3.4)
+    figure, panels = _panels(result, 4.9, 3.6)
     x, y = result[first].values, result[second].values
     status = result["status"].transpose(first, second).values
-    for axes, name in zip(panels, names, strict=True):
+    for name, axes in panels.items():
         values = result[name].transpose(first, second).values
         axes.grid(visible=False)
-        axes.set_title(_wrapped(_title(result, name)))
-        _scale(axes.set_xscale, x)
-        _scale(axes.set_yscale, y)
         shown = np.ma.masked_invalid(values)
         if shown.count():
-            drawn = axes.pcolormesh(_edges(x), _edges(y), shown.T, cmap=_MAP)
-            figure.colorbar(drawn, ax=axes, label=result[name].attrs["units"])
+            wide = shown.min() > 0.0 and shown.max() > _WIDE * shown.min()
+            norm = LogNorm() if wide else None
+            drawn = axes.pcolormesh(_edges(x), _edges(y), shown.T, cmap=_MAP, norm=norm)
+            figure.colorbar(drawn, ax=axes, label=_unit(result, name))
+        _scale(axes.set_xscale, axes.xaxis, x)
+        _scale(axes.set_yscale, axes.yaxis, y)
         for which, colour in (("failed", VERMILLION), ("missing", GREY)):
             i, j = np.nonzero(status == which)
             if i.size:
                 axes.plot(x[i], y[j], "x", color=colour, markersize=5.0, label=which)
-    figure.supxlabel(_label(result, first), fontsize=10.0)
-    figure.supylabel(_label(result, second), fontsize=10.0)
-    if (status != "done").any():
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    _legend(figure, panels)
+    _name_axes(panels, _label(result, first), _label(result, second))
     return figure
 
 
@@ -144,36 +145,56 @@ def _column(result: xr.Dataset, name: str) -> Array:
     return np.asarray(values.broadcast_like(status).transpose(*status.dims).values, dtype=float).ravel()
 
 
-def _panels(result: xr.Dataset, width: float, height: float) -> tuple[list[str], Figure, list[Axes]]:
+def _panels(result: xr.Dataset, width: float, height: float) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure with a panel per metric, entitled; widths and heights in inches."""
     names = _metrics(result)
-    columns = 1 if len(names) == 1 else 2
+    columns = {1: 1, 2: 2, 4: 2}.get(len(names), 3)
     rows = -(-len(names) // columns)
-    figure = new_figure(max(7.0, width * columns), height * rows + 1.0, "constrained")
+    figure = new_figure(max(6.5, width * columns), height * rows + 0.6, "constrained")
     grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=True)
-    panels = list(grid.ravel())
-    for spare in panels[len(names) :]:
-        spare.set_visible(False)
-    return names, figure, panels[: len(names)]
+    for spare in grid.ravel()[len(names) :]:
+        spare.remove()
+    panels = dict(zip(names, grid.ravel(), strict=False))
+    for name, axes in panels.items():
+        axes.set_title(textwrap.fill(str(result[name].attrs["long_name"]), 46))
+    return figure, panels
+
+
+def _name_axes(panels: dict[str, Axes], first: str, second: str | None) -> None:
+    """Write the names of the keys at the outer panels: the first one below, the second one at the left."""
+    spots = {name: axes.get_subplotspec() for name, axes in panels.items()}
+    lowest = {spot.colspan.start: name for name, spot in spots.items() if spot is not None}
+    for name, axes in panels.items():
+        spot = spots[name]
+        assert spot is not None
+        if lowest[spot.colspan.start] == name:
+            axes.set_xlabel(first)
+            axes.tick_params(labelbottom=True)
+        if second is not None and spot.colspan.start == 0:
+            axes.set_ylabel(second)
+
+
+def _legend(figure: Figure, panels: dict[str, Axes]) -> None:
+    handles, labels = next(iter(panels.values())).get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
 
 
 def _metrics(result: xr.Dataset) -> list[str]:
     return [str(name) for name in result.data_vars if name not in ("status", "reason")]
 
 
-def _title(result: xr.Dataset, name: str) -> str:
-    return str(result[name].attrs["long_name"])
-
-
 def _label(result: xr.Dataset, key: str) -> str:
     return f"{short_key(key)} ({result[key].attrs['units']})"
 
 
+def _unit(result: xr.Dataset, name: str) -> str:
+    unit = str(result[name].attrs["units"])
+    return "" if unit == "1" else unit
+
+
 def _spaced(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _wrapped(text: str) -> str:
-    return textwrap.fill(text, 56)
 
 
 def _logarithmic(values: Array) -> bool:
@@ -184,9 +205,12 @@ def _logarithmic(values: Array) -> bool:
     return bool(np.allclose(ratios, ratios[0], rtol=1e-3) and not np.allclose(steps, steps[0], rtol=1e-2))
 
 
-def _scale(set_scale: Any, values: Array) -> None:
+def _scale(set_scale: Any, axis: Axis, values: Array) -> None:
     if _logarithmic(values):
         set_scale("log")
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_locator(NullLocator())
 
 
 def _edges(values: Array) -> Array:

@@ -91,7 +91,7 @@ class DaskWorkers:
         keys = [f"finger_pin-{task.key}-{uuid.uuid4().hex}" for task in tasks]
         futures = self.client.map(execute, tasks, key=keys, pure=False)
         asked = dict(zip(keys, tasks, strict=True))
-        finished = distributed.as_completed(futures)
+        finished = distributed.as_completed(futures, loop=self.client.loop)
         del futures
         while not finished.is_empty() and not stop():
             if not finished.has_ready():

@@ -7,7 +7,7 @@ in brackets: ``environment.fingertip_force[2]``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from finger_pin.exceptions import InputError
 from finger_pin.loading import load_scenario
 from finger_pin.scenario import Scenario
-from finger_pin.validation import find_field
+from finger_pin.validation import find_field, nearest
 
 _INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6})\]")
 
@@ -68,6 +68,9 @@ class Starting:
         Raises:
             InputError: If there is no such key, it does not hold a number, or no value is allowed.
         """
+        # Of the finger nothing may come into being by a misspelt name, as an entry that is overridden otherwise may.
+        if key.startswith("finger.") and split(key)[1] is None and not _is_number(self._found(key)):
+            raise self._no_number(key)
         problem: InputError | None = None
         for value in values:
             try:
@@ -75,12 +78,15 @@ class Starting:
             except InputError as error:
                 problem = problem or error
                 continue
-            found = _look_up(scenario, key)
-            if isinstance(found, bool) or not isinstance(found, int | float):
-                raise InputError(key, "does not hold a number that can be varied")
+            if not _is_number(_look_up(scenario, key)):
+                raise self._no_number(key)
             return
         if problem is not None:
             raise problem
+
+    def _no_number(self, key: str) -> InputError:
+        near = nearest(key, _numbers(self.scenario.model_dump(mode="python"), ""))
+        return InputError(key, f"the scenario has no such number{f'; did you mean {near}?' if near else ''}")
 
     def _found(self, key: str) -> Any:
         return _look_up(self.scenario, key)
@@ -119,6 +125,22 @@ def describe(key: str) -> dict[str, str]:
     text = (field.description or "").rstrip(".") if field is not None else ""
     where = "" if index is None else f"[{index}]"
     return {"units": str(unit), "long_name": f"{text}{where}" if text else key}
+
+
+def _is_number(held: Any) -> bool:
+    return isinstance(held, int | float) and not isinstance(held, bool)
+
+
+def _numbers(held: Any, key: str) -> Iterator[str]:
+    """Give the keys below one that hold numbers."""
+    if _is_number(held):
+        yield key
+    elif isinstance(held, Mapping):
+        for name, below in held.items():
+            yield from _numbers(below, f"{key}.{name}" if key else name)
+    elif isinstance(held, list | tuple):
+        for index, below in enumerate(held):
+            yield from _numbers(below, f"{key}[{index}]")
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:

@@ -181,7 +181,7 @@ METRICS = {
         Metric("losses_tendons", "J", "energy lost to the friction of the tendons", losses_tendons),
         Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
         Metric("slack_time", "s", "time with a slack tendon", slack_time),
-        Metric("self_locking_margin", "1", "critical over actual joint friction on the reference", locking_margin),
+        Metric("self_locking_margin", "1", "critical over actual joint friction", locking_margin),
         Metric(
             "fingertip_force",
             "N",
