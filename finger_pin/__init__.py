@@ -31,18 +31,32 @@ if TYPE_CHECKING:
         plot_fig6,
         plot_friction_law,
         plot_losses,
+        plot_pareto,
         plot_sweep,
         plot_workspace,
     )
     from finger_pin.recording import load_result, save
     from finger_pin.simulation import simulate
     from finger_pin.simulator import Simulator
-    from finger_pin.studies import DaskCluster, Grid, LatinHypercube, Listing, LocalProcesses, Metric, Range, sweep
+    from finger_pin.studies import (
+        DaskCluster,
+        Effort,
+        Grid,
+        LatinHypercube,
+        Listing,
+        LocalProcesses,
+        Metric,
+        Range,
+        Variable,
+        optimise,
+        sweep,
+    )
     from finger_pin.viewer import LiveView, view, write_animation
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
     "DaskCluster": "studies",
+    "Effort": "studies",
     "Finger": "finger",
     "Grid": "studies",
     "LatinHypercube": "studies",
@@ -52,15 +66,18 @@ _LATER = {
     "Metric": "studies",
     "Range": "studies",
     "Simulator": "simulator",
+    "Variable": "studies",
     "critical_friction": "analysis",
     "draw_all": "plots",
     "force_polytope": "analysis",
     "largest_force": "analysis",
     "load_result": "recording",
+    "optimise": "studies",
     "plot_energy": "plots",
     "plot_fig6": "plots",
     "plot_friction_law": "plots",
     "plot_losses": "plots",
+    "plot_pareto": "plots",
     "plot_sweep": "plots",
     "plot_workspace": "plots",
     "save": "recording",
@@ -77,6 +94,7 @@ _LATER = {
 
 __all__ = [
     "DaskCluster",
+    "Effort",
     "Finger",
     "FingerDescription",
     "FingerPinError",
@@ -92,6 +110,7 @@ __all__ = [
     "Range",
     "Scenario",
     "Simulator",
+    "Variable",
     "critical_friction",
     "draw_all",
     "force_polytope",
@@ -101,10 +120,12 @@ __all__ = [
     "load_finger",
     "load_result",
     "load_scenario",
+    "optimise",
     "plot_energy",
     "plot_fig6",
     "plot_friction_law",
     "plot_losses",
+    "plot_pareto",
     "plot_sweep",
     "plot_workspace",
     "save",

@@ -16,6 +16,7 @@ from finger_pin.plots.energy import plot_energy
 from finger_pin.plots.fig6 import plot_fig6
 from finger_pin.plots.friction_law import plot_friction_law
 from finger_pin.plots.losses import plot_losses
+from finger_pin.plots.pareto import plot_pareto
 from finger_pin.plots.sweep import plot_sweep
 from finger_pin.plots.workspace import plot_workspace
 
@@ -25,6 +26,7 @@ __all__ = [
     "plot_fig6",
     "plot_friction_law",
     "plot_losses",
+    "plot_pareto",
     "plot_sweep",
     "plot_workspace",
     "save_figure",

@@ -6,13 +6,18 @@ from finger_pin.studies.cluster import ClusterError, DaskCluster
 from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
 from finger_pin.studies.local import LocalProcesses
 from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
+from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
 from finger_pin.studies.sweeping import sweep
+from finger_pin.studies.variables import Variable, radii
 
 __all__ = [
+    "DEFAULT_CONSTRAINTS",
     "DEFAULT_METRICS",
+    "DEFAULT_OBJECTIVES",
     "METRICS",
     "ClusterError",
     "DaskCluster",
+    "Effort",
     "Grid",
     "LatinHypercube",
     "Listing",
@@ -20,5 +25,8 @@ __all__ = [
     "Metric",
     "Range",
     "Run",
+    "Variable",
+    "optimise",
+    "radii",
     "sweep",
 ]

@@ -148,6 +148,12 @@ class Range:
             return np.clip(self.low * (self.high / self.low) ** np.asarray(share), self.low, self.high)
         return self.low + (self.high - self.low) * np.asarray(share)
 
+    def share(self, value: float) -> float:
+        """Return the share of the way from low to high at which a value lies."""
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
 
 @dataclass(frozen=True)
 class LatinHypercube:

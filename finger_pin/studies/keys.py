@@ -84,6 +84,17 @@ class Starting:
         if problem is not None:
             raise problem
 
+    def number(self, key: str) -> float:
+        """Return the number that the scenario itself has at a key.
+
+        Raises:
+            InputError: If it has none.
+        """
+        held = self._found(key)
+        if not _is_number(held):
+            raise self._no_number(key)
+        return float(held)
+
     def _no_number(self, key: str) -> InputError:
         near = nearest(key, _numbers(self.scenario.model_dump(mode="python"), ""))
         return InputError(key, f"the scenario has no such number{f'; did you mean {near}?' if near else ''}")

@@ -55,7 +55,7 @@ def test_a_whole_number_stays_one(fig6):
         ("finger.tendons.T9.crossings.abduction.radius", "no such number"),
         ("finger.tendons.T3.crossings.distal.radius", "no such number"),
         ("reference.joints.medial", "must be a table"),
-        ("finger.gravity", "did you mean finger.gravity[0]?"),
+        ("finger.gravity", "did you mean finger.gravity["),
         ("finger.gravity[3]", "[0] to [2]"),
         ("controller.gain[0]", "one number for all"),
         ("finger.joints[0]", "no such list"),
