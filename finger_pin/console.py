@@ -72,12 +72,14 @@ def runs_bar(what: str) -> Iterator[Callable[[int, int, int], None]]:
     spent, left = TimeElapsedColumn(), TimeRemainingColumn()
     columns = (TextColumn(what), BarColumn(), text, spent, TextColumn("so far, left"), left)
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        waiting = bar.add_task("", total=None, failed="")
         tasks: list[TaskID] = []
 
         def show(finished: int, failed: int, total: int) -> None:
             note = f", {failed} failed" if failed else ""
             if not tasks:
                 # What was found finished took no time, and tells nothing about the time that is left.
+                bar.remove_task(waiting)
                 tasks.append(bar.add_task("", total=total, completed=finished, failed=note))
             bar.update(tasks[0], completed=finished, total=total, failed=note)
 

@@ -51,6 +51,14 @@ def override(text: str) -> tuple[str, Any]:
     raise argparse.ArgumentTypeError(f"{key} = {value[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
 
 
+def tell_compilation() -> None:
+    """Say that the first run ever takes its time."""
+    from finger_pin.core.compilation import is_cached
+
+    if not is_cached():
+        print("Compiling the model, once for this version: about half a minute ...", file=sys.stderr)
+
+
 def complain(message: str) -> None:
     """Print one line on standard error."""
     text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)

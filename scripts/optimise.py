@@ -11,7 +11,17 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain, override
+from command_line import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    NOT_WRITTEN,
+    WRONG_INPUT,
+    Parser,
+    complain,
+    override,
+    tell_compilation,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,6 +108,8 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
         name = Starting.load(options.scenario, dict(options.set)).scenario.name
         output = options.output or Path("results", f"optimise-{name}")
         executor = DaskCluster(options.scheduler) if options.scheduler else LocalProcesses(options.workers)
+        if shown:
+            tell_compilation()
         with runs_bar("search") if shown else nullcontext() as progress, interrupts.patient():
             result = optimise(
                 options.scenario,

@@ -8,7 +8,17 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain, override
+from command_line import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    NOT_WRITTEN,
+    WRONG_INPUT,
+    Parser,
+    complain,
+    override,
+    tell_compilation,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -144,14 +154,6 @@ def draw(result: xr.Dataset, output: Path) -> None:
     from finger_pin.plots import plot_sweep, save_figure
 
     save_figure(plot_sweep(result), output / "figures" / "sweep.png")
-
-
-def tell_compilation() -> None:
-    """Say that the first run ever takes its time."""
-    from finger_pin.core.compilation import is_cached
-
-    if not is_cached():
-        print("Compiling the model, once for this version: about half a minute ...", file=sys.stderr)
 
 
 def summary(result: xr.Dataset) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from itertools import combinations
 
 import numpy as np
@@ -12,10 +13,10 @@ from matplotlib.ticker import MaxNLocator
 
 from finger_pin.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 
-# Values that differ by more than this factor are drawn on a logarithmic axis.
-_WIDE = 30.0
-# More designs on a front than this are not numbered all.
-_NUMBERED = 24
+# Percentiles of the designs that are in view whatever they are, and the room around them, in shares of their span.
+_IN_VIEW, _ROOM = (0.0, 95.0), 0.08
+# Of more designs on a front than this not all are numbered.
+_NUMBERED = 16
 
 
 @styled
@@ -31,42 +32,78 @@ def plot_pareto(result: xr.Dataset) -> Figure:
     names = [name for kind in ("minimise", "maximise") for name in result.attrs[kind].split(", ") if name]
     if len(names) == 1:
         return _course(result, names[0])
-    pairs = list(combinations(names, 2))
-    columns = min(len(pairs), 3)
-    rows = -(-len(pairs) // columns)
-    figure = new_figure(max(7.5, 4.6 * columns), max(5.4, 4.2 * rows), "constrained")
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for spare in grid.ravel()[len(pairs) :]:
-        spare.remove()
-    for axes, (first, second) in zip(grid.ravel(), pairs, strict=False):
-        _pair(axes, result, first, second, line=len(names) == 2)
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    if len(names) == 2:
+        figure = new_figure(11.0, 5.2, "constrained")
+        whole, close = figure.subplots(1, 2)
+        _pair(whole, result, *names)
+        _magnify(whole, close, result, *names)
+        panels = [whole]
+    else:
+        pairs = list(combinations(names, 2))
+        columns = min(len(pairs), 3)
+        rows = -(-len(pairs) // columns)
+        figure = new_figure(max(7.5, 4.6 * columns), max(5.4, 4.2 * rows), "constrained")
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for spare in grid[len(pairs) :]:
+            spare.remove()
+        panels = list(grid[: len(pairs)])
+        for axes, (first, second) in zip(panels, pairs, strict=True):
+            _pair(axes, result, first, second)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
-def _pair(axes: Axes, result: xr.Dataset, first: str, second: str, *, line: bool) -> None:
+def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
+    """Draw designs that keep the bounds, front and start, with all but the farthest designs in view."""
     x, y, front = (result[name].values for name in (first, second, "front"))
     kept = result["feasible"].values & (front == 0)
-    axes.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=3.5, markeredgewidth=0.0, label="kept bounds")
-    order = np.argsort(np.where(front > 0, front, np.inf))[: int((front > 0).sum())]
-    if line and order.size:
-        # Between two designs of a front nothing is known to be better than the worse value of either.
-        falls = second in result.attrs["minimise"].split(", ")
-        axes.step(x[order], y[order], where="post" if falls else "pre", color=VERMILLION, linewidth=1.0, alpha=0.6)
-    axes.plot(x[order], y[order], "o", color=VERMILLION, markersize=5.0, label="front")
-    for row in order if len(order) <= _NUMBERED else ():
-        axes.annotate(str(front[row]), (x[row], y[row]), xytext=(4, 4), textcoords="offset points", fontsize=8.5)
+    axes.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=4.0, markeredgewidth=0.0, label="kept bounds")
+    axes.plot(x[front > 0], y[front > 0], "o", color=VERMILLION, markersize=5.0, label="front")
     if result["status"].values[0] == "done":
         note = "start" if result["feasible"].values[0] else "start, breaks a bound"
-        axes.plot(x[:1], y[:1], "*", color=BLACK, markersize=11.0, label=note)
-    axes.set_xlabel(_label(result, first))
-    axes.set_ylabel(_label(result, second))
-    shown = np.append(np.flatnonzero(result["feasible"].values), 0)
-    for values, scale in ((x[shown], axes.set_xscale), (y[shown], axes.set_yscale)):
-        finite = values[np.isfinite(values)]
-        if finite.size and finite.min() > 0.0 and finite.max() > _WIDE * finite.min():
-            scale("log")
+        axes.plot(x[:1], y[:1], "*", color=BLACK, markersize=12.0, label=note)
+    axes.set_xlabel(textwrap.fill(_label(result, first), 60))
+    axes.set_ylabel(textwrap.fill(_label(result, second), 60))
+    always = front > 0
+    always[0] = True
+    for values, limit in ((x, axes.set_xlim), (y, axes.set_ylim)):
+        most = values[kept & np.isfinite(values)]
+        shown = np.concatenate([values[always], np.percentile(most, _IN_VIEW) if most.size else most])
+        shown = shown[np.isfinite(shown)]
+        if shown.size and np.ptp(shown) > 0.0:
+            limit(shown.min() - _ROOM * np.ptp(shown), shown.max() + _ROOM * np.ptp(shown))
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    beyond = int((kept & ~((x >= left) & (x <= right) & (y >= low) & (y <= high))).sum())
+    axes.set_title(f"{int(result['feasible'].sum())} designs" + (f", {beyond} beyond the edges" if beyond else ""))
+
+
+def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: str) -> None:
+    """Draw the front with its numbers, and where it lies in the whole."""
+    x, y, front = (result[name].values for name in (first, second, "front"))
+    order = np.argsort(np.where(front > 0, front, np.inf))[: int((front > 0).sum())]
+    close.set_xlabel(whole.get_xlabel())
+    if not order.size:
+        close.set_axis_off()
+        close.text(0.5, 0.5, "no design keeps all bounds", transform=close.transAxes, ha="center", color=GREY)
+        return
+    kept = result["feasible"].values & (front == 0)
+    close.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=4.0, markeredgewidth=0.0)
+    # Between two designs of a front nothing is known to be better than the worse value of either.
+    falls = second in result.attrs["minimise"].split(", ")
+    close.step(x[order], y[order], where="post" if falls else "pre", color=VERMILLION, linewidth=1.0, alpha=0.6)
+    close.plot(x[order], y[order], "o", color=VERMILLION, markersize=5.0)
+    every = -(-len(order) // _NUMBERED)
+    for row in order[::every]:
+        close.annotate(str(front[row]), (x[row], y[row]), xytext=(5, 4), textcoords="offset points", fontsize=8.5)
+    for values, limit in ((x[order], close.set_xlim), (y[order], close.set_ylim)):
+        span = np.ptp(values) or 0.02 * abs(values[0]) or 1.0
+        limit(values.min() - 0.35 * span, values.max() + 0.35 * span)
+    close.set_title(f"the front: {len(order)} designs")
+    close.xaxis.set_major_locator(MaxNLocator(6))
+    whole.indicate_inset(
+        (*(e[0] for e in (close.get_xlim(), close.get_ylim())), *map(np.ptp, (close.get_xlim(), close.get_ylim()))),
+        edgecolor=GREY, alpha=0.8,
+    )  # fmt: skip
 
 
 def _course(result: xr.Dataset, name: str) -> Figure:

@@ -6,10 +6,12 @@ dies costs the runs that it was at, which Dask gives to others.
 
 from __future__ import annotations
 
+import logging
 import time
 import uuid
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     import distributed
 
 _POLL = 0.05
+_LOST = "the connection to the scheduler is lost"
+_LOGGER = logging.getLogger("distributed.client")
 
 
 class ClusterError(FingerPinError):
@@ -66,9 +70,12 @@ class DaskWorkers:
     """
 
     client: distributed.Client
+    _level: int = field(default=logging.NOTSET, init=False, repr=False)
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return itself; what the client logs about a lost scheduler is told by an error instead."""
+        self._level = _LOGGER.level
+        _LOGGER.setLevel(logging.CRITICAL)
         return self
 
     def __exit__(
@@ -76,6 +83,7 @@ class DaskWorkers:
     ) -> None:
         """Disconnect; the cluster drops what it has not done."""
         self.client.close()
+        _LOGGER.setLevel(self._level)
 
     def run(self, tasks: Sequence[Task], stop: Stop) -> Iterator[Record]:
         """Do tasks in any order and yield the record of each as soon as it is done; end early when told to stop.
@@ -96,7 +104,7 @@ class DaskWorkers:
         while not finished.is_empty() and not stop():
             if not finished.has_ready():
                 if self.client.status not in ("running", "connecting"):
-                    raise ClusterError("the connection to the scheduler is lost")
+                    raise ClusterError(_LOST)
                 time.sleep(_POLL)
                 continue
             for future in finished.next_batch(block=False):
@@ -107,11 +115,13 @@ def _record(future: Any, task: Task) -> Record:
     from distributed.scheduler import KilledWorker
 
     if future.status not in ("finished", "error"):
-        raise ClusterError(f"the connection to the scheduler is lost, a run is {future.status}")
+        raise ClusterError(f"{_LOST}: a run is {future.status}")
     try:
         record = future.result()
     except KilledWorker as error:
         return task.failed(f"the workers that ran it died: {error}")
+    except (OSError, CancelledError) as error:
+        raise ClusterError(f"{_LOST}: {error}") from error
     except Exception as error:
         raise ClusterError(f"the workers cannot run it: {type(error).__name__}: {error}") from error
     assert isinstance(record, Record)

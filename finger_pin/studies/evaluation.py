@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,8 @@ def evaluate(
         stop: When it returns true, runs that have not been done are None.
         retry_failed: Whether runs that failed before count as not done.
     """
-    plans = [plan(starting, point, metrics) for point in points]
+    asked_to_stop = stop or (lambda: False)
+    plans = [plan(starting, point, metrics) for point in takewhile(lambda _: not asked_to_stop(), points)]
     found = {key: r for key, r in store.records.items() if not (retry_failed and r.status == FAILED)}
     records = {each.key: found[each.key] for each in plans if each.key in found}
     tasks = {each.key: each for each in plans if isinstance(each, Task) and each.key not in records}
@@ -70,15 +72,15 @@ def evaluate(
     def report() -> None:
         if progress is not None:
             done = [records[each.key] for each in plans if each.key in records]
-            progress(len(done), sum(record.status == FAILED for record in done), len(plans))
+            progress(len(done), sum(record.status == FAILED for record in done), len(points))
 
     for each in plans:
         if isinstance(each, Record) and each.key not in records:
             records[each.key] = each
             store.append(each)
     report()
-    for record in workers.run(list(tasks.values()), stop or (lambda: False)):
+    for record in workers.run(list(tasks.values()), asked_to_stop):
         store.append(record)
         records[record.key] = record
         report()
-    return [records.get(each.key) for each in plans]
+    return [records.get(each.key) for each in plans] + [None] * (len(points) - len(plans))

@@ -14,6 +14,14 @@ def gain(run):
     return float(run.scenario.controller.gain)
 
 
+def cheap(run):
+    return gain(run)
+
+
+def dear(run):
+    return 1.0 / gain(run)
+
+
 def slow_gain(run):
     time.sleep(0.15)
     return gain(run)
@@ -51,7 +59,7 @@ def threads(run):
     return float(os.environ["OPENBLAS_NUM_THREADS"])
 
 
-GAIN, SLOW, DIES, DIES_ONCE, RAISES, STOPS, THREADS = (
+GAIN, CHEAP, DEAR, SLOW, DIES, DIES_ONCE, RAISES, STOPS, THREADS = (
     Metric(function.__name__, "N m/rad", "planted", function)
-    for function in (gain, slow_gain, dies_at_two, dies_once_at_two, raises_at_two, stops_at_two, threads)
+    for function in (gain, cheap, dear, slow_gain, dies_at_two, dies_once_at_two, raises_at_two, stops_at_two, threads)
 )

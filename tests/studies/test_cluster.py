@@ -1,8 +1,10 @@
 """Sweeps on a real local Dask cluster, one of whose workers is killed in mid-run."""
 
+import importlib
 import json
 import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from finger_pin.exceptions import InputError
 
 distributed = pytest.importorskip("distributed")
 
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 SHORT = {"simulation.duration": 0.02}
 METRICS = [SLOW, "tracking_rms", "tension_peak"]
 GAINS = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]
@@ -70,6 +73,15 @@ def test_a_stop_ends_a_sweep_on_a_cluster(cluster):
     np.testing.assert_array_equal(
         *(result[name].values[result["status"] == "done"] for name in ("slow_gain", "controller.gain"))
     )
+
+
+def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    main = importlib.import_module("sweep").main
+    arguments = ["--over", "controller.gain=1,2", "--metric", "tracking_rms", "--set", "simulation.duration=0.02"]
+    assert main([*arguments, "--scheduler", cluster.scheduler_address]) == 0
+    assert "2 runs: 2 done" in capsys.readouterr().out
 
 
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path):
