@@ -108,6 +108,10 @@ class DaskWorkers:
                 time.sleep(_POLL)
                 continue
             for future in finished.next_batch(block=False):
+                if future.status in ("lost", "pending"):
+                    # A worker died with the result on it, and another one does the run again.
+                    finished.add(future)
+                    continue
                 yield _record(future, asked[str(future.key)])
 
 

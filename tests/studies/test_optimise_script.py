@@ -42,7 +42,9 @@ def script(monkeypatch):
     sys.modules.pop("optimise", None)
 
 
-def test_a_search_killed_in_mid_run_goes_on_and_ends_with_a_front_that_can_be_simulated(tmp_path):
+def test_a_search_killed_in_mid_run_goes_on_and_ends_with_a_front_that_can_be_simulated(
+    script, tmp_path, monkeypatch, capsys
+):
     path = tmp_path / "out" / "runs.jsonl"
     killed = start(tmp_path, *QUICK, "--generations", "3")
     while len(lines(path)) < 11:
@@ -51,13 +53,12 @@ def test_a_search_killed_in_mid_run_goes_on_and_ends_with_a_front_that_can_be_si
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     before = path.read_bytes()
-    process = start(tmp_path, *QUICK, "--generations", "3")
-    out, err = process.communicate(timeout=100)
-    assert (process.returncode, err) == (0, "")
+    monkeypatch.chdir(tmp_path)
+    assert script.main([*QUICK, "--generations", "3"]) == 0
     assert path.read_bytes().startswith(before[: before.rfind(b"\n") + 1])
     # The start is a design of the first generation as well, and run once.
     assert len({line["key"] for line in lines(path)}) == len(lines(path)) == 24
-    assert "25 designs: 25 keep all bounds" in out
+    assert "25 designs: 25 keep all bounds" in capsys.readouterr().out
     found = {each.relative_to(tmp_path / "out").as_posix() for each in (tmp_path / "out").rglob("*") if each.is_file()}
     assert {"study.toml", "optimise.nc", "front.csv", "front/01.toml", "figures/pareto.png"} <= found
     result = fp.load_result(tmp_path / "out" / "optimise.nc")

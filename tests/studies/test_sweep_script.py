@@ -52,22 +52,22 @@ def script(monkeypatch):
     sys.modules.pop("sweep", None)
 
 
-def test_a_sweep_writes_its_results_and_says_what_came_out(tmp_path):
-    code, out, err = finish(
-        start(tmp_path, "fig6", "--over", "controller.gain=0.5:2:2", "--over",
-              "finger.tendons.T3.crossings.medial.radius=-0.005,0.0063", "--metric", "tracking_rms", *SHORT)
-    )  # fmt: skip
-    assert (code, err) == (0, "")
-    assert "4 runs: 2 done, 2 failed" in out
-    assert "force closure" in out
+def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    radius = "finger.tendons.T3.crossings.medial.radius"
+    over = ["--over", "controller.gain=0.5:2:2", "--over", f"{radius}=-0.005,0.0063"]
+    assert script.main([*over, "--metric", "tracking_rms", *SHORT]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert "4 runs: 2 done, 2 failed" in printed.out
+    assert "force closure" in printed.out
     folder = tmp_path / "results" / "sweep-fig6"
     found = {str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file()}
     assert found == {"study.toml", "runs.jsonl", "sweep.nc", "figures/sweep.png"}
-    result = fp.load_result(folder / "sweep.nc")
-    assert dict(result.sizes) == {"controller.gain": 2, "finger.tendons.T3.crossings.medial.radius": 2}
+    assert dict(fp.load_result(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}
 
 
-def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(tmp_path):
+def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(script, tmp_path, monkeypatch, capsys):
     arguments = (
         "--over", "controller.gain=0.5:2:7", "--over", "finger.tendon_friction.coulomb=0.05,0.1", "--workers", "2",
         "--metric", "tracking_rms", "--set", "simulation.duration=0.3", "--output", "out", "--no-figures",
@@ -89,9 +89,9 @@ def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(tmp
 
     with path.open("ab") as file:
         file.write(b'{"key": "torn')
-    code, out, err = finish(start(tmp_path, *arguments))
-    assert (code, err) == (0, "")
-    assert "14 runs: 14 done" in out
+    monkeypatch.chdir(tmp_path)
+    assert script.main(list(arguments)) == 0
+    assert "14 runs: 14 done" in capsys.readouterr().out
     whole = before[: before.rfind(b"\n") + 1]
     assert path.read_bytes().startswith(whole)
     assert len({line["key"] for line in lines(path)}) == len(lines(path)) == 14
@@ -113,14 +113,14 @@ def test_an_interrupt_keeps_what_was_done_and_says_so(tmp_path):
     assert (result["status"] == "missing").any()
 
 
-def test_every_run_failing_has_its_own_exit_code(tmp_path):
-    code, _, err = finish(
-        start(tmp_path, "--design", "list", "--over", "finger.joint_friction.stiction=3e-4,3.4e-4", "--over",
-              "finger.joint_friction.coulomb=3.2e-4,3.5e-4", *SHORT)
-    )  # fmt: skip
-    assert code == 3
-    assert "every run failed" in err
-    assert err.count("\n") == 1
+def test_every_run_failing_has_its_own_exit_code(script, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    static = ["--over", "finger.joint_friction.stiction=3e-4,3.4e-4"]
+    kinetic = ["--over", "finger.joint_friction.coulomb=3.2e-4,3.5e-4"]
+    assert script.main(["--design", "list", *static, *kinetic, *SHORT]) == 3
+    error = capsys.readouterr().err
+    assert "every run failed" in error
+    assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
