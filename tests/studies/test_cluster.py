@@ -12,6 +12,7 @@ from planted import DIES, GAIN, SLOW
 
 import finger_pin as fp
 from finger_pin.exceptions import InputError
+from finger_pin.studies import ClusterError
 
 distributed = pytest.importorskip("distributed")
 
@@ -24,7 +25,7 @@ GAINS = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]
 @pytest.fixture(scope="module")
 def cluster():
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as cluster:
         yield cluster
 
@@ -73,6 +74,30 @@ def test_a_stop_ends_a_sweep_on_a_cluster(cluster):
     np.testing.assert_array_equal(
         *(result[name].values[result["status"] == "done"] for name in ("slow_gain", "controller.gain"))
     )
+
+
+def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
+    def leave(finished, failed, total):
+        if finished == 2:
+            own.close()
+
+    over, folder = {"controller.gain": GAINS}, tmp_path / "out"
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
+    ) as own:
+        executor = fp.DaskCluster(own.scheduler_address)
+        with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
+            fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=executor, progress=leave)
+    assert len((folder / "runs.jsonl").read_text().splitlines()) == 2
+    again = fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=fp.LocalProcesses(2))
+    np.testing.assert_array_equal(again["slow_gain"], GAINS)
+
+
+def test_workers_of_another_version_are_refused(cluster, monkeypatch):
+    monkeypatch.setattr("finger_pin.studies.runs.version", lambda: "0.0.0")
+    executor = fp.DaskCluster(cluster.scheduler_address)
+    with pytest.raises(ClusterError, match=r"a worker has finger_pin \d.*, not 0\.0\.0"):
+        fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
 
 
 def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):
