@@ -63,7 +63,7 @@ def progress_bar(duration: float) -> Iterator[Callable[[float], None]]:
 
 
 @contextmanager
-def runs_bar(total: int) -> Iterator[Callable[[int], None]]:
+def count_bar(total: int) -> Iterator[Callable[[int], None]]:
     """Show a bar on standard error, and give a function that takes the number of further runs that are finished."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -72,6 +72,30 @@ def runs_bar(total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=total)
         yield lambda further: bar.advance(task, further)
+
+
+@contextmanager
+def runs_bar(what: str) -> Iterator[Callable[[int, int, int], None]]:
+    """Show a bar on standard error, and give a function that takes the numbers of finished, failed and all runs."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    text = TextColumn("{task.completed} of {task.total} runs{task.fields[failed]}")
+    spent, left = TimeElapsedColumn(), TimeRemainingColumn()
+    columns = (TextColumn(what), BarColumn(), text, spent, TextColumn("so far, left"), left)
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        waiting = bar.add_task("", total=None, failed="")
+        tasks: list[TaskID] = []
+
+        def show(finished: int, failed: int, total: int) -> None:
+            note = f", {failed} failed" if failed else ""
+            if not tasks:
+                # What was found finished took no time, and tells nothing about the time that is left.
+                bar.remove_task(waiting)
+                tasks.append(bar.add_task("", total=total, completed=finished, failed=note))
+            bar.update(tasks[0], completed=finished, total=total, failed=note)
+
+        yield show
 
 
 def print_text(text: str) -> None:

@@ -84,7 +84,7 @@ def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: in
     waiting = deque(range(1, len(runs)))
     pending: dict[Future[xr.Dataset], int] = {}
     started = False
-    with ProcessPoolExecutor(count, mp_context=_context()) as pool:
+    with ProcessPoolExecutor(count, mp_context=process_context()) as pool:
         try:
             while waiting or pending:
                 while waiting and len(pending) < _IN_FLIGHT * count:
@@ -114,7 +114,7 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
-def _context() -> multiprocessing.context.BaseContext:
+def process_context() -> multiprocessing.context.BaseContext:
     """Return how to start processes: from a clean server where the cache serves them, else as copies of this one."""
     methods = multiprocessing.get_all_start_methods()
     if CACHE_FOLDER is None and "fork" in methods:

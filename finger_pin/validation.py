@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from finger_pin.exceptions import InputError
@@ -218,11 +219,21 @@ def _inner(annotation: Any) -> Any:
     return models[0] if models else annotation
 
 
-def _document(model: type[BaseModel], location: list[str]) -> str:
+def find_field(model: type[BaseModel], location: Sequence[str]) -> FieldInfo | None:
+    """Return the field at a location through nested models and tables, or None if there is none."""
     owner: Any = model
     for part in location[:-1]:
-        owner = _inner(owner.model_fields[part].annotation) if not isinstance(owner, dict) else owner["values"]
-    return str(owner.model_fields[location[-1]].description or "a table")
+        fields = getattr(owner, "model_fields", {})
+        owner = (
+            owner["values"] if isinstance(owner, dict) else _inner(fields[part].annotation if part in fields else None)
+        )
+    field: FieldInfo | None = getattr(owner, "model_fields", {}).get(location[-1])
+    return field
+
+
+def _document(model: type[BaseModel], location: list[str]) -> str:
+    field = find_field(model, location)
+    return str(field.description if field and field.description else "a table")
 
 
 def _checker(low: float, high: float, above: bool, hint: str, whole: bool = False) -> Callable[[Any, str], float]:

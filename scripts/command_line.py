@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
-from typing import NoReturn
+from typing import Any, NoReturn
 
 DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+# A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
+BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
 
 
 class Parser(argparse.ArgumentParser):
@@ -49,6 +53,39 @@ def positive(text: str) -> float:
     if not value > 0.0:
         raise argparse.ArgumentTypeError(f"{text[:80]}: must be above 0")
     return value
+
+
+def override(text: str) -> tuple[str, Any]:
+    """Parse KEY=VALUE."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise argparse.ArgumentTypeError(f"{text}: must be KEY=VALUE, such as controller.gain=2")
+    return shorthand(key.strip())(value)
+
+
+def shorthand(key: str) -> Callable[[str], tuple[str, Any]]:
+    """Return a parser of the VALUE of a key: TOML, or a string without quotes."""
+
+    def parse_value(text: str) -> tuple[str, Any]:
+        text = text.strip()
+        try:
+            table = tomllib.loads(f"value = {text}")
+            if table.keys() == {"value"}:
+                return key, table["value"]
+        except (ValueError, RecursionError):
+            if BARE_STRING.fullmatch(text):
+                return key, text
+        raise argparse.ArgumentTypeError(f"{key} = {text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
+
+    return parse_value
+
+
+def tell_compilation() -> None:
+    """Say that the first run ever takes its time."""
+    from finger_pin.core.compilation import is_cached
+
+    if not is_cached():
+        print("Compiling the model, once for this version: about half a minute ...", file=sys.stderr)
 
 
 def complain(program: str, message: str) -> None:

@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run(name: str, parts: str, output: Path, quiet: bool) -> int:
     """Run the experiments, write, show; return the exit code."""
-    from finger_pin.console import print_text, runs_bar
+    from finger_pin.console import count_bar, print_text
     from finger_pin.exceptions import InputError, IntegrationError
     from finger_pin.experiments import findings_table, write_findings
     from finger_pin.loading import load_scenario
@@ -65,7 +65,7 @@ def run(name: str, parts: str, output: Path, quiet: bool) -> int:
         chosen = experiments(parts)
         for each in chosen:
             each.check(scenario)
-        bar = runs_bar(sum(each.runs for each in chosen)) if sys.stderr.isatty() and not quiet else nullcontext()
+        bar = count_bar(sum(each.runs for each in chosen)) if sys.stderr.isatty() and not quiet else nullcontext()
         with bar as progress:
             for each in chosen:
                 found = each.measure(scenario, progress=progress)

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
-import tomllib
 import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain
+from command_line import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    NOT_WRITTEN,
+    WRONG_INPUT,
+    Parser,
+    complain,
+    override,
+    shorthand,
+    tell_compilation,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,8 +32,6 @@ if TYPE_CHECKING:
     from finger_pin.viewer import LiveView
 
 PROGRAM = "simulate.py"
-# A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
-BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -61,31 +68,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--quiet", action="store_true", help="print errors only")
     add("--list", action="store_true", help="list scenarios, fingers and methods, and exit")
     return parser.read(arguments)
-
-
-def override(text: str) -> tuple[str, Any]:
-    """Parse KEY=VALUE."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise argparse.ArgumentTypeError(f"{text}: must be KEY=VALUE, such as controller.gain=2")
-    return shorthand(key.strip())(value)
-
-
-def shorthand(key: str) -> Callable[[str], tuple[str, Any]]:
-    """Return a parser of the VALUE of a key: TOML, or a string without quotes."""
-
-    def parse_value(text: str) -> tuple[str, Any]:
-        text = text.strip()
-        try:
-            table = tomllib.loads(f"value = {text}")
-            if table.keys() == {"value"}:
-                return key, table["value"]
-        except (ValueError, RecursionError):
-            if BARE_STRING.fullmatch(text):
-                return key, text
-        raise argparse.ArgumentTypeError(f"{key} = {text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
-
-    return parse_value
 
 
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
@@ -141,13 +123,12 @@ def simulate(
 ) -> tuple[int, xr.Dataset | None, str]:
     """Return the exit code, the result as far as it goes, and what went wrong if anything did."""
     from finger_pin.console import progress_bar
-    from finger_pin.core.compilation import is_cached
     from finger_pin.exceptions import IntegrationError, Interrupted, SelfLockingWarning
     from finger_pin.simulation import simulate
 
     shown = sys.stderr.isatty() and not options.quiet
-    if shown and not is_cached():
-        print("Compiling the model, once for this version: about half a minute ...", file=sys.stderr)
+    if shown:
+        tell_compilation()
     bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
     with bar as progress, live_view(scenario, options.live) as live, interrupts.patient(), warnings.catch_warnings():
         observe = live.observe if live else None

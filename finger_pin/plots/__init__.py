@@ -19,8 +19,10 @@ from finger_pin.plots.force_capability import plot_force_polytope, plot_radius_s
 from finger_pin.plots.friction_influence import plot_friction_influence
 from finger_pin.plots.friction_law import plot_friction_law
 from finger_pin.plots.losses import plot_losses
+from finger_pin.plots.pareto import plot_pareto
 from finger_pin.plots.passive_delivery import plot_passive_delivery
 from finger_pin.plots.self_locking import plot_critical_friction, plot_runaway, plot_self_locking_map
+from finger_pin.plots.sweep import plot_sweep
 from finger_pin.plots.transmission import plot_transmission
 from finger_pin.plots.workspace import plot_workspace
 
@@ -34,10 +36,12 @@ __all__ = [
     "plot_friction_influence",
     "plot_friction_law",
     "plot_losses",
+    "plot_pareto",
     "plot_passive_delivery",
     "plot_radius_sensitivity",
     "plot_runaway",
     "plot_self_locking_map",
+    "plot_sweep",
     "plot_transmission",
     "plot_workspace",
     "save_figure",

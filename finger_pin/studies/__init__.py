@@ -1,0 +1,32 @@
+"""Studies: many runs of a scenario, measured and kept; sweeps over its numbers, and searches for better ones."""
+
+from __future__ import annotations
+
+from finger_pin.studies.cluster import ClusterError, DaskCluster
+from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
+from finger_pin.studies.local import LocalProcesses
+from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
+from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
+from finger_pin.studies.sweeping import sweep
+from finger_pin.studies.variables import Variable, radii
+
+__all__ = [
+    "DEFAULT_CONSTRAINTS",
+    "DEFAULT_METRICS",
+    "DEFAULT_OBJECTIVES",
+    "METRICS",
+    "ClusterError",
+    "DaskCluster",
+    "Effort",
+    "Grid",
+    "LatinHypercube",
+    "Listing",
+    "LocalProcesses",
+    "Metric",
+    "Range",
+    "Run",
+    "Variable",
+    "optimise",
+    "radii",
+    "sweep",
+]

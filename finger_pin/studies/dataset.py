@@ -1,0 +1,66 @@
+"""The Dataset of a sweep: metrics over the varied keys, and which runs failed and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.loading import to_toml
+from finger_pin.scenario import Scenario
+from finger_pin.studies.designs import SAMPLE, Design
+from finger_pin.studies.keys import describe
+from finger_pin.studies.metrics import Metric
+from finger_pin.studies.runs import Record
+
+MISSING = "missing"
+_PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
+
+
+def assemble(
+    scenario: Scenario, design: Design, metrics: Iterable[Metric], records: Iterable[Record | None]
+) -> xr.Dataset:
+    """Return the Dataset of a sweep.
+
+    Args:
+        scenario: The one that is varied.
+        design: Which points.
+        metrics: Which metrics; one variable each, NaN where there is none.
+        records: In the order of the design's points; None where a run has not been done.
+
+    Returns:
+        The metrics, ``status`` (done, failed or missing) and ``reason``, over the dimensions of the design.
+    """
+    dims = design.dims
+    coordinates = {
+        key: ((SAMPLE if dims == (SAMPLE,) else key,), np.array(values), describe(key))
+        for key, values in design.values.items()
+    }
+    shape = (len(design.points()),) if dims == (SAMPLE,) else tuple(map(len, design.values.values()))
+    rows = list(records)
+
+    def over(values: list[Any]) -> Any:
+        return np.array(values).reshape(shape)
+
+    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+        metric.name: (
+            dims,
+            over([np.nan if row is None else row.metrics.get(metric.name, np.nan) for row in rows]),
+            {"units": metric.unit, "long_name": metric.long_name},
+        )
+        for metric in metrics
+    }
+    status = over([MISSING if row is None else row.status for row in rows])
+    reason = over(["" if row is None else row.reason for row in rows])
+    variables["status"] = (dims, status, {"long_name": "what came of the run: done, failed or missing"})
+    variables["reason"] = (dims, reason, {"long_name": "why the run failed"})
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes(scenario))
+
+
+def attributes(scenario: Scenario) -> Mapping[str, str]:
+    """Return what a Dataset says about its origin: the scenario and the versions of packages."""
+    versions = {f"version_{name.replace('-', '_')}": metadata.version(name) for name in _PACKAGES}
+    return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **versions}

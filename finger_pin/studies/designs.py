@@ -1,0 +1,234 @@
+"""Designs: which points a sweep runs.
+
+A `Grid` has a dimension per key. A `Listing` and a `LatinHypercube` are lists of points: they have one dimension,
+``sample``, along which every key has its coordinate.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.stats import qmc
+
+from finger_pin.exceptions import InputError
+from finger_pin.studies.keys import split
+
+SAMPLE = "sample"
+#: More points than this are a mistake.
+MOST_POINTS = 1_000_000
+Point = dict[str, float]
+
+
+class Design(Protocol):
+    """Which points a sweep runs."""
+
+    @property
+    def values(self) -> Mapping[str, tuple[float, ...]]:
+        """The values of every key: along its own dimension, or of every sample."""
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The dimensions: the keys, or ``sample``."""
+
+    def points(self) -> list[Point]:
+        """Return the points, the last dimension varying fastest."""
+
+    def describe(self) -> dict[str, Any]:
+        """Return what was asked, for a TOML file."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Every combination of the values of some keys.
+
+    Attributes:
+        values: By key.
+    """
+
+    values: Mapping[str, tuple[float, ...]]
+
+    def __init__(self, values: Mapping[str, Sequence[float]]) -> None:
+        """Check and keep the values.
+
+        Raises:
+            InputError: If there are none, one is not finite or comes twice, or there are too many points.
+        """
+        object.__setattr__(self, "values", _checked(values))
+        for key, axis in self.values.items():
+            if len(set(axis)) < len(axis):
+                twice = next(value for value in axis if axis.count(value) > 1)
+                raise InputError(key, "must not come twice", twice)
+        _check_count(math.prod(map(len, self.values.values())))
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The keys."""
+        return tuple(self.values)
+
+    def points(self) -> list[Point]:
+        """Return the points, the last key varying fastest."""
+        return [dict(zip(self.values, point, strict=True)) for point in itertools.product(*self.values.values())]
+
+    def describe(self) -> dict[str, Any]:
+        """Return what was asked, for a TOML file."""
+        return {"kind": "grid", "values": {key: list(axis) for key, axis in self.values.items()}}
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A list of points: the first values of all keys together, then the second ones.
+
+    Attributes:
+        values: By key, equally many for each.
+    """
+
+    values: Mapping[str, tuple[float, ...]]
+
+    def __init__(self, values: Mapping[str, Sequence[float]]) -> None:
+        """Check and keep the values.
+
+        Raises:
+            InputError: If there are none, one is not finite, the keys have different numbers of them, or too many.
+        """
+        object.__setattr__(self, "values", _checked(values))
+        first, *others = self.values
+        for key in others:
+            if len(self.values[key]) != len(self.values[first]):
+                raise InputError(key, f"must have as many values as {first}, {len(self.values[first])}, in a list")
+        _check_count(len(self.values[first]))
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The one dimension."""
+        return (SAMPLE,)
+
+    def points(self) -> list[Point]:
+        """Return the points."""
+        return [dict(zip(self.values, point, strict=True)) for point in zip(*self.values.values(), strict=True)]
+
+    def describe(self) -> dict[str, Any]:
+        """Return what was asked, for a TOML file."""
+        return {"kind": "list", "values": {key: list(axis) for key, axis in self.values.items()}}
+
+
+@dataclass(frozen=True)
+class Range:
+    """An interval of values.
+
+    Attributes:
+        low: Its lower end.
+        high: Its upper end.
+        logarithmic: Whether values are spread evenly in their logarithms.
+    """
+
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    def check(self, key: str) -> None:
+        """Raise unless the ends are finite, in order and, for logarithms, positive.
+
+        Raises:
+            InputError: Naming the key.
+        """
+        ends = [self.low, self.high]
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise InputError(key, "must be two finite numbers, the lower one first", ends)
+        if self.logarithmic and self.low <= 0.0:
+            raise InputError(key, "must be above 0 for logarithmic steps", ends)
+
+    def at(self, share: Any) -> Any:
+        """Return the values at shares of the way from low to high, of any shape."""
+        if self.logarithmic:
+            return np.clip(self.low * (self.high / self.low) ** np.asarray(share), self.low, self.high)
+        return self.low + (self.high - self.low) * np.asarray(share)
+
+    def share(self, value: float) -> float:
+        """Return the share of the way from low to high at which a value lies."""
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class LatinHypercube:
+    """Points spread over ranges so that each of ``samples`` equal slices of every range holds exactly one.
+
+    Drawn by `scipy.stats.qmc.LatinHypercube` (McKay, Beckman and Conover, Technometrics 21, 1979).
+
+    Attributes:
+        ranges: By key.
+        samples: Number of points.
+        seed: Of the random numbers; the same seed gives the same points.
+    """
+
+    ranges: Mapping[str, Range]
+    samples: int
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check.
+
+        Raises:
+            InputError: If there are no ranges or samples, or a range is not one.
+        """
+        if not self.ranges:
+            raise InputError("over", "at least one key is needed")
+        for key, each in self.ranges.items():
+            split(key)
+            each.check(key)
+        if self.samples < 1:
+            raise InputError("samples", "must be at least 1", self.samples)
+        if self.seed < 0:
+            raise InputError("seed", "must be at least 0", self.seed)
+        _check_count(self.samples)
+
+    @property
+    def values(self) -> Mapping[str, tuple[float, ...]]:
+        """The values of every key at every sample."""
+        shares = qmc.LatinHypercube(len(self.ranges), rng=np.random.default_rng(self.seed)).random(self.samples)
+        return {
+            key: tuple(each.at(column).tolist())
+            for (key, each), column in zip(self.ranges.items(), shares.T, strict=True)
+        }
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The one dimension."""
+        return (SAMPLE,)
+
+    def points(self) -> list[Point]:
+        """Return the points."""
+        return Listing(self.values).points()
+
+    def describe(self) -> dict[str, Any]:
+        """Return what was asked, for a TOML file."""
+        ranges = {
+            key: {"low": each.low, "high": each.high, "logarithmic": each.logarithmic}
+            for key, each in self.ranges.items()
+        }
+        return {"kind": "latin", "samples": self.samples, "seed": self.seed, "ranges": ranges}
+
+
+def _checked(values: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
+    if not values:
+        raise InputError("over", "at least one key is needed")
+    checked = {key: tuple(float(value) for value in axis) for key, axis in values.items()}
+    for key, axis in checked.items():
+        split(key)
+        if not axis:
+            raise InputError(key, "needs at least one value")
+        for value in axis:
+            if not math.isfinite(value):
+                raise InputError(key, "must be a finite number", value)
+    return checked
+
+
+def _check_count(count: int) -> None:
+    if count > MOST_POINTS:
+        raise InputError("over", f"makes {count} points; at most {MOST_POINTS} are run")

@@ -1,0 +1,127 @@
+"""The folder of a study: what was asked, a record of every finished run, and what was made of them."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import tomli_w
+
+from finger_pin.exceptions import InputError
+from finger_pin.files import replacing
+from finger_pin.studies.store import Store
+
+STUDY, RUNS = "study.toml", "runs.jsonl"
+_MARK = "# What the study in this folder asks for. The same again goes on where it stopped; runs.jsonl has every run.\n"
+
+
+class StudyFolder:
+    """A folder that holds one study, and that one process at a time works in.
+
+        with StudyFolder("results/sweep-fig6", asked, products=["sweep.nc"]) as folder:
+            folder.store.append(record)
+
+    Attributes:
+        path: The folder.
+        store: The records of its runs, while entered.
+    """
+
+    store: Store
+
+    def __init__(
+        self, path: str | Path, asked: Mapping[str, Any], products: list[str], *, restart: bool = False
+    ) -> None:
+        """Say which study.
+
+        Args:
+            path: The folder; it may exist.
+            asked: What determines the study, for a TOML file.
+            products: Patterns of the files that are made of the runs, such as ``figures/sweep.png``.
+            restart: Whether to begin anew what is there already.
+        """
+        self.path = Path(path)
+        self._text = _MARK + tomli_w.dumps(asked)
+        self._artifacts = [*products, RUNS, STUDY]
+        self._restart = restart
+        self._lock: int | None = None
+
+    def __enter__(self) -> Self:
+        """Make and lock the folder, and read the runs that are there.
+
+        Raises:
+            InputError: If it cannot be written, holds another study or files of these names that no study wrote, or
+                another process works in it; nothing has changed then.
+        """
+        made = [each for each in (self.path, *self.path.parents) if not each.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = os.open(self.path, os.O_RDONLY)
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._prepare()
+            self.store = Store(self.path / RUNS)
+        except BaseException as error:
+            self._leave(made)
+            if isinstance(error, BlockingIOError):
+                raise InputError("output", "another process is at work there", str(self.path)) from None
+            if isinstance(error, OSError):
+                reason = f"cannot be written: {error.strerror or error}"
+                raise InputError("output", reason, str(self.path)) from None
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close and unlock."""
+        self.store.__exit__(kind, error, trace)
+        self._leave([])
+
+    def _prepare(self) -> None:
+        study = self.path / STUDY
+        present = [each for pattern in self._artifacts for each in self.path.glob(pattern)]
+        if present:
+            text = study.read_text("utf-8", "replace") if study.is_file() else ""
+            if not text.startswith(_MARK):
+                what = f"holds a {present[0].name} that is not of a study; name another folder"
+                raise InputError("output", what, str(self.path))
+            if text != self._text and not self._restart:
+                what = f"holds another study ({_difference(text, self._text)}); name another folder, or use --restart"
+                raise InputError("output", what, str(self.path))
+        if self._restart:
+            # What says whose the files are goes last.
+            for each in present:
+                each.unlink()
+        if self._restart or not present:
+            with replacing(study) as temporary:
+                Path(temporary).write_text(self._text, encoding="utf-8", newline="\n")
+
+    def _leave(self, made: list[Path]) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+        for folder in made:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+
+
+def _difference(before: str, after: str) -> str:
+    """Return the first entries in which two studies differ, in words."""
+    try:
+        earlier, wanted = _flat(tomllib.loads(before)), _flat(tomllib.loads(after))
+    except ValueError:
+        return "its study.toml cannot be read"
+    keys = [key for key in {**wanted, **earlier} if earlier.get(key) != wanted.get(key)]
+    return f"{', '.join(keys[:3])} {'differs' if len(keys) == 1 else 'differ'}" if keys else "differently written"
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return flat

@@ -1,0 +1,165 @@
+"""Keys of a scenario that hold a number: where they lie, what they mean, and scenarios with other numbers there.
+
+A key is dotted as in `load_scenario`, such as ``finger.joints.distal.link.length``. One number of a list has its index
+in brackets: ``environment.fingertip_force[2]``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from finger_pin.exceptions import InputError
+from finger_pin.loading import load_scenario
+from finger_pin.scenario import Scenario
+from finger_pin.validation import find_field, nearest
+
+_INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6})\]")
+
+
+@dataclass(frozen=True)
+class Starting:
+    """The scenario that a study varies.
+
+    Attributes:
+        name: Name or path, as `load_scenario` takes it.
+        overrides: Entries that hold at all points.
+        scenario: What the two make.
+    """
+
+    name: str
+    overrides: Mapping[str, Any]
+    scenario: Scenario
+
+    @classmethod
+    def load(cls, name: str | Path, overrides: Mapping[str, Any] | None = None) -> Starting:
+        """Load a scenario.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+        """
+        return cls(str(name), dict(overrides or {}), load_scenario(name, overrides))
+
+    def at(self, point: Mapping[str, float]) -> Scenario:
+        """Return the scenario with other numbers at some keys.
+
+        What a file leaves to its default, such as a mass centre at half a link's length, follows the numbers.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+        """
+        changed = dict(self.overrides)
+        for key, value in point.items():
+            name, index = split(key)
+            number = int(value) if value == int(value) and type(self._found(key)) is int else float(value)
+            if index is None:
+                changed[name] = number
+            else:
+                changed[name] = [*self._list(key, name, index, changed)]
+                changed[name][index] = number
+        return load_scenario(self.name, changed)
+
+    def check(self, key: str, values: Iterable[float]) -> None:
+        """Raise unless a key can hold a number; some value of it may still be wrong, or go ill with other keys.
+
+        Raises:
+            InputError: If there is no such key, it does not hold a number, or no value is allowed.
+        """
+        # Of the finger nothing may come into being by a misspelt name, as an entry that is overridden otherwise may.
+        if key.startswith("finger.") and split(key)[1] is None and not _is_number(self._found(key)):
+            raise self._no_number(key)
+        problem: InputError | None = None
+        for value in values:
+            try:
+                scenario = self.at({key: value})
+            except InputError as error:
+                problem = problem or error
+                continue
+            if not _is_number(_look_up(scenario, key)):
+                raise self._no_number(key)
+            return
+        if problem is not None:
+            raise problem
+
+    def number(self, key: str) -> float:
+        """Return the number that the scenario itself has at a key.
+
+        Raises:
+            InputError: If it has none.
+        """
+        held = self._found(key)
+        if not _is_number(held):
+            raise self._no_number(key)
+        return float(held)
+
+    def _no_number(self, key: str) -> InputError:
+        near = nearest(key, _numbers(self.scenario.model_dump(mode="python"), ""))
+        return InputError(key, f"the scenario has no such number{f'; did you mean {near}?' if near else ''}")
+
+    def _found(self, key: str) -> Any:
+        return _look_up(self.scenario, key)
+
+    def _list(self, key: str, name: str, index: int, changed: Mapping[str, Any]) -> list[float]:
+        held = changed.get(name, self._found(name))
+        if isinstance(held, int | float):
+            raise InputError(key, f"{name} is one number for all; give it a list first, or leave out the index")
+        if not isinstance(held, list | tuple):
+            raise InputError(key, "there is no such list of numbers")
+        if index >= len(held):
+            raise InputError(key, f"{name} has {len(held)} numbers, [0] to [{len(held) - 1}]")
+        return list(held)
+
+
+def split(key: str) -> tuple[str, int | None]:
+    """Return the name of a key, and its index or None.
+
+    Raises:
+        InputError: If it has brackets elsewhere than at its end.
+    """
+    found = _INDEXED.fullmatch(key)
+    if found:
+        return found["name"], int(found["index"])
+    if "[" in key or "]" in key:
+        raise InputError(key, "an index is a whole number in brackets at the end, such as controller.gain[2]")
+    return key, None
+
+
+def describe(key: str) -> dict[str, str]:
+    """Return ``units`` and ``long_name`` of what a key holds, from its description."""
+    name, index = split(key)
+    field = find_field(Scenario, name.split("."))
+    extra = field.json_schema_extra if field is not None else None
+    unit = extra.get("unit", "1") if isinstance(extra, dict) else "1"
+    text = (field.description or "").rstrip(".") if field is not None else ""
+    where = "" if index is None else f"[{index}]"
+    return {"units": str(unit), "long_name": f"{text}{where}" if text else key}
+
+
+def _is_number(held: Any) -> bool:
+    return isinstance(held, int | float) and not isinstance(held, bool)
+
+
+def _numbers(held: Any, key: str) -> Iterator[str]:
+    """Give the keys below one that hold numbers."""
+    if _is_number(held):
+        yield key
+    elif isinstance(held, Mapping):
+        for name, below in held.items():
+            yield from _numbers(below, f"{key}.{name}" if key else name)
+    elif isinstance(held, list | tuple):
+        for index, below in enumerate(held):
+            yield from _numbers(below, f"{key}[{index}]")
+
+
+def _look_up(scenario: Scenario, key: str) -> Any:
+    """Return what lies at a key, or None."""
+    name, index = split(key)
+    held: Any = scenario.model_dump(mode="python")
+    for part in name.split("."):
+        held = held.get(part) if isinstance(held, dict) else None
+    if index is None:
+        return held
+    return held[index] if isinstance(held, list | tuple) and index < len(held) else None

@@ -1,0 +1,194 @@
+"""Metrics: a number each that says how good a design is.
+
+Metrics of the motion are taken over the whole run, its start from rest included, and are means over time, not over
+samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.analysis import force_polytope, self_locking_margin
+from finger_pin.exceptions import InputError
+from finger_pin.finger import Finger
+from finger_pin.routing import Array
+from finger_pin.scenario import Scenario
+from finger_pin.simulation import simulate
+from finger_pin.validation import nearest
+
+#: Greatest tension for the metric of the fingertip force, N.
+FORCE_TENSION = 20.0
+
+
+class Run:
+    """A scenario and its simulation, which is done when a metric first asks for it.
+
+    Attributes:
+        scenario: The scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Keep a scenario."""
+        self.scenario = scenario
+
+    @cached_property
+    def result(self) -> xr.Dataset:
+        """What `simulate` returns."""
+        return simulate(self.scenario)
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number that says how good a run is.
+
+    Attributes:
+        name: How it is asked for.
+        unit: SI unit.
+        long_name: What it is.
+        measure: Takes a run and returns the number. Other processes import it: a function of a module.
+    """
+
+    name: str
+    unit: str
+    long_name: str
+    measure: Callable[[Run], float]
+
+
+def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
+    """Return metrics by name; those given as such are kept.
+
+    Raises:
+        InputError: If there are none, one is unknown, or one comes twice.
+    """
+    chosen: dict[str, Metric] = {}
+    for each in names:
+        if isinstance(each, str) and each not in METRICS:
+            near = nearest(each, METRICS)
+            hint = f"; did you mean {near}?" if near else ""
+            raise InputError("metric", f"there is no such metric; there are {', '.join(METRICS)}{hint}", each)
+        metric = METRICS[each] if isinstance(each, str) else each
+        if metric.name in chosen:
+            raise InputError("metric", "must not come twice", metric.name)
+        chosen[metric.name] = metric
+    if not chosen:
+        raise InputError("metric", f"at least one is needed; there are {', '.join(METRICS)}")
+    return tuple(chosen.values())
+
+
+def tracking_rms(run: Run) -> float:
+    """Return the root of the mean over time and joints of (theta^d - theta)^2, rad."""
+    return float(np.sqrt(_time_mean(run.result, np.mean(_rows(run.result, "tracking_error", "joint") ** 2, axis=1))))
+
+
+def tracking_peak(run: Run) -> float:
+    """Return the largest |theta^d - theta| of any joint, rad."""
+    return float(np.max(np.abs(_rows(run.result, "tracking_error", "joint"))))
+
+
+def tension_peak(run: Run) -> float:
+    """Return the largest tension at either end of any tendon, N: f^a, f, f5_3 or f5_4."""
+    return float(max(np.max(ends) for ends in _ends(run.result)))
+
+
+def tension_mean(run: Run) -> float:
+    """Return the mean over time and tendons of the delivered tension f, N; of passive tendons f5_4."""
+    return _time_mean(run.result, np.mean(_rows(run.result, "tendon_tension", "tendon"), axis=1))
+
+
+def losses(run: Run) -> float:
+    """Return what friction and limiters took, J."""
+    return losses_tendons(run) + losses_joints(run) + _final(run.result, "limiter")
+
+
+def losses_tendons(run: Run) -> float:
+    """Return what the friction of the tendons took, J."""
+    return sum(_final(run.result, f"tendon_{kind}") for kind in ("coulomb", "viscous", "micro_damping"))
+
+
+def losses_joints(run: Run) -> float:
+    """Return what the friction of the joints took, J."""
+    return sum(_final(run.result, f"joint_{kind}") for kind in ("coulomb", "viscous", "micro_damping"))
+
+
+def slack_time(run: Run) -> float:
+    """Return how long at least one tendon, or one half of a passive one, delivers no tension, s."""
+    delivered = [np.min(_rows(run.result, "tendon_tension", "tendon"), axis=1)]
+    if "passive_tension_proximal" in run.result:
+        delivered.append(_proximal(run.result).min(axis=1))
+    slack = (np.min(delivered, axis=0) <= 0.0).astype(float)
+    return float(np.trapezoid(slack, run.result["time"].values))
+
+
+def locking_margin(run: Run) -> float:
+    """Return the factor by which the joints' stiction could be raised until the finger locks on its reference."""
+    return self_locking_margin(run.scenario).margin
+
+
+def fingertip_force(run: Run) -> float:
+    """Return the force that the fingertip can exert whichever way its joints move it, N.
+
+    It is the radius of the largest ball around zero in the polytope of forces, without friction, at the mean posture
+    of the reference, with tensions up to `FORCE_TENSION`.
+    """
+    finger = Finger(run.scenario.finger)
+    times = run.scenario.simulation.duration * (np.arange(500) + 0.5) / 500
+    posture = np.mean(run.scenario.build_reference(finger.routing).at(times).position, axis=0)
+    offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
+    return float(np.min(offsets)) if offsets.size else 0.0
+
+
+def _rows(result: xr.Dataset, name: str, dimension: str) -> Array:
+    return np.asarray(result[name].transpose("time", dimension).values)
+
+
+def _proximal(result: xr.Dataset) -> Array:
+    values = np.asarray(result["passive_tension_proximal"].transpose("time", ...).values)
+    return values.reshape(len(values), -1)
+
+
+def _ends(result: xr.Dataset) -> list[Array]:
+    """Return the tensions at both ends of all tendons; what is planned for passive ones is none."""
+    delivered, command = (_rows(result, name, "tendon") for name in ("tendon_tension", "tendon_command"))
+    if "passive_tension_proximal" not in result:
+        return [delivered, command]
+    proximal = _proximal(result)
+    return [delivered, proximal, command[:, : command.shape[1] - proximal.shape[1]]]
+
+
+def _time_mean(result: xr.Dataset, values: Array) -> float:
+    time = result["time"].values
+    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
+
+
+def _final(result: xr.Dataset, name: str) -> float:
+    return float(result[f"energy_exchanged_{name}"][-1])
+
+
+#: All metrics by name.
+METRICS = {
+    metric.name: metric
+    for metric in (
+        Metric("tracking_rms", "rad", "tracking error, rms over time and joints", tracking_rms),
+        Metric("tracking_peak", "rad", "largest tracking error of any joint", tracking_peak),
+        Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak),
+        Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean),
+        Metric("losses", "J", "energy lost to friction and limiters", losses),
+        Metric("losses_tendons", "J", "energy lost to the friction of the tendons", losses_tendons),
+        Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
+        Metric("slack_time", "s", "time with a slack tendon", slack_time),
+        Metric("self_locking_margin", "1", "critical over actual joint friction", locking_margin),
+        Metric(
+            "fingertip_force",
+            "N",
+            f"fingertip force that is possible in every direction with tensions up to {FORCE_TENSION:g} N",
+            fingertip_force,
+        ),
+    )
+}
+#: Those that a sweep measures when none is named.
+DEFAULT_METRICS = ("tracking_rms", "tracking_peak", "tension_peak", "tension_mean", "losses", "slack_time")

@@ -1,0 +1,215 @@
+"""Searches for better designs: objectives and constraints on the metrics of runs, over some numbers of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.exceptions import InputError
+from finger_pin.routing import Array
+from finger_pin.studies.dataset import assemble
+from finger_pin.studies.designs import Listing, Point
+from finger_pin.studies.evaluation import Progress, describe_study, evaluate, write
+from finger_pin.studies.folder import StudyFolder
+from finger_pin.studies.front import PRODUCTS, write_front
+from finger_pin.studies.goals import Constraint, Goals
+from finger_pin.studies.keys import Starting
+from finger_pin.studies.local import LocalProcesses
+from finger_pin.studies.metrics import Metric
+from finger_pin.studies.runs import DONE, Executor, Record, Stop, Workers
+from finger_pin.studies.search import HOPELESS, Search, nondominated
+from finger_pin.studies.store import Store
+from finger_pin.studies.variables import Variable, check_variables, parse_variable, point_at, radii, start_of
+
+DEFAULT_OBJECTIVES = ("tracking_rms", "tension_peak")
+DEFAULT_CONSTRAINTS = ("self_locking_margin>=1.5", "fingertip_force>=0.8")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long and from which random numbers to search.
+
+    Attributes:
+        population: Designs of a generation.
+        generations: Number of generations.
+        seed: The same seed searches the same way.
+    """
+
+    population: int = 24
+    generations: int = 20
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check.
+
+        Raises:
+            InputError: If a number is too small.
+        """
+        for name, least in (("population", 4), ("generations", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(name, f"must be at least {least}", getattr(self, name))
+
+
+def optimise(
+    scenario: str | Path,
+    over: Iterable[Variable | str] | None = None,
+    *,
+    minimise: Iterable[str | Metric] = DEFAULT_OBJECTIVES,
+    maximise: Iterable[str | Metric] = (),
+    constraints: Iterable[str | Constraint] = DEFAULT_CONSTRAINTS,
+    effort: Effort | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    output: str | Path | None = None,
+    executor: Executor | None = None,
+    restart: bool = False,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+) -> xr.Dataset:
+    """Search for designs that no other one is better than.
+
+        fp.optimise("fig6", ["controller.gain=0.5:4"], minimise=["tracking_rms", "tension_peak"], constraints=[])
+
+    A design without force closure, or whose run fails, does not count; it is recorded with its reason. With an
+    ``output`` every finished run is on disk at once, and the same search asked for again goes on where it ended.
+
+    Args:
+        scenario: Name or path, as `load_scenario` takes it.
+        over: Variables, or how `parse_variable` reads them; by default the winding `radii` of the finger.
+        minimise: Metrics to be made small.
+        maximise: Metrics to be made large.
+        constraints: Bounds on metrics, such as ``self_locking_margin>=1.5``.
+        effort: How long to search.
+        overrides: Entries of the scenario that hold for all designs.
+        output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv`` and ``front``, which has every
+            design of the front as a scenario; by default nothing is kept.
+        executor: Where runs are done: `LocalProcesses` by default, or a `DaskCluster`.
+        restart: Whether to drop what the folder holds of a study, instead of going on with it.
+        progress: Called with the numbers of finished, failed and all runs.
+        stop: Asked now and then; when it returns true the search ends there.
+
+    Returns:
+        Along ``sample``, which begins with the scenario's own design and follows the search: every key, metric,
+        ``status``, ``reason``, ``feasible`` and ``front``.
+
+    Raises:
+        InputError: Naming the argument, key or value that is wrong; nothing is written then.
+        OSError: If a record cannot be written.
+    """
+    effort = effort or Effort()
+    goals = Goals.of(minimise, maximise, constraints)
+    starting = Starting.load(scenario, overrides)
+    given = radii(starting.scenario.finger) if over is None else over
+    variables = [parse_variable(each) if isinstance(each, str) else each for each in given]
+    check_variables(variables, starting)
+    own = start_of(variables, starting)
+    search = Search(
+        len(variables), len(goals.objectives), len(goals.constraints), effort.population, effort.seed,
+        _shares(variables, own),
+    )  # fmt: skip
+    with ExitStack() as stack:
+        workers = stack.enter_context((executor or LocalProcesses()).start())
+        if output is None:
+            store = stack.enter_context(Store())
+        else:
+            described = [variable.describe() for variable in variables]
+            asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
+            folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
+            store = stack.enter_context(folder).store
+        course = _Course(starting, goals, variables, store, workers, effort, progress, stop)
+        result = _assembled(starting, goals, *course.follow(dict(own), search))
+        if output is not None:
+            write(result, Path(output) / "optimise.nc")
+            write_front(result, starting, Path(output))
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """What a search goes through."""
+
+    starting: Starting
+    goals: Goals
+    variables: Sequence[Variable]
+    store: Store
+    workers: Workers
+    effort: Effort
+    progress: Progress | None
+    stop: Stop | None
+
+    def follow(self, own: Point, search: Search) -> tuple[list[Point], list[Record | None]]:
+        """Return all points with their records, the scenario's own first."""
+        points, records = [own], self._evaluate([own], [])
+        for _ in range(self.effort.generations):
+            if records[-1] is None or (self.stop is not None and self.stop()):
+                break
+            asked = [point_at(self.variables, shares) for shares in search.ask()]
+            found = self._evaluate(asked, records)
+            points, records = points + asked, records + found
+            done = [record for record in found if record is not None]
+            if len(done) < len(found):
+                break
+            judged = [self._judge(record) for record in done]
+            search.tell(np.array([value for value, _ in judged]), np.array([excess for _, excess in judged]))
+        return points, records
+
+    def _evaluate(self, points: list[Point], earlier: list[Record | None]) -> list[Record | None]:
+        total = 1 + self.effort.population * self.effort.generations
+        failed = sum(record is not None and record.status != DONE for record in earlier)
+
+        def report(finished: int, failures: int, _: int) -> None:
+            if self.progress is not None:
+                self.progress(len(earlier) + finished, failed + failures, total)
+
+        return evaluate(
+            self.starting, points, self.goals.metrics, self.store, self.workers, progress=report, stop=self.stop
+        )
+
+    def _judge(self, record: Record) -> tuple[Array, Array]:
+        """Return objectives and excesses; those of a design that cannot be run are beyond hope."""
+        if record.status == DONE:
+            values, excesses = self.goals.values(record.metrics), self.goals.excesses(record.metrics)
+            if np.isfinite(values).all() and not np.isnan(excesses).any():
+                return values, np.clip(excesses, -HOPELESS, HOPELESS)
+        return np.full(len(self.goals.objectives), HOPELESS), np.full(len(self.goals.constraints), HOPELESS)
+
+
+def _shares(variables: Sequence[Variable], own: Mapping[str, float]) -> Array | None:
+    """Return where in the unit cube the scenario's own design lies, or None if it does not."""
+    shares = []
+    for variable in variables:
+        first = own[variable.keys[0]]
+        for key, sign in zip(variable.keys, variable.signs, strict=True):
+            if own[key] != sign * first:
+                return None
+        if not variable.range.low <= first <= variable.range.high:
+            return None
+        shares.append(variable.range.share(first))
+    return np.array(shares)
+
+
+def _assembled(starting: Starting, goals: Goals, points: list[Point], records: list[Record | None]) -> xr.Dataset:
+    listing = Listing({key: [point[key] for point in points] for key in points[0]})
+    result = assemble(starting.scenario, listing, goals.metrics, records)
+    measured = [(row, r.metrics) for row, r in enumerate(records) if r is not None and r.status == DONE]
+    feasible, front = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=int)
+    if measured:
+        rows = np.array([row for row, _ in measured])
+        values = np.array([goals.values(metrics) for _, metrics in measured])
+        good = np.array([bool((goals.excesses(metrics) <= 0.0).all()) for _, metrics in measured])
+        good &= np.isfinite(values).all(axis=1)
+        rows, values = rows[good], values[good]
+        feasible[rows] = True
+        best = nondominated(values)
+        rows, values = rows[best], values[best]
+        # A design that comes again is on the front once; numbers follow the first objective.
+        _, once = np.unique(values, axis=0, return_index=True)
+        front[rows[once]] = 1 + np.arange(len(once))
+    result["feasible"] = ("sample", feasible, {"long_name": "whether the design keeps all constraints"})
+    result["front"] = ("sample", front, {"long_name": "number of the design on the front, from 1; 0 for the others"})
+    return result.assign_attrs({name: ", ".join(listed) for name, listed in goals.describe().items()})

@@ -1,0 +1,84 @@
+"""Sweeps: metrics of a scenario over some of its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from finger_pin.studies.dataset import assemble
+from finger_pin.studies.designs import Design, Grid
+from finger_pin.studies.evaluation import Progress, describe_study, evaluate, write
+from finger_pin.studies.folder import StudyFolder
+from finger_pin.studies.keys import Starting
+from finger_pin.studies.local import LocalProcesses
+from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, choose
+from finger_pin.studies.runs import Executor, Stop
+from finger_pin.studies.store import Store
+
+PRODUCTS = ["sweep.nc", "figures/sweep.png"]
+
+
+def sweep(
+    scenario: str | Path,
+    over: Design | Mapping[str, Sequence[float]],
+    *,
+    metrics: Iterable[str | Metric] = DEFAULT_METRICS,
+    overrides: Mapping[str, Any] | None = None,
+    output: str | Path | None = None,
+    executor: Executor | None = None,
+    restart: bool = False,
+    retry_failed: bool = False,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+) -> xr.Dataset:
+    """Run a scenario at many points and measure every run.
+
+        fp.sweep("fig6", {"controller.gain": [0.5, 1.0, 2.0]}, metrics=["tracking_rms"])
+
+    With an ``output`` every finished run is on disk at once: whoever is killed and asks for the same again goes on
+    where it ended. A run that fails, or a point at which there is no valid scenario, is NaN, with its reason.
+
+    Args:
+        scenario: Name or path, as `load_scenario` takes it.
+        over: A design, or the values of every key, which make a grid. Keys are those of `load_scenario`; an index as in
+            ``environment.fingertip_force[2]`` means one number of a list.
+        metrics: Names of `METRICS`, or metrics of one's own.
+        overrides: Entries of the scenario that hold at all points.
+        output: Folder for ``study.toml``, ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
+        executor: Where runs are done: `LocalProcesses` by default, or a `DaskCluster`.
+        restart: Whether to drop what the folder holds of a study, instead of going on with it.
+        retry_failed: Whether to repeat runs that failed before.
+        progress: Called with the numbers of finished, failed and all runs, first with those found.
+        stop: Asked now and then; when it returns true the sweep ends there, with ``status`` missing where it has not
+            been.
+
+    Returns:
+        A variable per metric, ``status`` and ``reason``; a dimension per key of a grid, else the dimension ``sample``.
+
+    Raises:
+        InputError: Naming the argument, key or value that is wrong; nothing is written then.
+        OSError: If a record cannot be written.
+    """
+    design = Grid(over) if isinstance(over, Mapping) else over
+    chosen = choose(metrics)
+    starting = Starting.load(scenario, overrides)
+    for key, values in design.values.items():
+        starting.check(key, values)
+    with ExitStack() as stack:
+        workers = stack.enter_context((executor or LocalProcesses()).start())
+        if output is None:
+            store = stack.enter_context(Store())
+        else:
+            asked = describe_study(starting, chosen, {"sweep": design.describe()})
+            store = stack.enter_context(StudyFolder(output, asked, PRODUCTS, restart=restart)).store
+        records = evaluate(
+            starting, design.points(), chosen, store, workers, progress=progress, stop=stop, retry_failed=retry_failed
+        )
+        result = assemble(starting.scenario, design, chosen, records)
+        if output is not None:
+            write(result, Path(output) / "sweep.nc")
+    return result

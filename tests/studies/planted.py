@@ -1,0 +1,65 @@
+"""Metrics that misbehave, in a module that worker processes can import."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from finger_pin.exceptions import IntegrationError
+from finger_pin.studies import Metric
+
+
+def gain(run):
+    """The gain itself, which needs no simulation."""
+    return float(run.scenario.controller.gain)
+
+
+def cheap(run):
+    return gain(run)
+
+
+def dear(run):
+    return 1.0 / gain(run)
+
+
+def slow_gain(run):
+    time.sleep(0.15)
+    return gain(run)
+
+
+def dies_at_two(run):
+    if gain(run) == 2.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return gain(run)
+
+
+def dies_once_at_two(run):
+    """Die unless an earlier attempt has left a mark in the folder that the scenario's title names."""
+    mark = Path(run.scenario.title, "mark")
+    if gain(run) == 2.0 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return gain(run)
+
+
+def raises_at_two(run):
+    if gain(run) == 2.0:
+        raise ArithmeticError("planted\nin two lines")
+    return gain(run)
+
+
+def stops_at_two(run):
+    if gain(run) == 2.0:
+        raise IntegrationError(0.01, "the step is too small", "a smaller simulation.rtol", run.result)
+    return gain(run)
+
+
+def threads(run):
+    """How many threads BLAS libraries are told to use."""
+    return float(os.environ["OPENBLAS_NUM_THREADS"])
+
+
+GAIN, CHEAP, DEAR, SLOW, DIES, DIES_ONCE, RAISES, STOPS, THREADS = (
+    Metric(function.__name__, "N m/rad", "planted", function)
+    for function in (gain, cheap, dear, slow_gain, dies_at_two, dies_once_at_two, raises_at_two, stops_at_two, threads)
+)

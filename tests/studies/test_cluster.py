@@ -1,0 +1,118 @@
+"""Sweeps on a real local Dask cluster, one of whose workers is killed in mid-run."""
+
+import importlib
+import json
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planted import DIES, GAIN, SLOW
+
+import finger_pin as fp
+from finger_pin.exceptions import InputError
+from finger_pin.studies import ClusterError
+
+distributed = pytest.importorskip("distributed")
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+SHORT = {"simulation.duration": 0.02}
+METRICS = [SLOW, "tracking_rms", "tension_peak"]
+GAINS = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+    ) as cluster:
+        yield cluster
+
+
+def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_local_processes(cluster, tmp_path):
+    victim = cluster.workers[0].pid
+    seen = []
+
+    def kill(finished, failed, total):
+        if finished == 2 and not seen:
+            os.kill(victim, signal.SIGKILL)
+            seen.append(victim)
+
+    over = {"controller.gain": GAINS}
+    away = fp.sweep(
+        "fig6", over, metrics=METRICS, overrides=SHORT, output=tmp_path,
+        executor=fp.DaskCluster(cluster.scheduler_address), progress=kill,
+    )  # fmt: skip
+    assert seen == [victim]
+    keys = [json.loads(line)["key"] for line in (tmp_path / "runs.jsonl").read_text().splitlines()]
+    assert len(keys) == len(set(keys)) == len(GAINS)
+    assert set(away["status"].values) == {"done"}
+    here = fp.sweep("fig6", over, metrics=METRICS, overrides=SHORT, executor=fp.LocalProcesses(2))
+    assert away.identical(here)
+
+
+def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster):
+    with distributed.Client(cluster) as client:
+        client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
+    result = fp.sweep(
+        "fig6", {"controller.gain": [1.0, 2.0]}, metrics=[DIES], overrides=SHORT,
+        executor=fp.DaskCluster(cluster.scheduler_address),
+    )  # fmt: skip
+    assert result["status"].values[1] == "failed"
+    assert "died" in str(result["reason"].values[1])
+
+
+def test_a_stop_ends_a_sweep_on_a_cluster(cluster):
+    done = []
+    result = fp.sweep(
+        "fig6", {"controller.gain": GAINS}, metrics=[SLOW], overrides=SHORT,
+        executor=fp.DaskCluster(cluster.scheduler_address), progress=lambda *numbers: done.append(numbers[0]),
+        stop=lambda: bool(done) and done[-1] >= 2,
+    )  # fmt: skip
+    assert (result["status"] == "missing").any()
+    np.testing.assert_array_equal(
+        *(result[name].values[result["status"] == "done"] for name in ("slow_gain", "controller.gain"))
+    )
+
+
+def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
+    def leave(finished, failed, total):
+        if finished == 2:
+            own.close()
+
+    over, folder = {"controller.gain": GAINS}, tmp_path / "out"
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
+    ) as own:
+        executor = fp.DaskCluster(own.scheduler_address)
+        with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
+            fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=executor, progress=leave)
+    assert len((folder / "runs.jsonl").read_text().splitlines()) == 2
+    again = fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=fp.LocalProcesses(2))
+    np.testing.assert_array_equal(again["slow_gain"], GAINS)
+
+
+def test_workers_of_another_version_are_refused(cluster, monkeypatch):
+    monkeypatch.setattr("finger_pin.studies.runs.version", lambda: "0.0.0")
+    executor = fp.DaskCluster(cluster.scheduler_address)
+    with pytest.raises(ClusterError, match=r"a worker has finger_pin \d.*, not 0\.0\.0"):
+        fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
+
+
+def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    main = importlib.import_module("sweep").main
+    arguments = ["--over", "controller.gain=1,2", "--metric", "tracking_rms", "--set", "simulation.duration=0.02"]
+    assert main([*arguments, "--scheduler", cluster.scheduler_address]) == 0
+    assert "2 runs: 2 done" in capsys.readouterr().out
+
+
+def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path):
+    for address in ("tcp://127.0.0.1:9", "nonsense://x", "not an address"):
+        with pytest.raises(InputError, match="scheduler") as caught:
+            executor = fp.DaskCluster(address, timeout=0.3)
+            fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path / "o", executor=executor)
+        assert str(caught.value).isprintable()
+    assert not (tmp_path / "o").exists()

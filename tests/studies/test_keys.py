@@ -1,0 +1,95 @@
+"""Keys that hold numbers: lengths, radii, entries of lists, and what is not one."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.studies.keys import Starting, describe
+
+RADIUS = "finger.tendons.T3.crossings.medial.radius"
+LENGTH = "finger.joints.distal.link.length"
+
+
+@pytest.fixture(scope="module")
+def fig6():
+    return Starting.load("fig6")
+
+
+def test_a_point_changes_its_keys_and_nothing_else(fig6):
+    changed = fig6.at({"controller.gain": 2.0, RADIUS: 0.007})
+    expected = fp.load_scenario("fig6", {"controller.gain": 2.0, RADIUS: 0.007})
+    assert changed == expected
+    assert changed.finger.tendons["T3"].crossings["medial"].radius == 0.007
+
+
+def test_what_a_file_leaves_to_its_default_follows_a_length(fig6):
+    link = fig6.at({LENGTH: 0.03}).finger.joints["distal"].link
+    assert link.length == 0.03
+    assert link.centre_of_mass == 0.015
+
+
+def test_an_index_means_one_number_of_a_list(fig6):
+    changed = fig6.at({"environment.fingertip_force[2]": -0.5, "environment.fingertip_force[0]": 0.1})
+    assert changed.environment.fingertip_force == (0.1, 0.0, -0.5)
+    listed = Starting.load("fig6", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
+    assert listed.at({"controller.gain[1]": 9.0}).controller.gain == (1.0, 9.0, 3.0, 4.0)
+    assert listed.overrides == {"controller.gain": [1.0, 2.0, 3.0, 4.0]}
+
+
+def test_a_whole_number_stays_one(fig6):
+    changed = Starting.load("fig6", {"finger.tendons.T5.mass_after": 1}).at({"finger.tendons.T5.mass_after": 2.0})
+    assert changed.finger.tendons["T5"].mass_after == 2
+
+
+@pytest.mark.parametrize(
+    ("key", "says"),
+    [
+        ("controler.gain", "did you mean controller.gain"),
+        ("controller.gian", "did you mean controller.gain"),
+        ("controller.gain.x", "no entries of its own"),
+        ("controller", "must be a table"),
+        ("controller.kind", "must be one of"),
+        ("simulation.method", "must be one of"),
+        ("finger.title", "no such number"),
+        ("finger.tendons.T1.crossings.abduction.bends", "no such number"),
+        ("finger.tendons.T9.crossings.abduction.radius", "no such number"),
+        ("finger.tendons.T3.crossings.distal.radius", "no such number"),
+        ("reference.joints.medial", "must be a table"),
+        ("finger.gravity", "did you mean finger.gravity["),
+        ("finger.gravity[3]", "[0] to [2]"),
+        ("controller.gain[0]", "one number for all"),
+        ("finger.joints[0]", "no such list"),
+        ("finger.gravity[-1]", "index"),
+    ],
+)
+def test_a_key_that_holds_no_number_is_told_in_one_line(fig6, key, says):
+    with pytest.raises(fp.InputError) as caught:
+        fig6.check(key, [0.5, 0.6])
+    assert says in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_a_key_is_right_if_any_of_its_values_is(fig6):
+    fig6.check(RADIUS, [-0.005, 0.0063])
+    with pytest.raises(fp.InputError):
+        fig6.check(RADIUS, [-0.005, -0.006])
+
+
+def test_a_reference_that_a_scenario_leaves_out_is_a_key():
+    still = Starting.load("fig6", {"reference.joints": {}})
+    still.check("reference.joints.medial.offset", [0.1])
+    assert still.at({"reference.joints.medial.offset": 0.1}).reference.joints["medial"].offset == 0.1
+
+
+def test_a_misspelt_name_of_a_tendon_does_not_make_a_new_one(fig6):
+    with pytest.raises(fp.InputError, match=r"did you mean finger\.tendons\.T\d\.crossings\.abduction\.radius"):
+        fig6.check("finger.tendons.T9.crossings.abduction.radius", [0.001])
+
+
+def test_what_a_key_holds_has_unit_and_name():
+    assert describe(RADIUS)["units"] == "m"
+    assert describe("finger.tendon_friction.viscous")["units"] == "N s/m"
+    assert describe("finger.joints.distal.link.length")["units"] == "m"
+    assert describe("reference.joints.medial.frequency") == {"units": "Hz", "long_name": "Of the sinusoid"}
+    assert describe("environment.fingertip_force[1]")["units"] == "N"
+    assert np.char.startswith(describe("controller.gain")["long_name"], "K_P")

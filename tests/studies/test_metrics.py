@@ -1,0 +1,105 @@
+"""Metrics against numbers worked out by hand, and against the energy account."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import finger_pin as fp
+from finger_pin.analysis import largest_force
+from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, choose
+
+# Uneven times: means over samples would be others.
+TIME = np.array([0.0, 1.0, 2.0, 6.0])
+
+
+@pytest.fixture(scope="module")
+def made():
+    """A run whose signals are written down here."""
+    run = Run(fp.load_scenario("fig6"))
+    run.result = xr.Dataset(
+        {
+            "tracking_error": (("time", "joint"), [[0.3, 0.0], [0.3, 0.0], [-0.3, -0.4], [-0.3, -0.4]]),
+            "tendon_tension": (("time", "tendon"), [[1.0, 3.0], [0.0, 3.0], [0.0, 3.0], [4.0, 3.0]]),
+            "tendon_command": (("time", "tendon"), [[1.0, 99.0], [5.0, 99.0], [1.0, 99.0], [1.0, 99.0]]),
+            "passive_tension_proximal": ("time", [2.0, 7.0, 2.0, 2.0]),
+        },
+        {"time": TIME, "joint": ["a", "b"], "tendon": ["T1", "T2"]},
+    )
+    return run
+
+
+def test_the_rms_error_is_a_mean_over_time(made):
+    squares = np.array([0.09, 0.09, 0.25, 0.25]) / 2
+    integral = 0.5 * (squares[:-1] + squares[1:]) @ np.diff(TIME)
+    assert METRICS["tracking_rms"].measure(made) == pytest.approx(np.sqrt(integral / 6.0))
+
+
+def test_the_peak_error_counts_both_signs(made):
+    assert METRICS["tracking_peak"].measure(made) == 0.4
+
+
+def test_the_peak_tension_is_at_any_end_but_not_what_is_planned_for_a_passive_tendon(made):
+    assert METRICS["tension_peak"].measure(made) == 7.0
+    made.result["passive_tension_proximal"][1] = 2.0
+    assert METRICS["tension_peak"].measure(made) == 5.0
+
+
+def test_the_mean_tension_is_over_time_and_tendons(made):
+    # T1: 0.5 in the first second, 0 in the second one, 2 in the last four; T2: 3.
+    assert METRICS["tension_mean"].measure(made) == pytest.approx(0.5 * ((0.5 + 0.0 + 8.0) / 6.0 + 3.0))
+
+
+def test_slack_time_counts_from_half_an_interval_before_to_half_after(made):
+    assert METRICS["slack_time"].measure(made) == pytest.approx(0.5 + 1.0 + 2.0)
+
+
+def test_losses_are_what_was_supplied_and_not_stored():
+    run = Run(fp.load_scenario("fig6", {"simulation.duration": 0.1}))
+    result = run.result
+    stored = ("kinetic", "gravity", "passive_tendon", "limiter", "tendon_bristles", "joint_bristles")
+    gain = sum(float(result[f"energy_{name}"][-1] - result[f"energy_{name}"][0]) for name in stored)
+    supplied = float(result["energy_exchanged_actuators"][-1])
+    assert METRICS["losses"].measure(run) == pytest.approx(supplied - gain, rel=1e-4)
+    parts = METRICS["losses_tendons"].measure(run) + METRICS["losses_joints"].measure(run)
+    assert 0.0 < parts <= METRICS["losses"].measure(run)
+
+
+def test_the_self_locking_margin_falls_as_the_joints_friction_grows():
+    margins = [
+        METRICS["self_locking_margin"].measure(
+            Run(fp.load_scenario("fig6", {"finger.joint_friction.stiction": static}))
+        )
+        for static in (3.5e-4, 7.0e-4)
+    ]
+    # M^c is scaled until it locks: twice the friction is half the factor.
+    assert margins[0] == pytest.approx(2.0 * margins[1])
+
+
+def test_the_fingertip_force_is_possible_in_every_direction_and_no_more_is():
+    scenario = fp.load_scenario("fig6")
+    force = METRICS["fingertip_force"].measure(Run(scenario))
+    finger = fp.Finger(scenario.finger)
+    # Whole periods: the mean of every sinusoid is its offset.
+    posture = np.array([0.0, 0.6108652381980153, 0.6108652381980153, 0.0])
+    posture[3] = (0.0035 * posture[2] - 1.0 / 5e4) / 0.005
+    directions = np.random.default_rng(1).normal(size=(60, 3))
+    reach = [largest_force(finger, posture, each, FORCE_TENSION) for each in directions]
+    assert force <= min(reach)
+    assert force > 0.7 * min(reach)
+
+
+def test_metrics_of_the_statics_simulate_nothing():
+    run = Run(fp.load_scenario("fig6"))
+    METRICS["self_locking_margin"].measure(run)
+    METRICS["fingertip_force"].measure(run)
+    assert "result" not in vars(run)
+
+
+def test_metrics_are_chosen_by_name_and_a_misspelt_one_is_told_the_nearest():
+    own = Metric("own", "1", "of one's own", len)
+    assert choose(["losses", own]) == (METRICS["losses"], own)
+    with pytest.raises(fp.InputError, match="did you mean tracking_rms"):
+        choose(["tracking_rsm"])
+    for names in ([], ["losses", "losses"]):
+        with pytest.raises(fp.InputError):
+            choose(names)

@@ -1,0 +1,192 @@
+"""Sweeps in local processes: the Dataset, failures with their reasons, dead processes, and going on."""
+
+import json
+
+import numpy as np
+import pytest
+from planted import DIES, DIES_ONCE, GAIN, RAISES, SLOW, STOPS, THREADS
+
+import finger_pin as fp
+from finger_pin.studies.metrics import METRICS, Run
+
+RADIUS = "finger.tendons.T3.crossings.medial.radius"
+SHORT = {"simulation.duration": 0.02}
+TWO = fp.LocalProcesses(2)
+
+
+def lines(folder):
+    return [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory):
+    """A grid with points at which there is no force closure."""
+    folder = tmp_path_factory.mktemp("grid")
+    seen = []
+    over = {"controller.gain": [0.5, 1.0, 2.0], RADIUS: [-0.005, 0.0063]}
+    metrics = ["tracking_rms", "tension_peak"]
+    result = fp.sweep(
+        "fig6", over, metrics=metrics, overrides=SHORT, output=folder, executor=TWO,
+        progress=lambda *numbers: seen.append(numbers),
+    )  # fmt: skip
+    return folder, result, seen
+
+
+def test_a_grid_has_a_dimension_per_key_and_every_number_is_that_of_its_own_run(grid):
+    _, result, _ = grid
+    assert result["tracking_rms"].dims == ("controller.gain", RADIUS)
+    for gain in (0.5, 1.0, 2.0):
+        alone = Run(fp.load_scenario("fig6", {**SHORT, "controller.gain": gain, RADIUS: 0.0063}))
+        for name in ("tracking_rms", "tension_peak"):
+            found = result[name].sel({"controller.gain": gain, RADIUS: 0.0063})
+            assert float(found) == METRICS[name].measure(alone)
+
+
+def test_points_without_a_scenario_are_nan_with_their_reason(grid):
+    folder, result, _ = grid
+    failed = result.sel({RADIUS: -0.005})
+    assert set(failed["status"].values) == {"failed"}
+    assert all("force closure" in reason for reason in failed["reason"].values)
+    assert np.isnan(failed["tracking_rms"]).all()
+    done = result.sel({RADIUS: 0.0063})
+    assert set(done["status"].values) == {"done"}
+    assert set(done["reason"].values) == {""}
+    assert sorted(line["status"] for line in lines(folder)) == ["done"] * 3 + ["failed"] * 3
+
+
+def test_variables_and_coordinates_have_units_and_names_and_the_dataset_its_origin(grid):
+    _, result, _ = grid
+    for name in ("tracking_rms", "tension_peak", "controller.gain", RADIUS):
+        assert result[name].attrs["units"] == {"tracking_rms": "rad", "tension_peak": "N", RADIUS: "m"}.get(
+            name, "N m/rad"
+        )
+        assert result[name].attrs["long_name"]
+    assert "version_finger_pin" in result.attrs
+    assert 'name = "fig6"' in result.attrs["scenario"]
+
+
+def test_progress_begins_with_what_is_there_and_ends_with_all(grid):
+    _, _, seen = grid
+    assert seen[0] == (3, 3, 6)
+    assert seen[-1] == (6, 3, 6)
+
+
+def test_the_file_holds_what_was_returned(grid):
+    folder, result, _ = grid
+    assert fp.load_result(folder / "sweep.nc").identical(result)
+
+
+def test_the_same_again_repeats_no_run(grid):
+    folder, result, _ = grid
+    before = (folder / "runs.jsonl").read_bytes()
+    seen = []
+    again = fp.sweep(
+        "fig6", fp.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
+        metrics=["tracking_rms", "tension_peak"], overrides=SHORT, output=folder, executor=TWO,
+        progress=lambda *numbers: seen.append(numbers),
+    )  # fmt: skip
+    assert again.identical(result)
+    assert (folder / "runs.jsonl").read_bytes() == before
+    assert seen == [(6, 3, 6)]
+
+
+def test_samples_have_every_key_as_a_coordinate():
+    cube = fp.LatinHypercube(
+        {"controller.gain": fp.Range(0.5, 2.0), "environment.fingertip_force[2]": fp.Range(0, 1)}, 3
+    )
+    result = fp.sweep("fig6", cube, metrics=[GAIN], overrides=SHORT, executor=TWO)
+    assert result["gain"].dims == ("sample",)
+    np.testing.assert_array_equal(result["gain"], result["controller.gain"])
+    assert result["environment.fingertip_force[2]"].dims == ("sample",)
+
+
+def test_a_run_that_raises_is_told_in_one_line_and_the_others_go_on():
+    result = fp.sweep("fig6", {"controller.gain": [1.0, 2.0, 3.0]}, metrics=[RAISES], overrides=SHORT, executor=TWO)
+    assert list(result["status"].values) == ["done", "failed", "done"]
+    assert result["reason"].values[1] == "ArithmeticError: planted in two lines"
+    np.testing.assert_array_equal(result["raises_at_two"], [1.0, np.nan, 3.0])
+
+
+def test_an_integration_that_fails_is_recorded_with_its_reason():
+    result = fp.sweep("fig6", {"controller.gain": [1.0, 2.0]}, metrics=[STOPS], overrides=SHORT, executor=TWO)
+    assert list(result["status"].values) == ["done", "failed"]
+    assert str(result["reason"].values[1]).startswith("the integration stopped at t = 0.01 s: the step is too small")
+
+
+def test_a_process_that_dies_costs_its_run_alone_and_is_told(tmp_path):
+    gains = [1.0, 2.0, 3.0, 4.0, 5.0]
+    result = fp.sweep(
+        "fig6", {"controller.gain": gains}, metrics=[DIES], overrides=SHORT, output=tmp_path, executor=TWO
+    )
+    assert list(result["status"].values) == ["done", "failed", "done", "done", "done"]
+    assert "killed by SIGKILL" in str(result["reason"].values[1])
+    assert len(lines(tmp_path)) == 5
+
+
+def test_a_process_that_dies_once_costs_nothing(tmp_path):
+    overrides = {**SHORT, "title": str(tmp_path)}
+    result = fp.sweep(
+        "fig6", {"controller.gain": [1.0, 2.0, 3.0]}, metrics=[DIES_ONCE], overrides=overrides, executor=TWO
+    )
+    assert (tmp_path / "mark").exists()
+    np.testing.assert_array_equal(result["dies_once_at_two"], [1.0, 2.0, 3.0])
+
+
+def test_failed_runs_are_repeated_when_asked_for(tmp_path):
+    overrides = {**SHORT, "title": str(tmp_path)}
+
+    def run(**options):
+        return fp.sweep(
+            "fig6", {"controller.gain": [1.0, 2.0]}, metrics=[RAISES], overrides=overrides, output=tmp_path,
+            executor=TWO, **options,
+        )  # fmt: skip
+
+    run()
+    assert len(lines(tmp_path)) == 2
+    run()
+    assert len(lines(tmp_path)) == 2
+    run(retry_failed=True)
+    assert [line["point"]["controller.gain"] for line in lines(tmp_path)[2:]] == [2.0]
+
+
+def test_a_stop_leaves_the_rest_missing_and_the_next_time_does_only_that(tmp_path):
+    gains = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    done = []
+
+    def run(stop=None):
+        return fp.sweep(
+            "fig6", {"controller.gain": gains}, metrics=[SLOW], overrides=SHORT, output=tmp_path, executor=TWO,
+            progress=lambda *numbers: done.append(numbers[0]), stop=stop,
+        )  # fmt: skip
+
+    first = run(stop=lambda: bool(done) and done[-1] >= 2)
+    missing = int((first["status"] == "missing").sum())
+    assert 2 <= missing <= 4
+    assert np.isnan(first["slow_gain"].values[first["status"].values == "missing"]).all()
+    before = (tmp_path / "runs.jsonl").read_bytes()
+    second = run()
+    np.testing.assert_array_equal(second["slow_gain"], gains)
+    assert (tmp_path / "runs.jsonl").read_bytes().startswith(before)
+    assert len({line["key"] for line in lines(tmp_path)}) == len(lines(tmp_path)) == 6
+
+
+def test_processes_use_one_thread_each():
+    result = fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[THREADS], overrides=SHORT, executor=TWO)
+    np.testing.assert_array_equal(result["threads"], [1.0])
+
+
+@pytest.mark.parametrize(
+    ("over", "options"),
+    [
+        ({"controler.gain": [1.0]}, {}),
+        ({"controller.gain": [-1.0]}, {}),
+        ({"controller.kind": [1.0]}, {}),
+        ({}, {}),
+        ({"controller.gain": [1.0]}, {"metrics": ["loses"]}),
+        ({"controller.gain": [1.0]}, {"overrides": {"simulation.duration": -1}}),
+    ],
+)
+def test_wrong_input_writes_nothing(tmp_path, over, options):
+    with pytest.raises(fp.InputError):
+        fp.sweep("fig6", over, output=tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,95 @@
+"""Figures of sweeps: which kind is drawn, and that what is drawn is what was found."""
+
+import matplotlib.collections
+import numpy as np
+import pytest
+import xarray as xr
+
+from finger_pin.plots.sweep import plot_sweep, short_key
+
+RADIUS = "finger.tendons.T3.crossings.medial.radius"
+
+
+def made(coordinates, dims, **values):
+    """A sweep's Dataset, without running one; NaN is a failed run."""
+    data = {}
+    for name, array in values.items():
+        data[name] = (dims, np.asarray(array, dtype=float), {"units": "N", "long_name": f"long {name}"})
+    first = np.asarray(next(iter(values.values())), dtype=float)
+    status = np.where(np.isnan(first), "failed", "done")
+    data["status"], data["reason"] = (dims, status), (dims, np.where(np.isnan(first), "why", ""))
+    units = {"units": "m", "long_name": "key"}
+    own = {key: (("sample",) if "sample" in dims else (key,), np.asarray(v), units) for key, v in coordinates.items()}
+    return xr.Dataset(data, own)
+
+
+def test_one_key_is_drawn_as_lines_with_failures_marked():
+    key = "controller.gain"
+    figure = plot_sweep(made({key: [1.0, 2.0, 3.0]}, (key,), a=[5.0, np.nan, 7.0], b=[1.0, np.nan, 2.0]))
+    first, second = figure.axes
+    np.testing.assert_array_equal(first.lines[0].get_ydata(), [5.0, np.nan, 7.0])
+    np.testing.assert_array_equal(second.lines[0].get_ydata(), [1.0, np.nan, 2.0])
+    np.testing.assert_array_equal(first.lines[1].get_xdata(), [2.0])
+    assert first.get_xscale() == "linear"
+    assert first.get_xlabel() == "controller gain (m)"
+
+
+def test_two_keys_are_drawn_as_a_map_with_each_number_in_its_own_cell():
+    keys = {RADIUS: [1.0, 2.0, 4.0], "b": [1.0, 10.0, 100.0, 1000.0]}
+    values = np.arange(12.0).reshape(3, 4)
+    values[0, 1] = np.nan
+    figure = plot_sweep(made(keys, (RADIUS, "b"), a=values))
+    axes = figure.axes[0]
+    (mesh,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.QuadMesh))
+    corners = mesh.get_coordinates()
+    for i, x in enumerate(keys[RADIUS]):
+        for j, y in enumerate(keys["b"]):
+            assert corners[j, i, 0] < x < corners[j + 1, i + 1, 0]
+            assert corners[j, i, 1] < y < corners[j + 1, i + 1, 1]
+            shown = mesh.get_array()[j, i]
+            assert np.ma.is_masked(shown) if np.isnan(values[i, j]) else shown == values[i, j]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    (cross,) = axes.lines
+    assert (cross.get_xdata().tolist(), cross.get_ydata().tolist()) == ([1.0], [10.0])
+
+
+@pytest.mark.parametrize("kind", ["sample", "grid"])
+def test_more_keys_and_samples_are_drawn_as_parallel_coordinates_of_all_runs(kind):
+    if kind == "sample":
+        result = made({"a": [0.0, 1.0, 3.0], "b": [9.0, 8.0, 7.0]}, ("sample",), m=[4.0, np.nan, 6.0])
+        rows, keys = [[0.0, 1.0, 0.0], [1.0, 0.0, 1.0]], 2
+    else:
+        axis = [0.0, 2.0]
+        values = np.arange(8.0).reshape(2, 2, 2)
+        values[0, 0, 1] = np.nan
+        result = made({"a": axis, "b": axis, "c": axis}, ("a", "b", "c"), m=values)
+        places = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+        rows, keys = [[i, j, k, values[i, j, k] / 7.0] for i, j, k in places if not np.isnan(values[i, j, k])], 3
+    axes = plot_sweep(result).axes[0]
+    (lines,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.LineCollection))
+    drawn = sorted(segment[:, 1].tolist() for segment in lines.get_segments())
+    assert drawn == sorted(rows)
+    assert any(len(line.get_xdata()) == keys and line.get_linestyle() == ":" for line in axes.lines)
+
+
+def test_keys_of_one_value_take_no_part():
+    figure = plot_sweep(made({"a": [1.0], "b": [1.0, 2.0]}, ("a", "b"), m=[[3.0, 4.0]]))
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), [3.0, 4.0])
+
+
+@pytest.mark.parametrize("shape", [(1,), (2, 2), (2, 2, 2)])
+def test_a_sweep_of_failures_alone_is_drawn(shape, tmp_path):
+    keys = {name: np.arange(1.0, 1.0 + size) for name, size in zip("abc", shape, strict=False)}
+    plot_sweep(made(keys, tuple(keys), m=np.full(shape, np.nan))).savefig(tmp_path / "f.png")
+
+
+def test_infinite_metrics_are_drawn(tmp_path):
+    for keys in ({"a": [1.0, 2.0]}, {"a": [1.0, 2.0], "b": [1.0]}, {"a": [1.0], "b": [1.0], "c": [1.0, 2.0]}):
+        shape = tuple(len(v) for v in keys.values())
+        plot_sweep(made(keys, tuple(keys), m=np.array([np.inf, 1.0]).reshape(shape))).savefig(tmp_path / "f.png")
+
+
+def test_labels_say_what_a_key_is_and_not_where_it_lies():
+    assert short_key(RADIUS) == "T3 medial radius"
+    assert short_key("finger.joints.distal.link.length") == "distal length"
+    assert short_key("finger.tendon_friction.coulomb") == "tendon friction coulomb"
