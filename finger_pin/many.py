@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
-from finger_pin.core.compilation import CACHE_FOLDER
 from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning
+from finger_pin.processes import process_context, usable_cores
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 
@@ -75,16 +73,17 @@ def simulate_many(
 
 def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: int) -> Iterator[tuple[int, xr.Dataset]]:
     """Yield index and result of every run as it is finished."""
+    if count == 1:
+        for index, run in enumerate(runs):
+            yield index, _run(run, keep)
+        return
+    context = process_context()
     # The first run comes first and here: it compiles what the other processes then find in the cache.
     yield 0, _run(runs[0], keep)
-    if count == 1:
-        for index in range(1, len(runs)):
-            yield index, _run(runs[index], keep)
-        return
     waiting = deque(range(1, len(runs)))
     pending: dict[Future[xr.Dataset], int] = {}
     started = False
-    with ProcessPoolExecutor(count, mp_context=process_context()) as pool:
+    with ProcessPoolExecutor(count, mp_context=context) as pool:
         try:
             while waiting or pending:
                 while waiting and len(pending) < _IN_FLIGHT * count:
@@ -103,27 +102,6 @@ def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: in
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        # Only Linux binds processes to cores.
-        return os.cpu_count() or 1
-
-
-def process_context() -> multiprocessing.context.BaseContext:
-    """Return how to start processes: from a clean server where the cache serves them, else as copies of this one."""
-    methods = multiprocessing.get_all_start_methods()
-    if CACHE_FOLDER is None and "fork" in methods:
-        return multiprocessing.get_context("fork")
-    if "forkserver" in methods:
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["finger_pin.simulation"])
-        return context
-    return multiprocessing.get_context("spawn")
 
 
 def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:

@@ -12,7 +12,6 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -20,13 +19,11 @@ from types import TracebackType
 from typing import Self
 
 from finger_pin.exceptions import FingerPinError, InputError
-from finger_pin.many import process_context
+from finger_pin.processes import process_context, single_threaded, usable_cores
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 from finger_pin.studies.runs import Record, Stop, Task, execute
 
-# Matrices of a finger are too small for several threads to help, and the cores are taken by the processes.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 # How often a request to stop is looked at, s, and how long compiled code is tried for, in simulated time, s.
 _POLL, _GLANCE = 0.1, 1e-3
 # A process may die for a reason outside, such as memory that others took; the same task twice is told.
@@ -56,7 +53,7 @@ class LocalProcesses:
 
     def start(self) -> LocalWorkers:
         """Return workers for the time of a ``with`` statement."""
-        return LocalWorkers(self.workers or len(os.sched_getaffinity(0)))
+        return LocalWorkers(self.workers or usable_cores())
 
 
 @dataclass(eq=False)
@@ -130,7 +127,7 @@ class LocalWorkers:
     def _add(self) -> _Worker:
         context = process_context()
         ours, theirs = context.Pipe()
-        with _single_threaded():
+        with single_threaded():
             process = context.Process(target=_work, args=(theirs,), daemon=True)  # type: ignore[attr-defined]
             process.start()
         theirs.close()
@@ -186,18 +183,3 @@ def _compile(scenario: Scenario) -> None:
     except FingerPinError:
         # Why this scenario cannot be simulated is told with its run.
         return
-
-
-@contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Let processes that are started meanwhile use one thread each."""
-    earlier = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in earlier.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
