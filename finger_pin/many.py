@@ -6,6 +6,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from threading import Thread
 
 import numpy as np
 import xarray as xr
@@ -77,31 +78,37 @@ def _completed(runs: Sequence[Scenario], keep: tuple[str, ...] | None, count: in
         for index, run in enumerate(runs):
             yield index, _run(run, keep)
         return
-    context = process_context()
-    # The first run comes first and here: it compiles what the other processes then find in the cache.
-    yield 0, _run(runs[0], keep)
     waiting = deque(range(1, len(runs)))
     pending: dict[Future[xr.Dataset], int] = {}
+    pool = ProcessPoolExecutor(count, mp_context=process_context())
+    calls: list[Future[None]] = []
+    # Starting a process waits for the server, which takes a second or two to start.
+    starting = Thread(target=lambda: calls.extend(pool.submit(_answer) for _ in range(count)))
+    starting.start()
     started = False
-    with ProcessPoolExecutor(count, mp_context=context) as pool:
-        try:
-            while waiting or pending:
-                while waiting and len(pending) < _IN_FLIGHT * count:
-                    index = waiting.popleft()
-                    pending[pool.submit(_run, runs[index], keep)] = index
-                if waiting and not started:
-                    # The processes take a second or two to start; this one is there already.
-                    index = waiting.popleft()
-                    yield index, _run(runs[index], keep)
-                finished, _ = wait(
-                    pending, timeout=None if started or not waiting else 0.0, return_when=FIRST_COMPLETED
-                )
-                started = started or bool(finished)
-                for future in finished:
-                    yield pending.pop(future), future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    try:
+        # The first run comes first and here: it compiles what the other processes then find in the cache.
+        yield 0, _run(runs[0], keep)
+        while waiting or pending:
+            started = started or any(call.done() for call in calls.copy())
+            if not started:
+                # This process is there already.
+                index = waiting.popleft()
+                yield index, _run(runs[index], keep)
+                continue
+            while waiting and len(pending) < _IN_FLIGHT * count:
+                index = waiting.popleft()
+                pending[pool.submit(_run, runs[index], keep)] = index
+            finished, _ = wait(pending, return_when=FIRST_COMPLETED)
+            for future in finished:
+                yield pending.pop(future), future.result()
+    finally:
+        starting.join()
+        pool.shutdown(wait=not pending, cancel_futures=True)
+
+
+def _answer() -> None:
+    """Do nothing: whoever does is there."""
 
 
 def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:

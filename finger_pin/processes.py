@@ -33,7 +33,7 @@ def process_context() -> multiprocessing.context.BaseContext:
         return multiprocessing.get_context("fork")
     if "forkserver" in methods:
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["finger_pin.simulation"])
+        context.set_forkserver_preload(["finger_pin.preloaded"])
         with single_threaded():
             # Its processes have the environment in which it was started.
             multiprocessing.forkserver.ensure_running()

@@ -16,6 +16,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from command_line import DONE, INTERRUPTED, NOT_WRITTEN, Parser, complain
+
+PROGRAM = "benchmark.py"
 PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "scikit-sundae")
 STAGES = ("work-precision", "step-interface", "joints", "mujoco", "many-runs", "main-job")
 
@@ -45,27 +48,27 @@ def main(arguments: list[str] | None = None) -> int:
         write(options.output / "benchmark.txt", lines)
         draw(stages, options.output)
     except KeyboardInterrupt:
-        print(f"benchmark.py: interrupted; what was measured is in {options.output}", file=sys.stderr)
-        return 130
+        complain(PROGRAM, f"interrupted; what was measured is in {options.output}")
+        return INTERRUPTED
     except OSError as error:
-        print(f"benchmark.py: {options.output}: cannot be written: {error.strerror or error}", file=sys.stderr)
-        return 2
+        complain(PROGRAM, f"{options.output}: cannot be written: {error.strerror or error}")
+        return NOT_WRITTEN
     from finger_pin.console import print_text
 
     print_text(f"{lines}\n\nResults are in {options.output}")
-    return 0
+    return DONE
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """Parse a command line, or exit."""
-    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
     parser.add_argument("--quick", action="store_true", help="shorter and fewer runs, to see that all works")
     parser.add_argument("--only", type=chosen, default=STAGES, metavar="STAGES", help=f"of {','.join(STAGES)}")
     parser.add_argument("--fresh", action="store_true", help="measure every part anew")
     parser.add_argument(
         "--output", type=Path, default=Path("results/benchmark"), metavar="DIR", help="default %(default)s"
     )
-    return parser.parse_args(arguments)
+    return parser.read(arguments)
 
 
 def chosen(names: str) -> tuple[str, ...]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from contextlib import nullcontext
 from pathlib import Path
 
 import xarray as xr
+from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, Parser, complain
 from rich import box
 from rich.console import Console
 from rich.progress import Progress
@@ -22,6 +22,7 @@ from finger_pin.plots.controllers import plot_controllers
 from finger_pin.routing import Routing
 from finger_pin.simulation import simulate
 
+PROGRAM = "controllers.py"
 WIDTH = 100
 TITLE = "Controllers on fig6, after the first second"
 CAPTION = "error: rms; by T5: of it, the passive tendon's stretch; peak, mean: commands; mJ: lost by friction; f5: mean"
@@ -30,11 +31,11 @@ DRAWN = ("paper", "all friction", "all friction, f5d 4 N, loop")
 
 def main(arguments: list[str] | None = None) -> int:
     """Simulate every controller, show and write the comparison; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
     parser.add_argument(
         "--output", type=Path, default=Path("results/controllers"), metavar="DIR", help="default %(default)s"
     )
-    folder = parser.parse_args(arguments).output
+    folder = parser.read(arguments).output
     rows: list[Comparison] = []
     drawn: dict[str, xr.Dataset] = {}
     try:
@@ -49,17 +50,17 @@ def main(arguments: list[str] | None = None) -> int:
                 drawn[name] = result
         save_figure(plot_controllers(drawn, rows), folder / "controllers.png")
     except IntegrationError as error:
-        print(f"controllers.py: {error}; the rows so far are in {folder}", file=sys.stderr)
-        return 3
+        complain(PROGRAM, f"{error}; the rows so far are in {folder}")
+        return FAILED
     except OSError as error:
-        print(f"controllers.py: {folder}: cannot be written: {error.strerror or error}", file=sys.stderr)
-        return 1
+        complain(PROGRAM, f"{folder}: cannot be written: {error.strerror or error}")
+        return NOT_WRITTEN
     except KeyboardInterrupt:
-        print(f"controllers.py: interrupted; the rows so far are in {folder}", file=sys.stderr)
-        return 130
+        complain(PROGRAM, f"interrupted; the rows so far are in {folder}")
+        return INTERRUPTED
     Console(width=max(Console().width, WIDTH)).print(table(rows))
     print(f"{note(rows)}\nTable and figure are in {folder}")
-    return 0
+    return DONE
 
 
 def runs():

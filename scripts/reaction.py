@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
+from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain, override
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -21,24 +21,16 @@ from finger_pin.files import replacing
 from finger_pin.plots import save_figure
 from finger_pin.plots.reaction import plot_reaction
 
-DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+PROGRAM = "reaction.py"
 FORCE = "environment.fingertip_force"
 AS_IT_IS = "as it is"
 TEXTS = ("fingertip force", "joint")
 PARTS = ("direction", "weight", "inertia", "static", "full", "other_groove")
 
 
-class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print one line and exit."""
-        self.exit(complain(message, WRONG_INPUT))
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Do what a command line says; return the exit code."""
-    parser = Parser(prog="reaction.py", description=__doc__, allow_abbrev=False)
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
     parser.add_argument("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path; default fig6")
     parser.add_argument("--set", action="append", default=[], type=override, metavar="KEY=VALUE", help="repeatable")
     parser.add_argument(
@@ -46,28 +38,21 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--output", type=Path, default=Path("results/reaction"), help="default results/reaction")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
-    options = parser.parse_args(arguments)
+    options = parser.read(arguments)
     try:
         return run(options)
     except fp.InputError as error:
-        return complain(str(error), WRONG_INPUT)
+        complain(PROGRAM, str(error))
+        return WRONG_INPUT
     except fp.IntegrationError as error:
-        return complain(f"{error}; nothing was written", FAILED)
+        complain(PROGRAM, f"{error}; nothing was written")
+        return FAILED
     except OSError as error:
-        return complain(f"the results cannot be written: {error}", NOT_WRITTEN)
+        complain(PROGRAM, f"the results cannot be written: {error}")
+        return NOT_WRITTEN
     except KeyboardInterrupt:
-        return complain("interrupted; nothing was written", INTERRUPTED)
-
-
-def override(text: str) -> tuple[str, Any]:
-    """Parse KEY=VALUE, where VALUE is TOML or a plain name."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise argparse.ArgumentTypeError(f"{text}: must be KEY=VALUE, such as controller.gain=2")
-    try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key.strip(), value.strip()
+        complain(PROGRAM, "interrupted; nothing was written")
+        return INTERRUPTED
 
 
 def run(options: argparse.Namespace) -> int:
@@ -160,12 +145,6 @@ def add_row(table: Table, row: dict[str, Any], label: str) -> None:
     friction = f"{row['friction mean, mN m']:.2f} ({row['friction max, mN m']:.2f})"
     motion = f"{row['motion rms, deg']:.3f}"
     table.add_row(label, row["joint"], f"{row['mean (17), N']:.1f}", *shares, friction, motion)
-
-
-def complain(message: str, code: int) -> int:
-    """Print one line on standard error and return the exit code."""
-    print(f"reaction.py: {message}", file=sys.stderr)
-    return code
 
 
 if __name__ == "__main__":

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from command_line import DONE, FAILED, INTERRUPTED, WRONG_INPUT, Parser, complain
 
 from finger_pin.console import print_text, progress_bar
 from finger_pin.exceptions import IntegrationError
@@ -17,6 +17,7 @@ from finger_pin.plots import draw_all, plot_friction_law, plot_workspace, save_f
 from finger_pin.scenario import Scenario
 from finger_pin.simulation import simulate
 
+PROGRAM = "reproduce.py"
 # The paper prints no numbers for its Fig. 6: these go with the scenario's references and gains, after its start.
 SETTLED = 1.0
 EXPECTED_ERRORS = {"abduction": "near 0.5", "proximal": "near 0.8", "medial": "near 1.1", "distal": "near 1.7"}
@@ -25,9 +26,9 @@ EXPECTED_TENSIONS = {"T3": "up to about 9", "T5": "1 to 7, never slack"}
 
 def main(arguments: list[str] | None = None) -> int:
     """Simulate, draw, and say what came out; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
     parser.add_argument("--output", type=Path, default=Path("results/paper"), metavar="DIR", help="default %(default)s")
-    folder = parser.parse_args(arguments).output
+    folder = parser.read(arguments).output
     scenario = load_scenario("fig6")
     try:
         paths = [
@@ -37,16 +38,16 @@ def main(arguments: list[str] | None = None) -> int:
         result = run(scenario)
         paths += draw_all(result, folder)
     except IntegrationError as error:
-        print(f"reproduce.py: {error}", file=sys.stderr)
-        return 3
+        complain(PROGRAM, f"{error}")
+        return FAILED
     except OSError as error:
-        print(f"reproduce.py: --output = {folder}: cannot be written: {error.strerror or error}", file=sys.stderr)
-        return 2
+        complain(PROGRAM, f"--output = {folder}: cannot be written: {error.strerror or error}")
+        return WRONG_INPUT
     except KeyboardInterrupt:
-        print("reproduce.py: interrupted", file=sys.stderr)
-        return 130
+        complain(PROGRAM, "interrupted")
+        return INTERRUPTED
     print_text("\n".join([*comparison(result), "", *map(str, paths)]))
-    return 0
+    return DONE
 
 
 def run(scenario: Scenario) -> xr.Dataset:

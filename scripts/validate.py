@@ -15,9 +15,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from command_line import INTERRUPTED, NOT_WRITTEN, Parser, complain
+
 if TYPE_CHECKING:
     from validation.report import Family
 
+PROGRAM = "validate.py"
 #: Names on the command line, and the modules in scripts/validation, in the order of the report.
 FAMILIES = {
     "kinematics": "kinematics",
@@ -47,11 +50,11 @@ def main(arguments: list[str] | None = None) -> int:
         whole = report.Report.now(families)
         report.write(whole, options.output)
     except KeyboardInterrupt:
-        print("validate.py: interrupted; nothing was written", file=sys.stderr)
-        return 130
+        complain(PROGRAM, "interrupted; nothing was written")
+        return INTERRUPTED
     except OSError as error:
-        print(f"validate.py: {options.output}: cannot be written: {error.strerror or error}", file=sys.stderr)
-        return 1
+        complain(PROGRAM, f"{options.output}: cannot be written: {error.strerror or error}")
+        return NOT_WRITTEN
     print_text(f"{report.text(whole)}\n\nThe report is {options.output / report.PAGE}")
     return 1 if whole.count(Verdict.FAIL) else 0
 
@@ -59,14 +62,14 @@ def main(arguments: list[str] | None = None) -> int:
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """Parse a command line, or exit."""
     summary, _, rest = (__doc__ or "").partition("\n\n")
-    parser = argparse.ArgumentParser(description=summary, epilog=rest, allow_abbrev=False)
+    parser = Parser(prog=PROGRAM, description=summary, epilog=rest, allow_abbrev=False)
     parser.add_argument(
         "--only", type=chosen, default=tuple(FAMILIES), metavar="NAME", help=f"one or more of {','.join(FAMILIES)}"
     )
     parser.add_argument(
         "--output", type=Path, default=Path("results/validation"), metavar="DIR", help="default %(default)s"
     )
-    return parser.parse_args(arguments)
+    return parser.read(arguments)
 
 
 def chosen(names: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from finger_pin.processes import usable_cores
 
 WORKERS = (1, 2)
 # Many enough that the start of the processes, two seconds, no longer counts.
-_COUNTS = (12, 144)
+_COUNTS = (12, 200)
 _QUICK_COUNTS = (4, 12)
 
 
