@@ -84,7 +84,10 @@ def _maps(result: xr.Dataset, first: str, second: str) -> Figure:
             wide = shown.min() > 0.0 and shown.max() > _WIDE * shown.min()
             norm = LogNorm() if wide else None
             drawn = axes.pcolormesh(_edges(x), _edges(y), shown.T, cmap=_MAP, norm=norm)
-            figure.colorbar(drawn, ax=axes, label=_unit(result, name))
+            bar = figure.colorbar(drawn, ax=axes, label=_unit(result, name))
+            if shown.min() == shown.max():
+                # A scale of made-up width would look like a range that was found.
+                bar.set_ticks([float(shown.min())])
         _scale(axes.set_xscale, axes.xaxis, x)
         _scale(axes.set_yscale, axes.yaxis, y)
         for which, colour in (("failed", VERMILLION), ("missing", GREY)):

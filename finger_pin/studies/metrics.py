@@ -6,6 +6,7 @@ samples.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, SelfLockingWarning
 from finger_pin.finger import Finger
 from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
@@ -39,7 +40,10 @@ class Run:
     @cached_property
     def result(self) -> xr.Dataset:
         """What `simulate` returns."""
-        return simulate(self.scenario)
+        with warnings.catch_warnings():
+            # Studies look at many designs, and at the margin by its metric.
+            warnings.simplefilter("ignore", SelfLockingWarning)
+            return simulate(self.scenario)
 
 
 @dataclass(frozen=True)
