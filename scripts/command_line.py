@@ -80,6 +80,21 @@ def shorthand(key: str) -> Callable[[str], tuple[str, Any]]:
     return parse_value
 
 
+def read_study(parser: Parser, arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Add what all studies of many runs take, and parse a command line, or exit."""
+    add, flag = parser.add_argument, argparse.BooleanOptionalAction
+    add("--set", action="append", default=[], type=override, metavar="KEY=VALUE", help="override an entry; repeatable")
+    add("--workers", type=int, metavar="N", help="processes; default one per core")
+    add("--scheduler", metavar="ADDRESS", help="run on the Dask cluster of this scheduler, such as tcp://host:8786")
+    add("--restart", action="store_true", help="drop what the folder holds of a study, and begin anew")
+    add("--figures", action=flag, default=True, help="draw the figure")
+    add("--quiet", action="store_true", help="print errors only")
+    options = parser.read(arguments)
+    if options.scheduler is not None and options.workers is not None:
+        parser.error("--workers: are local; those of a scheduler are its own")
+    return options
+
+
 def tell_compilation() -> None:
     """Say that the first run ever takes its time."""
     from finger_pin.core.compilation import is_cached

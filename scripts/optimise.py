@@ -19,7 +19,7 @@ from command_line import (
     WRONG_INPUT,
     Parser,
     complain,
-    override,
+    read_study,
     tell_compilation,
 )
 
@@ -55,7 +55,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Parse a command line, or exit."""
     plain = argparse.RawDescriptionHelpFormatter
     parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False, epilog=EXAMPLE, formatter_class=plain)
-    add, flag = parser.add_argument, argparse.BooleanOptionalAction
+    add = parser.add_argument
     add("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path of a .toml file; default fig6")
     over = "range of a key, LOW:HIGH or LOW:HIGH:log; keys that go together are KEY,KEY2,-KEY3; repeatable"
     add("--over", action="append", default=[], metavar="KEY=RANGE", help=f"{over}; default the finger's radii")
@@ -67,18 +67,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--population", type=int, metavar="N", help="designs of a generation; default 24")
     add("--generations", type=int, metavar="N", help="default 20")
     add("--seed", type=int, metavar="S", help="of the search; default 0")
-    add("--set", action="append", default=[], type=override, metavar="KEY=VALUE", help="override an entry; repeatable")
     add("--output", type=Path, metavar="DIR", help="where results go; default results/optimise-<scenario>")
-    add("--workers", type=int, metavar="N", help="processes; default one per core")
-    add("--scheduler", metavar="ADDRESS", help="run on the Dask cluster of this scheduler, such as tcp://host:8786")
-    add("--restart", action="store_true", help="drop what the folder holds of a study, and begin anew")
-    add("--figures", action=flag, default=True, help="draw the figure")
-    add("--quiet", action="store_true", help="print errors only")
-    options = parser.read(arguments)
+    options = read_study(parser, arguments)
     if options.no_constraints and options.constraint:
         parser.error("--no-constraints: contradicts --constraint")
-    if options.scheduler is not None and options.workers is not None:
-        parser.error("--workers: are local; those of a scheduler are its own")
     return options
 
 

@@ -16,7 +16,7 @@ from command_line import (
     WRONG_INPUT,
     Parser,
     complain,
-    override,
+    read_study,
     tell_compilation,
 )
 
@@ -55,7 +55,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Parse a command line, or exit."""
     plain = argparse.RawDescriptionHelpFormatter
     parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False, epilog=EXAMPLE, formatter_class=plain)
-    add, flag = parser.add_argument, argparse.BooleanOptionalAction
+    add = parser.add_argument
     add("scenario", nargs="?", default="fig6", metavar="SCENARIO", help="name or path of a .toml file; default fig6")
     over = "values of a key: START:STOP:N, START:STOP:N:log or A,B,C; for a latin design LOW:HIGH or LOW:HIGH:log"
     add("--over", action="append", default=[], metavar="KEY=VALUES", help=f"{over}; repeatable")
@@ -64,24 +64,16 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--design", choices=("grid", "list", "latin"), default="grid", help=f"{design}; default grid")
     add("--samples", type=int, metavar="N", help="points of a latin design")
     add("--seed", type=int, metavar="S", help="of a latin design; default 0")
-    add("--set", action="append", default=[], type=override, metavar="KEY=VALUE", help="override an entry; repeatable")
     add("--output", type=Path, metavar="DIR", help="where results go; default results/sweep-<scenario>")
-    add("--workers", type=int, metavar="N", help="processes; default one per core")
-    add("--scheduler", metavar="ADDRESS", help="run on the Dask cluster of this scheduler, such as tcp://host:8786")
-    add("--restart", action="store_true", help="drop what the folder holds of a study, and begin anew")
     add("--retry-failed", action="store_true", help="repeat runs that failed before")
-    add("--figures", action=flag, default=True, help="draw the figure")
-    add("--quiet", action="store_true", help="print errors only")
     add("--list", action="store_true", help="list metrics, and exit")
-    options = parser.read(arguments)
+    options = read_study(parser, arguments)
     if not options.list and not options.over:
         parser.error("--over: at least one key is needed, such as --over controller.gain=0.5:2:7")
     if (options.samples is None) == (options.design == "latin"):
         parser.error("--samples: is needed by --design latin, and by no other")
     if options.seed is not None and options.design != "latin":
         parser.error("--seed: is for --design latin")
-    if options.scheduler is not None and options.workers is not None:
-        parser.error("--workers: are local; those of a scheduler are its own")
     return options
 
 

@@ -21,16 +21,6 @@ from finger_pin.integration import integrate
 from finger_pin.routing import Array
 from finger_pin.scenario import Scenario
 
-#: Overrides that take away what MuJoCo cannot express: with mu_e = 0 and such soft bristles stiction stays below
-#: 1e-8 N, and a limiter of stiffness zero exerts nothing.
-FRICTIONLESS = {
-    "finger.tendon_friction.coulomb": 0.0,
-    "finger.tendon_friction.stiffness": 1e-9,
-    "finger.joint_friction.coulomb": 0.0,
-    "finger.joint_friction.stiction": 0.0,
-    "finger.joint_friction.stiffness": 1e-9,
-    "finger.stroke_limiter.stiffness": 0.0,
-}
 TEXTBOOK = ("BDF", "LSODA", "Radau")
 SUNDIALS = "CVODE, compiled"
 #: Integrates; returns joint positions at the sample times, shape (m, n), rad, and statistics if there are any.
