@@ -51,7 +51,7 @@ class DaskCluster:
         try:
             import distributed
         except ImportError:
-            what = "needs Dask: pip install 'finger-pin[dask]'"
+            what = "needs Dask: python -m pip install distributed"
             raise InputError("scheduler", what, self.address) from None
         try:
             client = distributed.Client(self.address, timeout=self.timeout, set_as_default=False)

@@ -44,7 +44,7 @@ class Search:
             from pymoo.algorithms.moo.nsga2 import NSGA2
             from pymoo.core.problem import Problem
         except ImportError:
-            raise InputError("optimise", "needs pymoo: pip install 'finger-pin[optimise]'") from None
+            raise InputError("optimise", "needs pymoo: python -m pip install pymoo") from None
         first = qmc.LatinHypercube(size, rng=np.random.default_rng(seed)).random(population)
         if start is not None:
             first[0] = start
