@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain, override
+from rich import box
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -25,7 +26,15 @@ PROGRAM = "reaction.py"
 FORCE = "environment.fingertip_force"
 AS_IT_IS = "as it is"
 TEXTS = ("fingertip force", "joint")
-PARTS = ("direction", "weight", "inertia", "static", "full", "other_groove")
+# What of the difference is told, and in which words.
+PARTS = {
+    "direction": "tendons' direction",
+    "weight": "weight",
+    "inertia": "inertia",
+    "static": "quasi-static, all",
+    "full": "with inertia, all",
+    "other_groove": "grooves proximal",
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -121,30 +130,33 @@ def write_csv(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 def show(rows: list[dict[str, Any]]) -> None:
-    """Print differences without further forces, and the worst of all forces: the mean and behind it the largest."""
-    table = Table(title="What (17) misses, % of its mean: mean (largest)", title_justify="left")
-    heads = ("direction", "weight", "inertia", "static", "full", "other grooves", "friction, mN m", "motion, deg")
-    for head in ("fingertip force", "joint", "(17), N", *heads):
-        table.add_column(head, justify="right" if head in heads else "left")
+    """Print differences without further forces, and the worst of all forces."""
     given = [row for row in rows if row["fingertip force"] == AS_IT_IS]
-    for row in given:
-        add_row(table, row, row["fingertip force"] if row is given[0] else "")
-    table.add_section()
+    print("What (17) misses at each joint, % of its mean: mean (largest)")
+    Console().print(table("as it is", given))
     further = [[row for row in rows if row["joint"] == each["joint"] and row not in given] for each in given]
-    for each, same in zip(given, further, strict=True):
-        if same:
-            worst = {key: max((row[key] for row in same), key=abs) for key in each if key not in TEXTS}
-            count = f"worst of {len(same)}"
-            add_row(table, worst | {"joint": each["joint"]}, count if each is given[0] else "")
-    (Console() if sys.stdout.isatty() else Console(width=150)).print(table)
+    if all(further):
+        worst = [
+            {key: max((row[key] for row in same), key=abs) for key in same[0] if key not in TEXTS}
+            | {"joint": same[0]["joint"]}
+            for same in further
+        ]
+        Console().print(table(f"worst of {len(further[0])} forces", worst))
 
 
-def add_row(table: Table, row: dict[str, Any], label: str) -> None:
-    """Add a joint to the printed table."""
-    shares = (f"{row[f'{part} mean, %']:.1f} ({row[f'{part} max, %']:.1f})" for part in PARTS)
-    friction = f"{row['friction mean, mN m']:.2f} ({row['friction max, mN m']:.2f})"
-    motion = f"{row['motion rms, deg']:.3f}"
-    table.add_row(label, row["joint"], f"{row['mean (17), N']:.1f}", *shares, friction, motion)
+def table(title: str, joints: list[dict[str, Any]]) -> Table:
+    """Return the table that is printed, a column per joint."""
+    found = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    found.add_column(title)
+    for row in joints:
+        found.add_column(row["joint"], justify="right")
+    found.add_row("mean of (17), N", *(f"{row['mean (17), N']:.1f}" for row in joints))
+    for part, text in PARTS.items():
+        found.add_row(text, *(f"{row[f'{part} mean, %']:.1f} ({row[f'{part} max, %']:.1f})" for row in joints))
+    shares = (f"{row['friction mean, mN m']:.2f} ({row['friction max, mN m']:.2f})" for row in joints)
+    found.add_row("friction, mN m", *shares)
+    found.add_row("motion, deg rms", *(f"{row['motion rms, deg']:.3f}" for row in joints))
+    return found
 
 
 if __name__ == "__main__":

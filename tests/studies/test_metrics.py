@@ -103,3 +103,13 @@ def test_metrics_are_chosen_by_name_and_a_misspelt_one_is_told_the_nearest():
     for names in ([], ["losses", "losses"]):
         with pytest.raises(fp.InputError):
             choose(names)
+
+
+def test_a_design_beyond_self_locking_is_measured_without_a_warning():
+    """The tests make an error of every warning, so `simulate` alone stops there."""
+    friction = {"finger.joint_friction.coulomb": 6e-3, "finger.joint_friction.stiction": 8e-3}
+    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.02} | friction)
+    with pytest.raises(fp.SelfLockingWarning):
+        fp.simulate(scenario)
+    assert METRICS["self_locking_margin"].measure(Run(scenario)) < 1.0
+    assert METRICS["tension_peak"].measure(Run(scenario)) > 0.0
