@@ -12,6 +12,8 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.exceptions import toml_like
 from finger_pin.validation import (
+    IN_RADIANS,
+    MOST_ANGLE,
     Description,
     Name,
     Numbers,
@@ -33,7 +35,7 @@ class Link(Description):
     length: Annotated[float, real(0.0, 2.0, above=True, hint=_MILLIMETRES)] = quantity(
         ..., unit="m", source="Table I", doc="a, distance from this joint's axis to the next along x."
     )
-    twist: Annotated[float, real(-math.pi, math.pi)] = quantity(
+    twist: Annotated[float, real(-math.pi, math.pi, hint=IN_RADIANS)] = quantity(
         0.0, unit="rad", source="Table I", doc="alpha, rotation about x from this joint's axis to the next."
     )
     section: Annotated[Literal["round", "square"], choice("round", "square")] = quantity(
@@ -86,7 +88,7 @@ class Link(Description):
 class Joint(Description):
     """A joint, its range (2) and, for a finger that is built here, the link that it carries."""
 
-    range: Annotated[tuple[float, float], vector(2, -1e3, 1e3)] = quantity(
+    range: Annotated[tuple[float, float], vector(2, -MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] = quantity(
         ..., unit="rad", source="(2)", doc="Lower and upper limit that the stroke limiter guards."
     )
     link: Link | None = Field(None, description="The link that this joint moves; none on a foreign model.")

@@ -15,6 +15,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.parameters import FingerDescription
 from finger_pin.routing import Array, Routing
 from finger_pin.validation import (
+    IN_RADIANS,
+    MOST_ANGLE,
     Description,
     Name,
     choice,
@@ -32,11 +34,14 @@ MOST_SAMPLES = 5_000_000
 LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
 
 
+_ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
+
+
 class JointReference(Description):
     """theta^d = offset + amplitude sin(2 pi frequency t + phase)."""
 
-    offset: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
-    amplitude: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
+    offset: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
     frequency: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="Hz", source="chosen", doc="Of the sinusoid.")
     phase: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="chosen", doc="At t = 0.")
 

@@ -20,6 +20,9 @@ from pydantic_core import PydanticCustomError
 from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
+#: The largest angle of a joint, rad: two turns. In degrees nearly every angle is beyond it.
+MOST_ANGLE = 12.5
+IN_RADIANS = " rad (is it in degrees?)"
 Numbers = float | tuple[float, ...]
 _Model = TypeVar("_Model", bound="Description")
 
@@ -87,9 +90,9 @@ def reals(
     return BeforeValidator(validate)
 
 
-def vector(size: int, low: float = -math.inf, high: float = math.inf) -> BeforeValidator:
+def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str = "") -> BeforeValidator:
     """Return a validator for a list of ``size`` finite numbers in [low, high]."""
-    check = _checker(low, high, False, "")
+    check = _checker(low, high, False, hint)
 
     def validate(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or len(value) != size:
@@ -247,7 +250,9 @@ def _checker(low: float, high: float, above: bool, hint: str, whole: bool = Fals
         if not math.isfinite(number):
             raise problem(where, "must be a finite number", value)
         if number < low or (above and number == low):
-            raise problem(where, f"must be {'above' if above else 'at least'} {low:g}", value)
+            # A limit at zero is about the sign, not about the unit.
+            unit = hint if low < 0.0 else ""
+            raise problem(where, f"must be {'above' if above else 'at least'} {low:g}{unit}", value)
         if number > high:
             raise problem(where, f"must be at most {high:g}{hint}", value)
         if whole and number != int(number):
