@@ -42,7 +42,7 @@ def make(joints: Mapping[str, float], tendons: Mapping[str, Mapping[str, float]]
         "name": "planar",
         "gravity": [0.0, -9.81, 0.0],
         "joints": {
-            name: {"range": [-50.0, 50.0], "link": {"length": length, "width": WIDTH, "mass": MASS}}
+            name: {"range": [-12.0, 12.0], "link": {"length": length, "width": WIDTH, "mass": MASS}}
             for name, length in joints.items()
         },
         "tendons": {
