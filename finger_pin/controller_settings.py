@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from finger_pin.parameters import FingerDescription
-from finger_pin.validation import Description, Numbers, check_size, choice, problem, quantity, real, reals
+from finger_pin.validation import Description, Numbers, check_size, choice, expand, problem, quantity, real, reals
 
 Share = Annotated[float, real(0.0, 2.0)]
 
@@ -150,14 +150,13 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
             check_size(value, names, f"controller.{entry}", what)
     if limits is not None:
         for name, low, high in zip(
-            tendons, _each(settings.minimum_tension, tendons), _each(limits.maximum_tension, tendons), strict=True
+            tendons,
+            expand(settings.minimum_tension, len(tendons)),
+            expand(limits.maximum_tension, len(tendons)),
+            strict=True,
         ):
             if high < low:
                 allowed = f"must be at least the minimum tension, {low:g} N for {name}"
                 raise problem("controller.distribution.maximum_tension", allowed, limits.maximum_tension)
     if settings.passive_tension_loop is not None and not finger.passive_names:
         raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")
-
-
-def _each(value: Numbers, names: tuple[str, ...]) -> tuple[float, ...]:
-    return value if isinstance(value, tuple) else (value,) * len(names)

@@ -109,6 +109,16 @@ class Routing:
         """Report whether tensions exist that are all positive and turn no joint."""
         return ForceClosure.of(self.coupling, self.tendons)
 
+    def curvature(self, position: Array) -> Array:
+        """Return phi(theta) of (15), shape (..., t), rad, at joint positions of shape (..., n)."""
+        curvature: Array = np.abs(position) @ self.curvature_matrix.T + self.curvature_offset
+        return curvature
+
+    def strand_tension(self, tension: Array) -> Array:
+        """Return the tensions of all strands, shape (..., s): both halves of a passive tendon have its own."""
+        halves = np.repeat(tension[..., self.actuated :], 2, axis=-1)
+        return np.concatenate([tension[..., : self.actuated], halves], axis=-1)
+
     def tendon_tension(self, strands: Array) -> Array:
         """Return the delivered tension of every tendon, shape (..., t), of strands (..., s): a passive one's distal."""
         distal = strands[..., self.actuated + 1 :: 2]

@@ -60,12 +60,16 @@ class FrictionLoop:
         command: f_hat = command[i] @ tau where tendon i attains the maximum of (22), shape (t, t, n).
         levels: -P_i / k_i, shape (t, n); the maximum of (22) is that of levels @ tau.
         passive: Mean tension of the passive tendons over tau when taut, shape (t, p, n).
+        inverse: P, shape (t, n), 1/m.
+        internal: k, shape (t,).
         tendons: The tendon layer.
     """
 
     command: Array
     levels: Array
     passive: Array
+    inverse: Array
+    internal: Array
     tendons: Tendons
 
     @classmethod
@@ -83,7 +87,7 @@ class FrictionLoop:
         closure = routing.force_closure()
         if not closure.holds:
             raise InputError("finger.tendons", f"{closure}; self-locking is a matter of fingers that can be taut")
-        inverse = np.linalg.pinv(routing.coupling.T)
+        inverse = np.asarray(np.linalg.pinv(routing.coupling.T))
         levels = -inverse / closure.tension[:, None]
         command = inverse + closure.tension[None, :, None] * levels[:, None, :]
         if gain is None:
@@ -91,7 +95,7 @@ class FrictionLoop:
         else:
             elastic = 0.5 * tendons.half_stiffness[:, None] * routing.coupling[routing.actuated :] / gain
             passive = np.broadcast_to(elastic, (len(levels), *elastic.shape))
-        return cls(command, levels, passive, tendons)
+        return cls(command, levels, passive, inverse, closure.tension, tendons)
 
     def critical(self, position: Array, weights: Array, sliding: Array) -> tuple[Array, Array, Array]:
         """Return kappa_crit and its eigenvectors for m cases at once.
@@ -162,13 +166,12 @@ class FrictionLoop:
             sliding: sigma, shape (m, t).
         """
         routing, scale = self.tendons.routing, self._shares(position, sliding)
-        inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
+        inverse, internal = self.inverse, self.internal
         tension = np.broadcast_to(internal, (len(position), len(internal)))
         growth = np.zeros(len(position))
         torque = np.zeros_like(weights)
         for _ in range(_TURNS):
-            halves = np.repeat(tension[:, routing.actuated :], 2, axis=1)
-            strands = scale * np.concatenate([tension[:, : routing.actuated], halves], axis=1)
+            strands = scale * routing.strand_tension(tension)
             torque = torque + weights * (strands @ routing.loads.T) - strands @ routing.strand_coupling
             size = np.maximum(np.max(np.abs(torque), axis=1, keepdims=True), np.finfo(float).tiny)
             growth, torque = size[:, 0], torque / size
@@ -190,15 +193,14 @@ class FrictionLoop:
             weight: G, shape (m, n), N m.
         """
         routing, scale = self.tendons.routing, self._shares(position, sliding)
-        inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
+        inverse, internal = self.inverse, self.internal
         torque, command = np.array(weight), np.full((len(position), len(internal)), np.inf)
         going = np.arange(len(position))
         for _ in range(_ITERATIONS):
             minimal = torque[going] @ inverse.T
             level = np.max((minimum - minimal) / internal, axis=1, keepdims=True)
             tension = minimal + level * internal
-            halves = np.repeat(tension[:, routing.actuated :], 2, axis=1)
-            strands = scale[going] * np.concatenate([tension[:, : routing.actuated], halves], axis=1)
+            strands = scale[going] * routing.strand_tension(tension)
             residual = strands @ routing.strand_coupling - weights[going] * (strands @ routing.loads.T)
             residual -= weight[going]
             span = np.max(np.abs(tension), axis=1)
@@ -215,8 +217,7 @@ class FrictionLoop:
     def _shares(self, position: Array, sliding: Array) -> Array:
         """Return the tension of every strand over the command or the mean tension of its tendon, shape (m, s)."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
-        curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
-        friction = sliding * capstan_coefficient(self.tendons.surface, curvature)
+        friction = sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position))
         share = (1.0 - friction[:, :actuated]) / (1.0 + friction[:, :actuated])
         pairs = np.stack([1.0 + friction[:, actuated:], 1.0 - friction[:, actuated:]], axis=-1)
         return np.concatenate([share, pairs.reshape(len(position), -1)], axis=1)

@@ -74,8 +74,7 @@ class TipStatics:
         """Collect the constraints; ``slide`` and ``signs`` serve HINDERING alone."""
         routing, tendons = finger.routing, finger.tendons
         a, (s, n) = routing.actuated, routing.strand_coupling.shape
-        curvature = np.abs(theta) @ routing.curvature_matrix.T + routing.curvature_offset
-        loss = np.exp(-tendons.surface * curvature)
+        loss = np.exp(-tendons.surface * routing.curvature(theta))
         command, strand, joint = np.split(np.eye(a + s + n), [a, a + s])
         direct, proximal, distal = strand[:a], strand[a::2], strand[a + 1 :: 2]
         reaction = finger.joint_friction.kinetic[:, None] * (routing.loads @ strand)

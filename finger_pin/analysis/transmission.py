@@ -76,7 +76,7 @@ def transmission_efficiency(finger: Finger, position: Array) -> TransmissionEffi
     """
     tendons = finger.tendons
     routing = tendons.routing
-    curvature = np.abs(np.asarray(position, dtype=float)) @ routing.curvature_matrix.T + routing.curvature_offset
+    curvature = routing.curvature(np.asarray(position, dtype=float))
     kinetic = capstan_coefficient(tendons.surface, curvature)
     # rho mu^d above 1 leaves nothing to deliver: the tendon does not move.
     static = np.minimum(tendons.stiction_ratio * kinetic, 1.0)
@@ -97,8 +97,8 @@ def coupling_in_motion(tendons: Tendons, position: Array, velocity: Array) -> Ar
         velocity: theta', shape (n,), rad/s; signs and ratios matter.
     """
     routing, actuated = tendons.routing, tendons.routing.actuated
-    curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
-    loss = np.sign(sliding_velocity(tendons, velocity)) * capstan_coefficient(tendons.surface, curvature)
+    kinetic = capstan_coefficient(tendons.surface, routing.curvature(position))
+    loss = np.sign(sliding_velocity(tendons, velocity)) * kinetic
     share = ((1.0 - loss) / (1.0 + loss))[:actuated, None]
     part = loss[actuated:, None]
     passive = (1.0 + part) * routing.proximal_coupling + (1.0 - part) * routing.distal_coupling

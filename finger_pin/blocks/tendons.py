@@ -162,7 +162,7 @@ class Tendons:
             command: f^a, shape (..., a), N.
         """
         routing, actuated = self.routing, self.routing.actuated
-        curvature = np.abs(position) @ routing.curvature_matrix.T + routing.curvature_offset
+        curvature = routing.curvature(position)
         coefficient = capstan_coefficient(self.surface, curvature)
         sliding = np.concatenate([velocity @ routing.actuated_coupling.T, passive_velocity], axis=-1)
         settled = friction.friction_force(stiction, sliding, self.viscous)[..., :actuated]

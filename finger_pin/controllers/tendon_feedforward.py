@@ -16,8 +16,7 @@ _MOST = 0.9
 
 def undivided(routing: Routing) -> Array:
     """Return W, shape (s, t), without friction: both halves of a passive tendon carry what is planned for it."""
-    tendons = np.eye(len(routing.tendons))
-    return np.concatenate([tendons[: routing.actuated], np.repeat(tendons[routing.actuated :], 2, axis=0)])
+    return routing.strand_tension(np.eye(len(routing.tendons))).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +44,7 @@ class TendonFeedforward:
     def coefficient(self, position: Array, desired_velocity: Array) -> Array:
         """Return x of every tendon, shape (..., t), for motion of shape (..., n)."""
         tendons = self.tendons
-        curvature = np.abs(position) @ tendons.routing.curvature_matrix.T + tendons.routing.curvature_offset
-        kinetic = capstan_coefficient(tendons.surface, curvature)
+        kinetic = capstan_coefficient(tendons.surface, tendons.routing.curvature(position))
         static = tendons.stiction_ratio * kinetic
         velocity = self._velocity(desired_velocity)
         signed = signed_coefficient(
