@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, NoReturn
 
 DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -106,3 +107,14 @@ def tell_compilation() -> None:
 def complain(program: str, message: str) -> None:
     """Print one line on standard error."""
     print(f"{program}:", "".join(c if c.isprintable() else repr(c)[1:-1] for c in message), file=sys.stderr)
+
+
+def told(program: str, error: Exception, output: Path) -> int:
+    """Tell in one line what stopped a script whose results go to a folder; return the exit code."""
+    from finger_pin.exceptions import InputError
+
+    if isinstance(error, OSError):
+        complain(program, f"--output = {output}: cannot be written: {error.strerror or error}")
+        return NOT_WRITTEN
+    complain(program, str(error))
+    return WRONG_INPUT if isinstance(error, InputError) else FAILED

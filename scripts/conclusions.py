@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain
+from command_line import DONE, INTERRUPTED, Parser, complain, told
 
 if TYPE_CHECKING:
     from finger_pin.experiments import Finding
@@ -73,15 +73,8 @@ def run(name: str, parts: str, output: Path, quiet: bool) -> int:
                 # As soon as it is there: who interrupts keeps it.
                 save_figure(each.draw(found), output / each.figure)
                 write_findings(findings, output / "conclusions.csv")
-    except InputError as error:
-        complain(PROGRAM, str(error))
-        return WRONG_INPUT
-    except IntegrationError as error:
-        complain(PROGRAM, str(error))
-        return FAILED
-    except OSError as error:
-        complain(PROGRAM, f"--output = {output}: cannot be written: {error.strerror or error}")
-        return NOT_WRITTEN
+    except (InputError, IntegrationError, OSError) as error:
+        return told(PROGRAM, error, output)
     if not quiet:
         print_text(f"{findings_table(findings)}\nFigures and table are in {output}")
     return DONE

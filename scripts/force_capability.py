@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from command_line import DONE, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain, number, positive
+from command_line import DONE, INTERRUPTED, Parser, complain, number, positive, told
 
 PROGRAM = "force_capability.py"
 
@@ -53,12 +53,8 @@ def run(options: argparse.Namespace) -> int:
         }
         for name, figure in figures.items():
             save_figure(figure, options.output / f"{name}.png")
-    except fp.InputError as error:
-        complain(PROGRAM, str(error))
-        return WRONG_INPUT
-    except OSError as error:
-        complain(PROGRAM, f"--output = {options.output}: cannot be written: {error.strerror or error}")
-        return NOT_WRITTEN
+    except (fp.InputError, OSError) as error:
+        return told(PROGRAM, error, options.output)
     lines = [f"Largest tension for a force of {np.linalg.norm(options.force):g} N, N"]
     lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
     print_text("\n".join([*lines, f"Figures are in {options.output}"]))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from command_line import DONE, FAILED, INTERRUPTED, NOT_WRITTEN, WRONG_INPUT, Parser, complain
+from command_line import DONE, INTERRUPTED, Parser, complain, told
 
 if TYPE_CHECKING:
     import finger_pin as fp
@@ -62,15 +62,8 @@ def run(name: str, output: Path) -> int:
             figures["runs"] = plot_runaway(runs)
         for title, figure in figures.items():
             save_figure(figure, output / f"{title}.png")
-    except fp.InputError as error:
-        complain(PROGRAM, str(error))
-        return WRONG_INPUT
-    except fp.IntegrationError as error:
-        complain(PROGRAM, str(error))
-        return FAILED
-    except OSError as error:
-        complain(PROGRAM, f"--output = {output}: cannot be written: {error.strerror or error}")
-        return NOT_WRITTEN
+    except (fp.InputError, fp.IntegrationError, OSError) as error:
+        return told(PROGRAM, error, output)
     print_text("\n".join([*lines, f"Figures are in {output}"]))
     return DONE
 
