@@ -8,10 +8,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from finger_pin.description.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, SelfLockingWarning
-from finger_pin.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
-from finger_pin.parameters import FingerDescription
-from finger_pin.scenario import Scenario
 
 if TYPE_CHECKING:
     from finger_pin.analysis import (
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         self_locking_margin,
         tension_for_force,
     )
-    from finger_pin.controllers import (
+    from finger_pin.control import (
         CompensatedController,
         JointCompensation,
         PassiveTensionLoop,
@@ -31,12 +31,28 @@ if TYPE_CHECKING:
         TorqueLaw,
         build_controller,
     )
-    from finger_pin.controllers.limited_distribution import LimitedDistribution
-    from finger_pin.convergence import Convergence, check_convergence
-    from finger_pin.finger import Finger
-    from finger_pin.many import simulate_many
-    from finger_pin.mjcf import to_mjcf
-    from finger_pin.plots import (
+    from finger_pin.control.limited_distribution import LimitedDistribution
+    from finger_pin.mechanism.finger import Finger
+    from finger_pin.mechanism.mjcf import to_mjcf
+    from finger_pin.simulation.convergence import Convergence, check_convergence
+    from finger_pin.simulation.recording import load_result, save
+    from finger_pin.simulation.simulate import simulate
+    from finger_pin.simulation.simulator import Simulator
+    from finger_pin.studies import (
+        DaskCluster,
+        Effort,
+        Grid,
+        LatinHypercube,
+        Listing,
+        LocalProcesses,
+        Metric,
+        Range,
+        Variable,
+        optimise,
+        sweep,
+    )
+    from finger_pin.studies.many import simulate_many
+    from finger_pin.views.plots import (
         draw_all,
         plot_convergence,
         plot_critical_friction,
@@ -52,78 +68,62 @@ if TYPE_CHECKING:
         plot_sweep,
         plot_workspace,
     )
-    from finger_pin.recording import load_result, save
-    from finger_pin.simulation import simulate
-    from finger_pin.simulator import Simulator
-    from finger_pin.studies import (
-        DaskCluster,
-        Effort,
-        Grid,
-        LatinHypercube,
-        Listing,
-        LocalProcesses,
-        Metric,
-        Range,
-        Variable,
-        optimise,
-        sweep,
-    )
-    from finger_pin.viewer import LiveView, view, view_forces, write_animation
+    from finger_pin.views.viewer import LiveView, view, view_forces, write_animation
 
 # What needs Pinocchio, the compiler or matplotlib is imported when it is first asked for.
 _LATER = {
-    "CompensatedController": "controllers",
-    "Convergence": "convergence",
+    "CompensatedController": "control",
+    "Convergence": "simulation.convergence",
     "DaskCluster": "studies",
     "Effort": "studies",
-    "Finger": "finger",
+    "Finger": "mechanism.finger",
     "Grid": "studies",
-    "JointCompensation": "controllers",
+    "JointCompensation": "control",
     "LatinHypercube": "studies",
-    "LimitedDistribution": "controllers.limited_distribution",
+    "LimitedDistribution": "control.limited_distribution",
     "Listing": "studies",
-    "LiveView": "viewer",
+    "LiveView": "views.viewer",
     "LocalProcesses": "studies",
     "Metric": "studies",
-    "PassiveTensionLoop": "controllers",
-    "PseudoInverse": "controllers",
+    "PassiveTensionLoop": "control",
+    "PseudoInverse": "control",
     "Range": "studies",
-    "Simulator": "simulator",
-    "TendonFeedforward": "controllers",
-    "TorqueLaw": "controllers",
+    "Simulator": "simulation.simulator",
+    "TendonFeedforward": "control",
+    "TorqueLaw": "control",
     "Variable": "studies",
-    "build_controller": "controllers",
-    "check_convergence": "convergence",
+    "build_controller": "control",
+    "check_convergence": "simulation.convergence",
     "critical_friction": "analysis",
-    "draw_all": "plots",
+    "draw_all": "views.plots",
     "force_polytope": "analysis",
     "largest_force": "analysis",
-    "load_result": "recording",
+    "load_result": "simulation.recording",
     "optimise": "studies",
-    "plot_convergence": "plots",
-    "plot_critical_friction": "plots",
-    "plot_energy": "plots",
-    "plot_fig6": "plots",
-    "plot_force_polytope": "plots",
-    "plot_friction_law": "plots",
-    "plot_losses": "plots",
-    "plot_pareto": "plots",
-    "plot_radius_sensitivity": "plots",
-    "plot_runaway": "plots",
-    "plot_self_locking_map": "plots",
-    "plot_sweep": "plots",
-    "plot_workspace": "plots",
-    "save": "recording",
+    "plot_convergence": "views.plots",
+    "plot_critical_friction": "views.plots",
+    "plot_energy": "views.plots",
+    "plot_fig6": "views.plots",
+    "plot_force_polytope": "views.plots",
+    "plot_friction_law": "views.plots",
+    "plot_losses": "views.plots",
+    "plot_pareto": "views.plots",
+    "plot_radius_sensitivity": "views.plots",
+    "plot_runaway": "views.plots",
+    "plot_self_locking_map": "views.plots",
+    "plot_sweep": "views.plots",
+    "plot_workspace": "views.plots",
+    "save": "simulation.recording",
     "self_locking_map": "analysis",
     "self_locking_margin": "analysis",
-    "simulate": "simulation",
-    "simulate_many": "many",
+    "simulate": "simulation.simulate",
+    "simulate_many": "studies.many",
     "sweep": "studies",
     "tension_for_force": "analysis",
-    "to_mjcf": "mjcf",
-    "view": "viewer",
-    "view_forces": "viewer",
-    "write_animation": "viewer",
+    "to_mjcf": "mechanism.mjcf",
+    "view": "views.viewer",
+    "view_forces": "views.viewer",
+    "write_animation": "views.viewer",
 }
 
 __all__ = [

@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as error:
         complain(PROGRAM, f"{options.output}: cannot be written: {error.strerror or error}")
         return NOT_WRITTEN
-    from finger_pin.console import print_text
+    from finger_pin.commands.console import print_text
 
     print_text(f"{lines}\n\nResults are in {options.output}")
     return DONE
@@ -121,7 +121,7 @@ def draw(stages: dict[str, Any], folder: Path) -> None:
     """Write the figures of the stages that have some."""
     from benchmarks import report
 
-    from finger_pin.plots import save_figure
+    from finger_pin.views.plots import save_figure
 
     if stages.get("work-precision"):
         save_figure(report.plot_work_precision(stages["work-precision"]), folder / "work_precision.png")

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from command_line import DONE, INTERRUPTED, Parser, complain, told
 
 if TYPE_CHECKING:
-    from finger_pin.experiments import Finding
-    from finger_pin.scenario import Scenario
+    from finger_pin.description.scenario import Scenario
+    from finger_pin.studies.conclusions import Finding
 
 PROGRAM = "conclusions.py"
 PARTS = {
@@ -53,11 +53,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run(name: str, parts: str, output: Path, quiet: bool) -> int:
     """Run the experiments, write, show; return the exit code."""
-    from finger_pin.console import count_bar, print_text
+    from finger_pin.commands.console import count_bar, print_text
+    from finger_pin.description.loading import load_scenario
     from finger_pin.exceptions import InputError, IntegrationError
-    from finger_pin.experiments import findings_table, write_findings
-    from finger_pin.loading import load_scenario
-    from finger_pin.plots import save_figure
+    from finger_pin.studies.conclusions import findings_table, write_findings
+    from finger_pin.views.plots import save_figure
 
     try:
         scenario = load_scenario(name)
@@ -82,8 +82,8 @@ def run(name: str, parts: str, output: Path, quiet: bool) -> int:
 
 def experiments(chosen: str) -> list[Experiment]:
     """Return what measures, judges and draws the chosen conclusions."""
-    from finger_pin import experiments as e
-    from finger_pin import plots as p
+    from finger_pin.studies import conclusions as e
+    from finger_pin.views import plots as p
 
     table = {
         "a": Experiment(

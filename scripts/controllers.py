@@ -13,14 +13,14 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from finger_pin.comparison import CASES, Comparison, compare, to_csv
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.routing import Routing
 from finger_pin.exceptions import IntegrationError
 from finger_pin.files import replacing
-from finger_pin.loading import load_scenario
-from finger_pin.plots import save_figure
-from finger_pin.plots.controllers import plot_controllers
-from finger_pin.routing import Routing
-from finger_pin.simulation import simulate
+from finger_pin.simulation.simulate import simulate
+from finger_pin.studies.comparison import CASES, Comparison, compare, to_csv
+from finger_pin.views.plots import save_figure
+from finger_pin.views.plots.controllers import plot_controllers
 
 PROGRAM = "controllers.py"
 WIDTH = 100

@@ -33,8 +33,8 @@ def run(options: argparse.Namespace) -> int:
     """Report, draw and show; return the exit code."""
     import finger_pin as fp
     from finger_pin.analysis import Friction
-    from finger_pin.console import print_text
-    from finger_pin.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
+    from finger_pin.commands.console import print_text
+    from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
 
     try:
         finger = fp.Finger(fp.load_finger(options.finger))

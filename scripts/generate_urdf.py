@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from finger_pin.description import to_urdf
-from finger_pin.loading import list_fingers, load_finger
+from finger_pin.description.loading import list_fingers, load_finger
+from finger_pin.mechanism.urdf import to_urdf
 
 FOLDER = Path(__file__).resolve().parents[1] / "urdf"
 

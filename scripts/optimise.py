@@ -26,7 +26,7 @@ from command_line import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.console import Interrupts
+    from finger_pin.commands.console import Interrupts
 
 PROGRAM = "optimise.py"
 EXAMPLE = """examples:
@@ -42,7 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Do what a command line says; return the exit code."""
     options = parse(arguments)
     try:
-        from finger_pin.console import Interrupts
+        from finger_pin.commands.console import Interrupts
 
         with Interrupts() as interrupts:
             return run(options, interrupts)
@@ -76,9 +76,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Search, draw, tell what came out; return the exit code."""
-    from finger_pin.console import print_text, runs_bar
+    from finger_pin.commands.console import print_text, runs_bar
     from finger_pin.exceptions import FingerPinError, InputError
-    from finger_pin.plots import plot_pareto, save_figure
     from finger_pin.studies import (
         DEFAULT_CONSTRAINTS,
         DEFAULT_OBJECTIVES,
@@ -88,6 +87,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
         optimise,
     )
     from finger_pin.studies.keys import Starting
+    from finger_pin.views.plots import plot_pareto, save_figure
 
     shown = sys.stderr.isatty() and not options.quiet
     effort: dict[str, Any] = {
@@ -161,7 +161,7 @@ def summary(result: xr.Dataset) -> str:
 
 def label(result: xr.Dataset, name: str) -> str:
     """Return a short name of a metric or key with its unit."""
-    from finger_pin.plots.sweep import short_key
+    from finger_pin.views.plots.sweep import short_key
 
     return f"{short_key(name)} ({result[name].attrs['units']})"
 

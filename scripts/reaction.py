@@ -19,8 +19,8 @@ from rich.table import Table
 import finger_pin as fp
 from finger_pin.analysis import JointReactions, ReactionDifference, fingertip_loads, joint_reactions
 from finger_pin.files import replacing
-from finger_pin.plots import save_figure
-from finger_pin.plots.reaction import plot_reaction
+from finger_pin.views.plots import save_figure
+from finger_pin.views.plots.reaction import plot_reaction
 
 PROGRAM = "reaction.py"
 FORCE = "environment.fingertip_force"

@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 from command_line import DONE, FAILED, INTERRUPTED, WRONG_INPUT, Parser, complain
 
-from finger_pin.console import print_text, progress_bar
+from finger_pin.commands.console import print_text, progress_bar
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import IntegrationError
-from finger_pin.loading import load_scenario
-from finger_pin.plots import draw_all, plot_friction_law, plot_workspace, save_figure
-from finger_pin.scenario import Scenario
-from finger_pin.simulation import simulate
+from finger_pin.simulation.simulate import simulate
+from finger_pin.views.plots import draw_all, plot_friction_law, plot_workspace, save_figure
 
 PROGRAM = "reproduce.py"
 # The paper prints no numbers for its Fig. 6: these go with the scenario's references and gains, after its start.

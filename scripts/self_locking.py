@@ -34,8 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
 def run(name: str, output: Path) -> int:
     """Report and draw; return the exit code."""
     import finger_pin as fp
-    from finger_pin.console import print_text
-    from finger_pin.plots import plot_critical_friction, plot_runaway, plot_self_locking_map, save_figure
+    from finger_pin.commands.console import print_text
+    from finger_pin.views.plots import plot_critical_friction, plot_runaway, plot_self_locking_map, save_figure
 
     try:
         scenario = fp.load_scenario(name)

@@ -26,10 +26,10 @@ from command_line import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.console import Interrupts
-    from finger_pin.results import ResultFolder
-    from finger_pin.scenario import Scenario
-    from finger_pin.viewer import LiveView
+    from finger_pin.commands.console import Interrupts
+    from finger_pin.description.scenario import Scenario
+    from finger_pin.simulation.results import ResultFolder
+    from finger_pin.views.viewer import LiveView
 
 PROGRAM = "simulate.py"
 
@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parse(arguments)
     try:
         # Importing the package takes a second or two: what is wrong with the options is told before.
-        from finger_pin import console
+        from finger_pin.commands import console
 
         if options.list:
             console.print_text(listing())
@@ -72,12 +72,12 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Load, simulate, write, show; return the exit code."""
-    from finger_pin.console import print_text
-    from finger_pin.convergence import tightened
+    from finger_pin.commands.console import print_text
+    from finger_pin.description.loading import load_scenario
     from finger_pin.exceptions import InputError
-    from finger_pin.loading import load_scenario
-    from finger_pin.results import ResultFolder
-    from finger_pin.summary import summarize
+    from finger_pin.simulation.convergence import tightened
+    from finger_pin.simulation.results import ResultFolder
+    from finger_pin.views.summary import summarize
 
     try:
         scenario = load_scenario(options.scenario, dict(options.set))
@@ -112,7 +112,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     if not options.quiet:
         print_text(f"{summarize(result)}\n\nResults are in {output}")
     if options.view and code == DONE:
-        from finger_pin.viewer import view
+        from finger_pin.views.viewer import view
 
         view(result)
     return code
@@ -122,9 +122,9 @@ def simulate(
     scenario: Scenario, interrupts: Interrupts, options: argparse.Namespace
 ) -> tuple[int, xr.Dataset | None, str]:
     """Return the exit code, the result as far as it goes, and what went wrong if anything did."""
-    from finger_pin.console import progress_bar
+    from finger_pin.commands.console import progress_bar
     from finger_pin.exceptions import IntegrationError, Interrupted, SelfLockingWarning
-    from finger_pin.simulation import simulate
+    from finger_pin.simulation.simulate import simulate
 
     shown = sys.stderr.isatty() and not options.quiet
     if shown:
@@ -146,9 +146,9 @@ def check(
     scenario: Scenario, result: xr.Dataset, interrupts: Interrupts, options: argparse.Namespace
 ) -> tuple[int, xr.Dataset, str]:
     """Return the exit code, the result with its convergence if that could be checked, and what went wrong."""
-    from finger_pin.console import progress_bar
-    from finger_pin.convergence import check_convergence
+    from finger_pin.commands.console import progress_bar
     from finger_pin.exceptions import IntegrationError, Interrupted
+    from finger_pin.simulation.convergence import check_convergence
 
     shown = sys.stderr.isatty() and not options.quiet
     bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
@@ -166,7 +166,7 @@ def live_view(scenario: Scenario, wanted: bool) -> AbstractContextManager[LiveVi
     """Return a viewer for the time of the simulation, or nothing."""
     if not wanted:
         return nullcontext()
-    from finger_pin.viewer import LiveView
+    from finger_pin.views.viewer import LiveView
 
     return LiveView(scenario.finger, title=scenario.title)
 
@@ -174,11 +174,11 @@ def live_view(scenario: Scenario, wanted: bool) -> AbstractContextManager[LiveVi
 def draw(result: xr.Dataset, folder: ResultFolder, figures: bool) -> tuple[int, str]:
     """Draw animation and figures, all or none; return an exit code and what went wrong if anything did."""
     try:
-        from finger_pin.viewer import write_animation
+        from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")
         if figures:
-            from finger_pin.plots import draw_all
+            from finger_pin.views.plots import draw_all
 
             draw_all(result, folder.stage / "figures")
     except KeyboardInterrupt:
@@ -195,8 +195,8 @@ def draw(result: xr.Dataset, folder: ResultFolder, figures: bool) -> tuple[int, 
 
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
-    from finger_pin.loading import list_fingers, list_scenarios
-    from finger_pin.scenario import METHODS
+    from finger_pin.description.loading import list_fingers, list_scenarios
+    from finger_pin.description.scenario import METHODS
 
     tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Methods": dict.fromkeys(METHODS, "")}
     rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}

@@ -23,7 +23,7 @@ from command_line import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.console import Interrupts
+    from finger_pin.commands.console import Interrupts
     from finger_pin.studies.designs import Design
 
 PROGRAM = "sweep.py"
@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Do what a command line says; return the exit code."""
     options = parse(arguments)
     try:
-        from finger_pin.console import Interrupts, print_text
+        from finger_pin.commands.console import Interrupts, print_text
 
         if options.list:
             print_text(listing())
@@ -79,7 +79,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Run the sweep, draw it, tell what came out; return the exit code."""
-    from finger_pin.console import print_text, runs_bar
+    from finger_pin.commands.console import print_text, runs_bar
     from finger_pin.exceptions import FingerPinError, InputError
     from finger_pin.studies import DEFAULT_METRICS, DaskCluster, LocalProcesses, sweep
     from finger_pin.studies.keys import Starting
@@ -144,7 +144,7 @@ def build_design(options: argparse.Namespace) -> Design:
 
 def draw(result: xr.Dataset, output: Path) -> None:
     """Draw the figure of a sweep."""
-    from finger_pin.plots import plot_sweep, save_figure
+    from finger_pin.views.plots import plot_sweep, save_figure
 
     save_figure(plot_sweep(result), output / "figures" / "sweep.png")
 

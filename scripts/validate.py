@@ -43,7 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
         from validation import report
         from validation.check import Verdict
 
-        from finger_pin.console import print_text
+        from finger_pin.commands.console import print_text
 
         options.output.mkdir(parents=True, exist_ok=True)
         families = validate(options.only)

@@ -3,7 +3,7 @@
 import pytest
 
 import finger_pin as fp
-from finger_pin.scenario import METHODS
+from finger_pin.description.scenario import METHODS
 
 
 @pytest.fixture(scope="session")

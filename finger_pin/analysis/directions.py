@@ -8,8 +8,8 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
-from finger_pin.blocks.tendons import Tendons
-from finger_pin.routing import Array
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.tendons import Tendons
 
 
 def sliding_velocity(tendons: Tendons, velocity: Array) -> Array:

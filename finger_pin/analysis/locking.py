@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import directions_of_motion, sliding_velocity
 from finger_pin.analysis.locking_loop import FrictionLoop
-from finger_pin.blocks.tendons import Tendons
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.parameters import FingerDescription
-from finger_pin.routing import Array
-from finger_pin.validation import expand, finite_vector
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.tendons import Tendons
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,9 +39,10 @@ from itertools import product
 
 import numpy as np
 
-from finger_pin.blocks.tendons import Tendons, capstan_coefficient
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.routing import Array
+from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.tendons import Tendons
 
 _REAL = 1e-9
 _SINGULAR = 1e-12

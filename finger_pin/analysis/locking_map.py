@@ -9,11 +9,11 @@ import numpy as np
 
 from finger_pin.analysis.directions import directions_of_motion
 from finger_pin.analysis.locking_loop import FrictionLoop
-from finger_pin.blocks.reference import PassiveCoupling
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
-from finger_pin.validation import expand
+from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False)

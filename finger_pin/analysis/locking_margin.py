@@ -9,11 +9,12 @@ import numpy as np
 
 from finger_pin.analysis.directions import sliding_velocity
 from finger_pin.analysis.locking_loop import FrictionLoop
-from finger_pin.blocks.tendons import Tendons
+from finger_pin.control.reference import HarmonicReference
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import expand
 from finger_pin.exceptions import SelfLockingWarning
-from finger_pin.routing import Array
-from finger_pin.scenario import Scenario
-from finger_pin.validation import expand
+from finger_pin.mechanism.tendons import Tendons
 
 #: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
 CLOSE_TO_LOCKING = 1.2
@@ -57,7 +58,7 @@ def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None
     routing = tendons.routing
     # Midpoints: a reference that starts or ends at rest moves there.
     times = scenario.simulation.duration * (np.arange(samples) + 0.5) / samples
-    motion = scenario.build_reference(routing).at(times)
+    motion = HarmonicReference.from_scenario(scenario, routing).at(times)
     size = len(routing.joints)
     # What stands still but for rounding does not move.
     speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.finger import Finger
-from finger_pin.geometry import Groove, TendonGeometry
-from finger_pin.routing import Array
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.geometry import Groove, TendonGeometry
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ import numpy as np
 import scipy.spatial
 
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
+from finger_pin.mechanism.finger import Finger
 
 _RANK = 1e-6
 _FLAT = 1e-7

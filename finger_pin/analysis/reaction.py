@@ -15,12 +15,12 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.pin_wrench import pin_wrench
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.geometry import Groove
-from finger_pin.routing import Array
-from finger_pin.scenario import Scenario
-from finger_pin.validation import validate
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.geometry import Groove
 
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 

@@ -16,10 +16,10 @@ from finger_pin.analysis.tip_statics import (
     posture,
     slides,
 )
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
-from finger_pin.validation import finite_vector
+from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False)

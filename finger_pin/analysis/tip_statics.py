@@ -32,10 +32,10 @@ from typing import Any
 import numpy as np
 import scipy.optimize
 
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
-from finger_pin.validation import expand, finite_vector
+from finger_pin.mechanism.finger import Finger
 
 #: What scipy's linear programmes report.
 INFEASIBLE, UNBOUNDED = 2, 3

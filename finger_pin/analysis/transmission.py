@@ -18,12 +18,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from finger_pin import friction
 from finger_pin.analysis.directions import sliding_velocity
-from finger_pin.blocks.reference import PassiveCoupling
-from finger_pin.blocks.tendons import Tendons, capstan_coefficient
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.routing import Array
+from finger_pin.laws import bristle as friction
+from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.tendons import Tendons
 
 # Since its last reversal a tendon has slid by this many bristle lengths F^n M / s0: exp(-5) from steady sliding.
 _SETTLED = 5.0

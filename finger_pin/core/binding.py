@@ -14,7 +14,7 @@ from numba import errors, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from finger_pin.routing import Array
+from finger_pin.description.routing import Array
 
 Vector = Annotated[Array, types.Array(types.float64, 1, "C")]
 Matrix = Annotated[Array, types.Array(types.float64, 2, "C")]

@@ -22,7 +22,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 def _digest() -> str:
     package = Path(__file__).parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted([*package.glob("core/*.py"), *package.glob("blocks/*.py"), package / "friction.py"]):
+    for source in sorted([*package.glob("core/*.py"), *package.glob("laws/*.py")]):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -37,7 +37,7 @@ def reference(control: Any, time: float, work: Any) -> None:
     size = table.shape[0]
     for j in range(size):
         offset, amplitude, frequency, phase = table[j, 0], table[j, 1], table[j, 2], table[j, 3]
-        joint[BASE, j] = laws.harmonic(time, offset, amplitude, frequency, phase)
+        joint[BASE, j] = laws.harmonic_position(time, offset, amplitude, frequency, phase)
     for j in range(size):
         position = control.offset[j]
         for k in range(size):

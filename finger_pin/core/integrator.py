@@ -14,8 +14,8 @@ from finger_pin.core.binding import block_for
 from finger_pin.core.linearisation import build_linear
 from finger_pin.core.plant import Control, Plant, build_work
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
-from finger_pin.integration import Statistics, Stop, Trajectory, Watch
-from finger_pin.routing import Array
+from finger_pin.core.textbook import Statistics, Stop, Trajectory, Watch
+from finger_pin.description.routing import Array
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 _FIRST_STEP = 1e-6

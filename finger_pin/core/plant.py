@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.blocks.controller import ProportionalController
-from finger_pin.blocks.reference import HarmonicReference
 from finger_pin.core.binding import Indices, Layers, Matrix, Vector
 from finger_pin.core.rigid_body import (
     BODY_COLUMNS,
@@ -21,9 +19,9 @@ from finger_pin.core.rigid_body import (
     SQUARE_LAYERS,
     TRANSLATION,
 )
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
+from finger_pin.mechanism.finger import Finger
 
 
 class Plant(NamedTuple):
@@ -166,21 +164,6 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
         actuated=routing.actuated,
         fingertip_force=np.array(fingertip_force, dtype=float),
         loaded=bool(np.any(fingertip_force)),
-    )
-
-
-def build_control(controller: ProportionalController, reference: HarmonicReference, actuated: int) -> Control:
-    """Read the paper's controller and a harmonic reference into arrays."""
-    return Control(
-        held=False,
-        tension=np.zeros(actuated),
-        gain=controller.gain,
-        minimum=controller.minimum,
-        inverse=np.ascontiguousarray(controller.inverse),
-        internal=controller.internal,
-        reference=np.column_stack([reference.offset, reference.amplitude, reference.frequency, reference.phase]),
-        coupling=reference.coupling.matrix,
-        offset=reference.coupling.offset,
     )
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.loading import to_toml
-from finger_pin.scenario import Scenario
+from finger_pin.description.loading import to_toml
+from finger_pin.description.scenario import Scenario
 from finger_pin.studies.designs import SAMPLE, Design
 from finger_pin.studies.keys import describe
 from finger_pin.studies.metrics import Metric

@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from finger_pin.recording import save
+from finger_pin.simulation.recording import save
 from finger_pin.studies.designs import Point
 from finger_pin.studies.keys import Starting
 from finger_pin.studies.metrics import Metric

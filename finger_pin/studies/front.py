@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from finger_pin.description.loading import to_toml
 from finger_pin.files import replacing
-from finger_pin.loading import to_toml
 from finger_pin.studies.keys import Starting
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]

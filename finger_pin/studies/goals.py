@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.routing import Array
 from finger_pin.studies.metrics import Metric, choose
 
 _CONSTRAINT = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<sense>[<>]=)\s*(?P<bound>\S+)\s*")

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
-from finger_pin.loading import load_scenario
-from finger_pin.scenario import Scenario
-from finger_pin.validation import find_field, nearest
 
 _INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6})\]")
 

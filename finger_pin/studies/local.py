@@ -18,10 +18,10 @@ from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Self
 
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
-from finger_pin.processes import process_context, single_threaded, usable_cores
-from finger_pin.scenario import Scenario
-from finger_pin.simulation import simulate
+from finger_pin.simulation.simulate import simulate
+from finger_pin.studies.processes import process_context, single_threaded, usable_cores
 from finger_pin.studies.runs import Record, Stop, Task, execute
 
 # How often a request to stop is looked at, s, and how long compiled code is tried for, in simulated time, s.

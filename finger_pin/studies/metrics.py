@@ -15,12 +15,13 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
+from finger_pin.control.reference import HarmonicReference
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, SelfLockingWarning
-from finger_pin.finger import Finger
-from finger_pin.routing import Array
-from finger_pin.scenario import Scenario
-from finger_pin.simulation import simulate
-from finger_pin.validation import nearest
+from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.simulate import simulate
 
 #: Greatest tension for the metric of the fingertip force, N.
 FORCE_TENSION = 20.0
@@ -141,7 +142,7 @@ def fingertip_force(run: Run) -> float:
     """
     finger = Finger(run.scenario.finger)
     times = run.scenario.simulation.duration * (np.arange(500) + 0.5) / 500
-    posture = np.mean(run.scenario.build_reference(finger.routing).at(times).position, axis=0)
+    posture = np.mean(HarmonicReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
     offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
     return float(np.min(offsets)) if offsets.size else 0.0
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.routing import Array
 from finger_pin.studies.dataset import assemble
 from finger_pin.studies.designs import Listing, Point
 from finger_pin.studies.evaluation import Progress, describe_study, evaluate, write

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from importlib import metadata
 from typing import Any, Protocol, Self
 
+from finger_pin.description.loading import to_toml
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
-from finger_pin.loading import to_toml
-from finger_pin.scenario import Scenario
 from finger_pin.studies.keys import Starting
 from finger_pin.studies.metrics import Metric, Run
 

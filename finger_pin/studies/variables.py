@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from finger_pin.description.parameters import FingerDescription, Tendon
 from finger_pin.exceptions import InputError
-from finger_pin.parameters import FingerDescription, Tendon
 from finger_pin.studies.designs import Point, Range
 from finger_pin.studies.keys import Starting
 from finger_pin.studies.spelling import parse_range

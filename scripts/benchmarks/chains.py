@@ -12,7 +12,7 @@ import finger_pin as fp
 from benchmarks.runs import compiled
 from benchmarks.store import Store, say
 from benchmarks.timing import interleaved
-from finger_pin.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop
 
 _MOST = 8
 _RTOL = 1e-5

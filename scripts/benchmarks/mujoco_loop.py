@@ -20,8 +20,10 @@ import finger_pin as fp
 from benchmarks.runs import Job, Point, compiled, point, rms, truth
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
-from finger_pin.mjcf import to_mjcf
-from finger_pin.routing import Array
+from finger_pin.control.proportional import ProportionalController
+from finger_pin.control.reference import HarmonicReference
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.mjcf import to_mjcf
 
 LIMIT = 1e-3
 STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 1e-5, 5e-6)
@@ -62,11 +64,11 @@ class Loop:
         routing = fp.Finger(scenario.finger).routing
         self.model, self.step = model, step
         self._joints, self._actuated = len(routing.joints), routing.actuated
-        controller = scenario.build_controller(routing)
+        controller = ProportionalController.from_scenario(scenario, routing)
         self._feedback = controller.inverse * controller.gain
         self._minimum, self._internal = controller.minimum, controller.internal
         times = step * np.arange(round(scenario.simulation.duration / step))
-        self._feedforward = scenario.build_reference(routing).at(times).position @ self._feedback.T
+        self._feedforward = HarmonicReference.from_scenario(scenario, routing).at(times).position @ self._feedback.T
         self._every = max(1, round(_PERIOD / step))
         self._stride = max(1, round(step / _PERIOD))
         self.controls = np.zeros((len(times), self._actuated))

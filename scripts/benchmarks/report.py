@@ -10,8 +10,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.targets import Target
 from benchmarks.work_precision import OURS
-from finger_pin.plots.lines import series
-from finger_pin.plots.style import GREY, new_figure, styled
+from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.style import GREY, new_figure, styled
 
 _MARKERS = "osD^vP"
 _MIB = 2**20

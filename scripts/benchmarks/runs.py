@@ -11,15 +11,16 @@ import numpy as np
 
 import finger_pin as fp
 from benchmarks.timing import clocked
-from finger_pin.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import build_control
 from finger_pin.core.compilation import entry
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.dynamics import evaluate
-from finger_pin.core.finger import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
-from finger_pin.core.plant import build_control, build_work
-from finger_pin.integration import integrate
-from finger_pin.routing import Array
-from finger_pin.scenario import Scenario
+from finger_pin.core.plant import build_work
+from finger_pin.core.textbook import integrate
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
 
 TEXTBOOK = ("BDF", "LSODA", "Radau")
 SUNDIALS = "CVODE, compiled"

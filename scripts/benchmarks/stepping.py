@@ -10,7 +10,8 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.runs import rms, settled
 from benchmarks.store import Store
-from finger_pin.blocks.reference import ReferenceSignals
+from finger_pin.control.proportional import ProportionalController
+from finger_pin.control.reference import HarmonicReference, ReferenceSignals
 
 PERIOD = 1e-3
 _ROUNDS = 3
@@ -44,7 +45,10 @@ def _study(duration: float) -> dict[str, Any]:
 def _run(scenario: fp.Scenario) -> tuple[float, float, Any]:
     """Return the wall times of the loop and of its steps, s, and the joint positions at all samples, rad."""
     finger = fp.Finger(scenario.finger)
-    controller, reference = scenario.build_controller(finger.routing), scenario.build_reference(finger.routing)
+    controller, reference = (
+        ProportionalController.from_scenario(scenario, finger.routing),
+        HarmonicReference.from_scenario(scenario, finger.routing),
+    )
     desired = reference.at(scenario.sample_times())
     simulator = fp.Simulator(finger, desired.position[0])
     simulator.step(np.ones(finger.routing.actuated), 1e-6)  # Compiles.

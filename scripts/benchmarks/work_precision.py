@@ -9,7 +9,7 @@ import finger_pin as fp
 from benchmarks.runs import SUNDIALS, TEXTBOOK, Point, compiled, has_sundials, point, settled, sundials, textbook, truth
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked, cost_at
-from finger_pin.scenario import Scenario
+from finger_pin.description.scenario import Scenario
 
 #: Error, rad, at which costs are compared, by scenario.
 TARGET = {"fig6": 1e-5, "stick_slip": 1e-4}

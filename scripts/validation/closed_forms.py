@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
-from finger_pin.core.finger import CompiledFinger
-from finger_pin.finger import Finger
-from finger_pin.parameters import FingerDescription
-from finger_pin.plots.style import BLACK, BLUE, GREY, new_figure, styled
-from finger_pin.routing import Array
-from finger_pin.simulator import Simulator
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.simulator import Simulator
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, new_figure, styled
 from validation.check import Check, Comparison, Picture, Section, compare
 
 TITLE = "Closed forms"

@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.loading import list_scenarios, load_scenario
-from finger_pin.plots.lines import series, trace
-from finger_pin.plots.style import new_figure, styled
-from finger_pin.simulation import simulate
+from finger_pin.description.loading import list_scenarios, load_scenario
+from finger_pin.simulation.simulate import simulate
+from finger_pin.views.plots.lines import series, trace
+from finger_pin.views.plots.style import new_figure, styled
 from validation.check import Check, Picture, Section, compare
 
 TITLE = "Energy account"

@@ -11,14 +11,15 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.finger import Finger
-from finger_pin.loading import load_scenario
-from finger_pin.mjcf import to_mjcf
-from finger_pin.plots.lines import series
-from finger_pin.plots.style import GREY, new_figure, styled
-from finger_pin.routing import Array
-from finger_pin.scenario import Scenario
-from finger_pin.simulation import simulate
+from finger_pin.control.reference import HarmonicReference
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.mjcf import to_mjcf
+from finger_pin.simulation.simulate import simulate
+from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.style import GREY, new_figure, styled
 from validation.check import Check, Picture, Section, compare, skipped
 
 TITLE = "Whole motions against MuJoCo"
@@ -66,7 +67,7 @@ def follow(scenario: Scenario, model: Any, step: float) -> Array:
     inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
     gain = np.broadcast_to(scenario.controller.gain, len(routing.joints))
     minimum = np.broadcast_to(scenario.controller.minimum_tension, len(routing.tendons))
-    reference = scenario.build_reference(routing).at(step * np.arange(round(DURATION / step))).position
+    reference = HarmonicReference.from_scenario(scenario, routing).at(step * np.arange(round(DURATION / step))).position
     model.opt.timestep = step
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -9,15 +9,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
-from finger_pin.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import build_control
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import TABLEAUS, Stepper
-from finger_pin.core.plant import build_control, build_plant
-from finger_pin.loading import load_scenario
-from finger_pin.plots.lines import series
-from finger_pin.plots.style import new_figure, styled
-from finger_pin.routing import Array
-from finger_pin.scenario import Scenario
+from finger_pin.core.plant import build_plant
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.style import new_figure, styled
 from validation.check import Check, Picture, Section, compare
 
 TITLE = "Order of the integrators"

@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.finger import Finger
-from finger_pin.loading import load_scenario
-from finger_pin.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
-from finger_pin.routing import Array
-from finger_pin.simulation import simulate
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.simulate import simulate
+from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
 from validation.check import Check, Comparison, Picture, Section, compare
 
 TITLE = "Infinite stiffness of the passive tendon"

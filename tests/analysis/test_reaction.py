@@ -10,8 +10,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.analysis import fingertip_loads, joint_reactions, pin_wrench
-from finger_pin.geometry import Groove, TendonGeometry
-from finger_pin.plots.reaction import plot_reaction
+from finger_pin.mechanism.geometry import Groove, TendonGeometry
+from finger_pin.views.plots.reaction import plot_reaction
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reaction.py"
 FORCE = np.array([0.4, -0.7, 0.5])

@@ -8,7 +8,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.analysis import critical_friction, self_locking_map, self_locking_margin, warn_of_self_locking
-from finger_pin.summary import summarize
+from finger_pin.control.proportional import ProportionalController
+from finger_pin.views.summary import summarize
 
 STUCK = {f"finger.joint_friction.{name}": 7.6e-4 for name in ("coulomb", "stiction")}
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=4)))
@@ -222,7 +223,7 @@ def test_a_simulation_close_to_locking_warns_whoever_calls_it_and_its_summary_sa
 def test_a_controller_of_ones_own_is_not_judged_by_the_papers():
     stuck = fp.load_scenario("fig6", STUCK | {"simulation.duration": 0.01})
     finger = fp.Finger(stuck.finger)
-    own = stuck.build_controller(finger.routing)
+    own = ProportionalController.from_scenario(stuck, finger.routing)
     assert "self_locking_margin" not in fp.simulate(stuck, controller=own, control_period=1e-3).attrs
 
 

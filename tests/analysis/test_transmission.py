@@ -12,7 +12,7 @@ from finger_pin.analysis.transmission import (
     transmission_in_motion,
     workspace_postures,
 )
-from finger_pin.routing import ForceClosure
+from finger_pin.description.routing import ForceClosure
 
 
 def curvature_by_hand(theta):

@@ -7,7 +7,7 @@ import pytest
 from core_cases import FORCE, Case, lugre, none_passive, on_model, tree_model, two_passive, without_abduction_link
 
 import finger_pin as fp
-from finger_pin.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop
 
 
 @pytest.fixture(scope="session")

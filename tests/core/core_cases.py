@@ -8,11 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 import finger_pin as fp
-from finger_pin.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import build_control
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import TABLEAUS, Stepper
 from finger_pin.core.linearisation import build_linear
-from finger_pin.core.plant import build_control, build_plant, build_work
+from finger_pin.core.plant import build_plant, build_work
 
 BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(

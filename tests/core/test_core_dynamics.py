@@ -9,10 +9,10 @@ from core_cases import BODIES, LOOPS, relative
 
 import finger_pin as fp
 from finger_pin.core import rosenbrock, signals
-from finger_pin.core.finger import CompiledFinger
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper
 from finger_pin.core.plant import build_plant, held_control
-from finger_pin.finger import FingerSignals
+from finger_pin.mechanism.finger import FingerSignals
 
 STATES = 100
 

@@ -9,7 +9,7 @@ import pytest
 from core_cases import BODIES, relative
 
 import finger_pin as fp
-from finger_pin.core.finger import CompiledFinger
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.plant import build_plant, build_work
 from finger_pin.core.rigid_body import BY_POSITION, BY_VELOCITY, MASS_MATRIX
 from finger_pin.exceptions import InputError

@@ -12,7 +12,7 @@ from test_core_linearisation import pieces
 from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
-from finger_pin.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import TABLEAUS, _interpolant
 from finger_pin.core.plant import held_control

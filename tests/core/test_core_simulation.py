@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.blocks.controller import ControlSignals
+from finger_pin.control.proportional import ControlSignals, ProportionalController
 from finger_pin.core.integrator import TABLEAUS
-from finger_pin.energy import Powers
 from finger_pin.exceptions import IntegrationError, Interrupted
+from finger_pin.simulation.energy import Powers
 
 METHODS = tuple(TABLEAUS)
 #: Every kind of signal that follows from the state, with what is little of it.
@@ -116,7 +116,7 @@ def test_recorded_tensions_are_held_within_a_period_and_step_at_its_multiples(sc
     result = run(scenario, duration=0.0215, rate=2000.0, control_period=3e-3)
     commands = result.tendon_command.values[:, :4]
     assert len(commands) == 44
-    controller = scenario.build_controller(fp.Finger(scenario.finger).routing)
+    controller = ProportionalController.from_scenario(scenario, fp.Finger(scenario.finger).routing)
     for k in range(0, len(commands), period):
         held = commands[k : k + period]
         assert np.all(held == held[0])

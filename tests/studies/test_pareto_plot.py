@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from finger_pin.plots.pareto import plot_pareto
+from finger_pin.views.plots.pareto import plot_pareto
 
 
 def made(minimise, maximise=(), feasible=(True, True, True, False)):

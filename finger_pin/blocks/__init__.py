@@ -1,1 +1,0 @@
-"""The boxes of Fig. 5, one file each."""

@@ -1,0 +1,31 @@
+"""Controllers beyond (19): blocks with the face of the paper's, joined by `CompensatedController`.
+
+A torque law (`TorqueLaw`), the friction of joints (`JointCompensation`) and tendons (`TendonFeedforward`), the
+distribution over tendons (`PseudoInverse`, or `LimitedDistribution` of `limited_distribution`), a loop around the
+passive tendons' tension (`PassiveTensionLoop`). `build_controller` makes them from the entries of a scenario.
+"""
+
+from __future__ import annotations
+
+from finger_pin.control.build import build_controller
+from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.distribution import Distribution, Plan, PseudoInverse
+from finger_pin.control.joint_compensation import JointCompensation
+from finger_pin.control.measurement import MeasuringController, Sensors
+from finger_pin.control.passive_loop import PassiveTensionLoop
+from finger_pin.control.tendon_feedforward import TendonFeedforward
+from finger_pin.control.torque import TorqueLaw
+
+__all__ = [
+    "CompensatedController",
+    "Distribution",
+    "JointCompensation",
+    "MeasuringController",
+    "PassiveTensionLoop",
+    "Plan",
+    "PseudoInverse",
+    "Sensors",
+    "TendonFeedforward",
+    "TorqueLaw",
+    "build_controller",
+]

@@ -1,0 +1,102 @@
+"""From the entries of a scenario to its controller."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from finger_pin.analysis import critical_friction
+from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.distribution import Distribution, PseudoInverse
+from finger_pin.control.joint_compensation import JointCompensation
+from finger_pin.control.passive_loop import PassiveTensionLoop
+from finger_pin.control.proportional import Controller, ProportionalController
+from finger_pin.control.tendon_feedforward import TendonFeedforward
+from finger_pin.control.torque import TorqueLaw
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import Numbers, expand
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+
+
+def build_controller(scenario: Scenario, finger: Finger | None = None) -> Controller:
+    """Return the controller that a scenario describes.
+
+    The paper's, unless an entry asks for more; then a `CompensatedController`, inside a `PassiveTensionLoop` if asked.
+
+    Args:
+        scenario: The scenario.
+        finger: Its finger, if it is built already.
+
+    Raises:
+        InputError: If the joint friction that it is to compensate is believed to lock the finger.
+    """
+    finger = finger or Finger(scenario.finger)
+    settings = scenario.controller
+    if settings.is_paper:
+        return ProportionalController.from_scenario(scenario, finger.routing)
+    joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)
+    controller = CompensatedController(
+        routing=finger.routing,
+        law=TorqueLaw(
+            gain=expand(settings.gain, joints),
+            damping=expand(settings.damping, joints),
+            gravity=finger.rigid_body.gravity_torque if settings.gravity_compensation else None,
+        ),
+        distribution=_distribution(scenario, finger),
+        minimum=expand(settings.minimum_tension, tendons),
+        tendons=_feedforward(scenario, finger),
+        joints=_joint_compensation(scenario, finger),
+    )
+    loop = settings.passive_tension_loop
+    if loop is None:
+        return controller
+    wish = expand(settings.passive_tension, finger.routing.passive)
+    return PassiveTensionLoop(controller, wish, loop.proportional, loop.integral, loop.limit)
+
+
+def _distribution(scenario: Scenario, finger: Finger) -> Distribution:
+    limits = scenario.controller.distribution
+    if limits is None:
+        return PseudoInverse.from_routing(finger.routing)
+    # Importing the solver takes a while, which nobody without limits shall wait for.
+    from finger_pin.control.limited_distribution import LimitedDistribution
+
+    return LimitedDistribution(finger.routing, expand(limits.maximum_tension, len(finger.routing.tendons)))
+
+
+def _feedforward(scenario: Scenario, finger: Finger) -> TendonFeedforward | None:
+    settings = scenario.controller.tendon_friction_feedforward
+    if settings is None:
+        return None
+    tendons = finger.tendons
+    believed = replace(
+        tendons,
+        surface=_belief(settings.coulomb, tendons.surface),
+        stiction_ratio=_belief(settings.stiction_ratio, tendons.stiction_ratio),
+    )
+    return TendonFeedforward(believed, settings.share, settings.reversal_speed)
+
+
+def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation | None:
+    settings = scenario.controller.joint_friction_compensation
+    if settings is None:
+        return None
+    friction = finger.joint_friction
+    kinetic = _belief(settings.coulomb, friction.kinetic)
+    static = np.maximum(_belief(settings.stiction, friction.static), kinetic)
+    believed = replace(friction, kinetic=kinetic, static=static, viscous=_belief(settings.viscous, friction.viscous))
+    most, critical = settings.share * float(np.max(static)), critical_friction(finger).coefficient
+    if most >= critical:
+        raise InputError(
+            "controller.joint_friction_compensation",
+            f"compensates joint friction up to {most:.3g} m; from {critical:.3g} m on, the tensions that overcome it "
+            "raise it by as much (self-locking): lower share, coulomb or stiction",
+        )
+    return JointCompensation(believed, settings.share, settings.reversal_speed)
+
+
+def _belief(given: Numbers | None, actual: Array) -> Array:
+    return actual if given is None else expand(given, len(actual))

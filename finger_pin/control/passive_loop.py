@@ -1,0 +1,61 @@
+"""Closed-loop control of the passive tendons' tension, by the internal tension."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.measurement import MeasuringController
+from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.description.routing import Array
+
+
+class PassiveTensionLoop(MeasuringController):
+    """Raises or lowers the internal tension until the passive tendons carry what is wished.
+
+    A passive tendon cannot be commanded; (20) only chooses an angle of the follower joint at which, free of friction
+    and with the actuated tendons in balance, it would carry f5^d. Here f5^d is also planned: it is the least tension of
+    the passive tendons in (22), corrected by the error of the measured one,
+
+        f0_5 = max(f0_5, f5^d + k_P e + I),   I' = k_I e,   e = f5^d - f5.
+
+    Where the other tendons' f0 asks for more internal tension than the wish does, (22) has its way and f5 stays above
+    the wish; the integral stops at f0_5 or at its limit. It lasts from sample to sample: one object, one simulation.
+
+    Attributes:
+        controller: The controller whose internal tension is set.
+        wish: f5^d, shape (p,), N.
+        proportional: k_P.
+        integral: k_I, 1/s.
+        limit: Largest |I|, N.
+        correction: k_P e + I at present, shape (p,), N.
+    """
+
+    def __init__(
+        self, controller: CompensatedController, wish: Array, proportional: float, integral: float, limit: float
+    ) -> None:
+        """Begin with no correction."""
+        self.controller = controller
+        self.wish = np.asarray(wish, dtype=float)
+        self.proportional, self.integral, self.limit = proportional, integral, limit
+        self.correction = np.zeros(len(self.wish))
+        self._sum = np.zeros(len(self.wish))
+
+    def sense(self, tension: Array, elapsed: float) -> None:
+        """Take measured tensions, shape (t,), N, of which the passive ones count, and the time since the last, s."""
+        actuated = self.controller.routing.actuated
+        error = self.wish - tension[actuated:]
+        # Below its own f0 a wish has no effect, and an integral that went there would take time to come back.
+        lowest = np.clip(self.controller.minimum[actuated:] - self.wish, -self.limit, 0.0)
+        self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)
+        self.correction = self.proportional * error + self._sum
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return the commands for shapes (..., n) with the present correction."""
+        actuated = self.controller.routing.actuated
+        minimum = self.controller.minimum.copy()
+        minimum[actuated:] = np.maximum(minimum[actuated:], self.wish + self.correction)
+        return self.controller.command_above(minimum, reference, position, velocity)

@@ -1,0 +1,82 @@
+"""Sampled execution of a controller: asked once a period through its sensors; its tensions act later and are held."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.measurement import MeasuringController, Sensors
+from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.description.controller import SamplingSettings
+from finger_pin.description.routing import Array
+
+# A delay this close to a multiple of the period, in periods, is one: a step between the two would be of no length.
+_COINCIDENT = 1e-9
+
+
+class SampledController:
+    """A controller that is asked at multiples of a period, in order, and then answers for any time up to the next.
+
+    What it says at a sample acts after the delay, and holds until what it says at the next one acts. Before the first
+    arrives, it acts already.
+
+    Attributes:
+        period: Sampling period, s.
+        instant: When it is to act next, s: at a sample, or when tensions arrive.
+    """
+
+    def __init__(self, loop: ClosedLoop, settings: SamplingSettings) -> None:
+        """Sample the controller of a loop."""
+        self.period = settings.period
+        self.instant = 0.0
+        self._loop = loop
+        self._sensors = Sensors(settings.period, settings.encoder_resolution, settings.tension_noise, settings.seed)
+        self._samples: list[ControlSignals] = []
+        whole = math.floor(settings.delay / settings.period + _COINCIDENT)
+        rest = settings.delay - whole * settings.period
+        self._late = whole
+        self._rest = rest if rest > _COINCIDENT * settings.period else 0.0
+        self._acting = 0
+
+    def act(self, x: Array) -> Array:
+        """Sample, if it is time to, and return the tensions that act from this instant on, shape (a,)."""
+        if self.instant == len(self._samples) * self.period:
+            self._samples.append(self._sample(self.instant, x))
+        while self._acting + 1 < len(self._samples) and self._arrival(self._acting + 1) <= self.instant:
+            self._acting += 1
+        self.instant = len(self._samples) * self.period
+        if self._acting + 1 < len(self._samples):
+            self.instant = min(self.instant, self._arrival(self._acting + 1))
+        return self._tension()
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return what was held at the given times; an instant belongs to the tensions that arrive at it."""
+        index = np.floor((np.asarray(time) - self._rest) / self.period * (1.0 + 1e-12)).astype(int) - self._late
+        index = np.clip(index, 0, len(self._samples) - 1)
+        torques = np.array([sample.torque for sample in self._samples])
+        tensions = np.array([sample.tension for sample in self._samples])
+        missing = [sample.shortfall for sample in self._samples if sample.shortfall is not None]
+        shortfall = np.array(missing)[index] if len(missing) == len(self._samples) else None
+        return ControlSignals(torques[index], tensions[index], shortfall)
+
+    def _arrival(self, sample: int) -> float:
+        return (sample + self._late) * self.period + self._rest
+
+    def _tension(self) -> Array:
+        return self._samples[self._acting].tension[: self._loop.finger.routing.actuated]
+
+    def _sample(self, time: float, x: Array) -> ControlSignals:
+        loop, controller = self._loop, self._loop.controller
+        state = loop.finger.layout.unpack(x.copy())
+        motion = self._sensors.motion(state)
+        if isinstance(controller, MeasuringController):
+            acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
+            strands = loop.dynamics.evaluate(x, acting, loop.fingertip_force).tendons.strands
+            delivered = loop.finger.routing.tendon_tension(strands)
+            controller.sense(self._sensors.tension(delivered), self.period if self._samples else 0.0)
+        return controller.command(time, loop.reference.at(time), motion.position, motion.velocity)

@@ -1,0 +1,82 @@
+"""Tendon friction, (9) and (16), added to the commands so that the finger gets the tensions that were planned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.control.direction import signed_coefficient
+from finger_pin.description.routing import Array, Routing
+from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.tendons import Tendons
+
+# A tendon whose friction exceeds its tension cannot be moved by pulling harder: compensation stops short of that.
+_MOST = 0.9
+
+
+def undivided(routing: Routing) -> Array:
+    """Return W, shape (s, t), without friction: both halves of a passive tendon carry what is planned for it."""
+    return routing.strand_tension(np.eye(len(routing.tendons))).T
+
+
+@dataclass(frozen=True, eq=False)
+class TendonFeedforward:
+    """The steady sliding of (9), with (16), solved for the command.
+
+    With x = M(v) times the direction, f = f^a - x (f + f^a) - b v gives
+
+        f^a = (f (1 + x) + b v) / (1 - x),
+
+    which is f exp(mu_e phi) where M = mu^d and b = 0: the capstan law, upside down. The passive tendons have no
+    command; the halves of one carry m (1 + x) and m (1 - x) with mean m, and the difference is a torque that the others
+    have to make up for.
+
+    Attributes:
+        tendons: The tendons as they are believed to be.
+        share: Part of the friction that is compensated.
+        reversal_speed: v_r, m/s.
+    """
+
+    tendons: Tendons
+    share: float
+    reversal_speed: float
+
+    def coefficient(self, position: Array, desired_velocity: Array) -> Array:
+        """Return x of every tendon, shape (..., t), for motion of shape (..., n)."""
+        tendons = self.tendons
+        kinetic = capstan_coefficient(tendons.surface, tendons.routing.curvature(position))
+        static = tendons.stiction_ratio * kinetic
+        velocity = self._velocity(desired_velocity)
+        signed = signed_coefficient(
+            velocity, kinetic, static, tendons.stribeck_velocity, tendons.stribeck_exponent, self.reversal_speed
+        )
+        clipped: Array = np.clip(signed, -_MOST, _MOST)
+        return clipped
+
+    def command(self, planned: Array, position: Array, desired_velocity: Array) -> Array:
+        """Return f^a, shape (..., t), N, that deliver planned tensions of that shape; passive ones stay as they are."""
+        actuated = self.tendons.routing.actuated
+        x = self.coefficient(position, desired_velocity)[..., :actuated]
+        viscous = self.tendons.viscous[:actuated] * self._velocity(desired_velocity)[..., :actuated]
+        delivered = planned[..., :actuated]
+        needed = (delivered * (1.0 + x) + viscous) / (1.0 - x)
+        command = np.maximum(0.0, delivered + self.share * (needed - delivered))
+        return np.concatenate([command, planned[..., actuated:]], axis=-1)
+
+    def strand_matrix(self, position: Array, desired_velocity: Array) -> Array:
+        """Return W, shape (..., s, t): the tensions of the strands are W f_hat when what is planned is delivered."""
+        routing = self.tendons.routing
+        plain = undivided(routing)
+        rows = np.arange(routing.actuated, len(plain))
+        columns = np.argmax(plain[rows], axis=1)
+        x = self.share * self.coefficient(position, desired_velocity)[..., columns]
+        matrix = np.broadcast_to(plain, (*position.shape[:-1], *plain.shape)).copy()
+        matrix[..., rows, columns] += np.where((rows - routing.actuated) % 2 == 0, x, -x)
+        return matrix
+
+    def _velocity(self, desired_velocity: Array) -> Array:
+        """Return v of the tendons, shape (..., t), m/s; that of a passive one is its middle's, both halves alike."""
+        tendons = self.tendons
+        actuated = desired_velocity @ tendons.routing.actuated_coupling.T
+        return np.concatenate([actuated, tendons.rest_position(desired_velocity)], axis=-1)

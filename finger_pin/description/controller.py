@@ -1,0 +1,172 @@
+"""The controller as data: the paper's (19)-(22), what compensates its errors, and how it is executed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.validation import (
+    Description,
+    Numbers,
+    check_size,
+    choice,
+    expand,
+    problem,
+    quantity,
+    real,
+    reals,
+)
+
+Share = Annotated[float, real(0.0, 2.0)]
+
+
+class TendonFeedforwardSettings(Description):
+    """Tendon friction by (9) and (16), added to the commands; what is left out is believed as it is in the finger."""
+
+    share: Share = quantity(1.0, unit="1", source="chosen", doc="Part of the expected friction that is compensated.")
+    reversal_speed: Annotated[float, real(0.0, 10.0, above=True)] = quantity(
+        1e-3, unit="m/s", source="chosen", doc="Desired tendon velocity below which a reversal is smoothed."
+    )
+    coulomb: Annotated[Numbers, reals(0.0, 10.0)] | None = quantity(
+        None, unit="1", source="finger.tendon_friction", doc="mu_e as the controller believes it."
+    )
+    stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] | None = quantity(
+        None, unit="1", source="finger.tendon_friction", doc="rho as the controller believes it."
+    )
+
+
+class JointCompensationSettings(Description):
+    """Joint friction by (9) and (17), added to the torque; what is left out is believed as it is in the finger."""
+
+    share: Share = quantity(1.0, unit="1", source="chosen", doc="Part of the expected friction that is compensated.")
+    reversal_speed: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        0.1, unit="rad/s", source="chosen", doc="Desired joint velocity below which a reversal is smoothed."
+    )
+    coulomb: Annotated[Numbers, reals(0.0, 0.1)] | None = quantity(
+        None, unit="m", source="finger.joint_friction", doc="M^d as the controller believes it."
+    )
+    stiction: Annotated[Numbers, reals(0.0, 0.1)] | None = quantity(
+        None, unit="m", source="finger.joint_friction", doc="M^c as the controller believes it."
+    )
+    viscous: Annotated[Numbers, reals(0.0, 1e6)] | None = quantity(
+        None, unit="N m s/rad", source="finger.joint_friction", doc="b as the controller believes it."
+    )
+
+
+class PassiveTensionSettings(Description):
+    """A loop from the measured passive tension to the internal tension; the wish is controller.passive_tension."""
+
+    proportional: Annotated[float, real(0.0, 10.0)] = quantity(
+        0.0, unit="1", source="chosen", doc="k_P, change of the planned tension over the error of the measured one."
+    )
+    integral: Annotated[float, real(0.0, 1e4)] = quantity(10.0, unit="1/s", source="chosen", doc="k_I, likewise.")
+    limit: Annotated[float, real(0.0, 1e5)] = quantity(
+        5.0, unit="N", source="chosen", doc="Largest correction of the planned tension by the integral."
+    )
+
+
+class DistributionSettings(Description):
+    """Tensions from a quadratic programme with limits, in place of the pseudo-inverse (21), (22)."""
+
+    maximum_tension: Annotated[Numbers, reals(0.0, 1e5, above=True)] = quantity(
+        ..., unit="N", source="design", doc="Most planned tension, one number or one per tendon."
+    )
+
+
+class SamplingSettings(Description):
+    """Execution on a computer: sampled and held, late, from sensors that are not perfect."""
+
+    period: Annotated[float, real(1e-7, 10.0)] = quantity(1e-3, unit="s", source="chosen", doc="From sample to sample.")
+    delay: Annotated[float, real(0.0, 10.0)] = quantity(
+        0.0, unit="s", source="chosen", doc="From a sample to the instant at which its tensions act."
+    )
+    encoder_resolution: Annotated[float, real(0.0, 10.0)] = quantity(
+        0.0, unit="rad", source="chosen", doc="Step of the measured angles; 0: exact angles and velocities."
+    )
+    tension_noise: Annotated[float, real(0.0, 1e5)] = quantity(
+        0.0, unit="N", source="chosen", doc="Standard deviation of the tension sensors."
+    )
+    seed: int = Field(0, ge=0, le=2**63 - 1, strict=True, description="Of the noise.")
+
+
+class ControllerSettings(Description):
+    """The paper's controller (19)-(22), and what is built around it where a table or entry asks for it."""
+
+    kind: Annotated[Literal["proportional"], choice("proportional")] = quantity(
+        "proportional", unit="1", source="(19)", doc="Which controller."
+    )
+    gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
+    )
+    minimum_tension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
+        1.0, unit="N", source="chosen", doc="f0, one number or one per tendon."
+    )
+    passive_tension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
+        1.0, unit="N", source="chosen", doc="f5^d, one number or one per passive tendon."
+    )
+    damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
+    )
+    gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    tendon_friction_feedforward: TendonFeedforwardSettings | None = Field(None, description="By (9) and (16).")
+    joint_friction_compensation: JointCompensationSettings | None = Field(None, description="By (9) and (17).")
+    passive_tension_loop: PassiveTensionSettings | None = Field(None, description="Closed loop on f5; sampled.")
+    distribution: DistributionSettings | None = Field(None, description="Quadratic programme with tension limits.")
+    sampling: SamplingSettings | None = Field(None, description="Sampled execution; continuous without it.")
+
+    @model_validator(mode="after")
+    def _sampled(self) -> Self:
+        if self.passive_tension_loop is not None and self.sampling is None:
+            raise problem("passive_tension_loop", "works from sample to sample: set controller.sampling.period too")
+        return self
+
+    @property
+    def is_paper(self) -> bool:
+        """Whether it is the paper's controller and nothing else, sampled or not."""
+        added = (
+            self.tendon_friction_feedforward,
+            self.joint_friction_compensation,
+            self.passive_tension_loop,
+            self.distribution,
+        )
+        damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
+        return not self.gravity_compensation and not any(damping) and all(each is None for each in added)
+
+
+def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
+    """Raise the error of an entry that does not fit the finger, or another entry."""
+    joints, tendons = tuple(finger.joints), tuple(finger.tendons)
+    of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
+    sizes: list[tuple[str, Numbers | None, tuple[tuple[str, ...], str]]] = [
+        ("gain", settings.gain, of_joints),
+        ("damping", settings.damping, of_joints),
+        ("minimum_tension", settings.minimum_tension, of_tendons),
+        ("passive_tension", settings.passive_tension, (finger.passive_names, "passive tendon")),
+    ]
+    tendon, joint = settings.tendon_friction_feedforward, settings.joint_friction_compensation
+    if tendon is not None:
+        for name in ("coulomb", "stiction_ratio"):
+            sizes.append((f"tendon_friction_feedforward.{name}", getattr(tendon, name), of_tendons))
+    if joint is not None:
+        for name in ("coulomb", "stiction", "viscous"):
+            sizes.append((f"joint_friction_compensation.{name}", getattr(joint, name), of_joints))
+    limits = settings.distribution
+    if limits is not None:
+        sizes.append(("distribution.maximum_tension", limits.maximum_tension, of_tendons))
+    for entry, value, (names, what) in sizes:
+        if value is not None:
+            check_size(value, names, f"controller.{entry}", what)
+    if limits is not None:
+        for name, low, high in zip(
+            tendons,
+            expand(settings.minimum_tension, len(tendons)),
+            expand(limits.maximum_tension, len(tendons)),
+            strict=True,
+        ):
+            if high < low:
+                allowed = f"must be at least the minimum tension, {low:g} N for {name}"
+                raise problem("controller.distribution.maximum_tension", allowed, limits.maximum_tension)
+    if settings.passive_tension_loop is not None and not finger.passive_names:
+        raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")

@@ -1,0 +1,60 @@
+"""The coupling that passive tendons impose on references (20)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.description.routing import Array, Routing
+from finger_pin.exceptions import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveCoupling:
+    """Equation (20): the references of the joints that passive tendons drive follow from the others.
+
+    The last joint of every passive tendon that couples two or more joints is a follower: its reference is such that
+    the tendon, free of friction, carries its desired tension.
+
+    Attributes:
+        matrix: Shape (n, n); theta^d = matrix @ base + offset.
+        offset: Shape (n,), rad.
+        followers: Indices of the follower joints.
+    """
+
+    matrix: Array
+    offset: Array
+    followers: tuple[int, ...]
+
+    @classmethod
+    def from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
+        """Solve H_c theta^d = -f^d / K_t for the follower joints.
+
+        Args:
+            routing: The routing.
+            tension: f_5^d, shape (p,), N.
+            stiffness: K_t, shape (p,), N/m.
+
+        Raises:
+            InputError: If two passive tendons would determine the same joint.
+        """
+        size = len(routing.joints)
+        rows, followers = [], []
+        for index, row in enumerate(routing.coupling[routing.actuated :]):
+            crossed = np.flatnonzero(row)
+            if len(crossed) > 1:
+                rows.append(index)
+                followers.append(int(crossed[-1]))
+        matrix, offset = np.eye(size), np.zeros(size)
+        if not rows:
+            return cls(matrix, offset, ())
+        coupling = routing.coupling[routing.actuated + np.array(rows)]
+        driven = coupling[:, followers]
+        if len(set(followers)) < len(followers) or np.linalg.matrix_rank(driven) < len(followers):
+            names = ", ".join(routing.passive_names[index] for index in rows)
+            raise InputError("finger.tendons", f"the passive tendons {names} determine the same joint twice")
+        matrix[followers] = 0.0
+        matrix[followers] = -np.linalg.solve(driven, coupling @ matrix)
+        offset[followers] = -np.linalg.solve(driven, (tension / stiffness)[rows])
+        return cls(matrix, offset, tuple(followers))

@@ -1,0 +1,252 @@
+"""From TOML to validated descriptions: shipped data, a user's files, overrides, and errors a person can act on."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import Description, nearest, validate
+from finger_pin.exceptions import InputError
+from finger_pin.publishing import settle
+
+Table = dict[str, Any]
+_LARGEST = 10_000_000
+
+
+def list_fingers() -> dict[str, str]:
+    """Return the fingers that ship with the package, with a line about each."""
+    return _shipped("fingers")
+
+
+def list_scenarios() -> dict[str, str]:
+    """Return the scenarios that ship with the package, with a line about each."""
+    return _shipped("scenarios")
+
+
+def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
+    """Load a finger by the name of a shipped one or the path of a TOML file.
+
+    Args:
+        name: Such as ``ub`` or ``my_finger.toml``.
+        overrides: Values by dotted key, such as ``{"finger.joints.distal.link.length": 0.025}``.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    overrides = _from_here(overrides or {}, {"finger"})
+    table: Table = {"finger": str(name)}
+    with _depth_limited("finger"):
+        _apply(overrides, table)
+        return validate(FingerDescription, _resolve_finger(table["finger"], Path()), ("finger",))
+
+
+def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Load a scenario by the name of a shipped one or the path of a TOML file.
+
+    A scenario file may say ``extends = "fig6"`` to start from another scenario, and ``finger = "ub"`` or, to change
+    some of a finger, ``[finger]`` with ``base = "ub"`` and further entries.
+
+    Args:
+        name: Such as ``fig6`` or ``my_scenario.toml``.
+        overrides: Values by dotted key, such as ``{"controller.gain": 2.0}``; they win over the file. Paths among them
+            are relative to the working directory, paths in a file to the file.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    overrides = _from_here(overrides or {}, set(Scenario.model_fields))
+    with _depth_limited("scenario"):
+        table, folder = _read_scenario(str(name), Path())
+        table.setdefault("name", _as_name(Path(str(name)).stem))
+        # Another finger replaces the old one before entries on top of either are applied.
+        _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
+        if "finger" not in table:
+            raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+        table["finger"] = _resolve_finger(table["finger"], folder)
+        _apply(overrides, table)
+        return validate(Scenario, table, ())
+
+
+def to_toml(description: Description) -> str:
+    """Return the TOML text of a description, complete: reading it gives the same description back."""
+    return tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True)))
+
+
+def _shipped(kind: str) -> dict[str, str]:
+    found = {}
+    for entry in sorted(resources.files("finger_pin.description").joinpath(kind).iterdir(), key=lambda item: item.name):
+        if entry.name.endswith(".toml"):
+            found[entry.name.removesuffix(".toml")] = str(tomllib.loads(entry.read_text("utf-8")).get("title", ""))
+    return found
+
+
+def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
+    """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
+    if _is_path(name):
+        what, path = f"{kind} file {name}", folder / _expand(name)
+        with contextlib.suppress(OSError, ValueError):
+            settle(path.parent)
+        data = _read_bytes(what, path)
+    else:
+        what, path = f"{kind} {name}", Path(name)
+        names = _shipped(f"{kind}s")
+        if name not in names:
+            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{_hint(name, names)}"
+            raise InputError(kind, allowed, name)
+        data = resources.files("finger_pin.description").joinpath(f"{kind}s/{name}.toml").read_bytes()
+    try:
+        return tomllib.loads(data.decode("utf-8-sig")), path
+    except UnicodeDecodeError:
+        raise InputError(what, "is not a text file in UTF-8") from None
+    except RecursionError:
+        raise InputError(what, "is nested too deeply") from None
+    except ValueError as error:
+        raise InputError(what, f"is not valid TOML: {error}") from None
+
+
+def _is_path(name: str) -> bool:
+    return name.endswith(".toml") or "/" in name or "\\" in name
+
+
+def _expand(name: str) -> Path:
+    """Return a path with the home folder in place of ~, or as it is where there is no such home."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def _read_bytes(what: str, path: Path) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            data = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(what, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > _LARGEST:
+        raise InputError(what, f"is larger than {_LARGEST} bytes")
+    return data
+
+
+def _read_scenario(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
+    """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in."""
+    table, path = _read("scenario", name, folder)
+    identity = path.resolve()
+    if identity in seen:
+        raise InputError("extends", "a scenario cannot start from itself", name)
+    folder = path.parent
+    if "extends" not in table:
+        return table, folder
+    base = table.pop("extends")
+    if not isinstance(base, str):
+        raise InputError("extends", "must be the name or path of another scenario", base)
+    parent, parent_folder = _read_scenario(base, folder, (*seen, identity))
+    parent.pop("name", None)
+    if "finger" in parent:
+        parent["finger"] = _resolve_finger(parent["finger"], parent_folder)
+    if isinstance(table.get("finger"), str) or "base" in _as_table(table.get("finger")):
+        parent.pop("finger", None)
+    return _merge(parent, table), folder
+
+
+def _resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
+    """Return the table of a finger given by name, by path, or as a table that may start from a base."""
+    if isinstance(finger, str):
+        table, path = _read("finger", finger, folder)
+        identity = path.resolve()
+        if identity in seen:
+            raise InputError("finger.base", "a finger cannot start from itself", finger)
+        table.setdefault("name", _as_name(Path(finger).stem))
+        return _resolve_finger(table, path.parent, (*seen, identity))
+    if isinstance(finger, dict) and "base" in finger:
+        rest = dict(finger)
+        base = rest.pop("base")
+        if not isinstance(base, str):
+            raise InputError("finger.base", "must be the name or path of a finger", base)
+        return _merge(_resolve_finger(base, folder, seen), rest)
+    if not isinstance(finger, dict):
+        raise InputError("finger", "must be the name of a finger, the path of a .toml file, or a table", finger)
+    return finger
+
+
+def _merge(base: Table, top: Table) -> Table:
+    merged = dict(base)
+    for key, value in top.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _merge(merged[key], value) if both else value
+    return merged
+
+
+def _apply(overrides: Mapping[str, Any], table: Table) -> None:
+    for key, value in overrides.items():
+        *path, last = key.split(".")
+        inner = table
+        for depth, part in enumerate(path):
+            below = inner.setdefault(part, {})
+            if isinstance(below, str) and path[: depth + 1] == ["finger"]:
+                below = inner[part] = {"base": below}
+            if not isinstance(below, dict):
+                raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
+            inner = below
+        inner[last] = copy.deepcopy(value)
+
+
+def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
+    """Return overrides whose keys begin with an allowed one, with the path of a finger's file made absolute."""
+    checked: Table = {}
+    for key, value in overrides.items():
+        first, *rest = key.split(".")
+        if first not in allowed:
+            near = nearest(first, allowed)
+            hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
+            raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
+        if key in ("finger", "finger.base"):
+            value = _absolute(value)
+        if key == "finger" and isinstance(value, dict) and "base" in value:
+            value = {**value, "base": _absolute(value["base"])}
+        checked[key] = value
+    return checked
+
+
+def _absolute(finger: Any) -> Any:
+    return str(_expand(finger).absolute()) if isinstance(finger, str) and _is_path(finger) else finger
+
+
+@contextmanager
+def _depth_limited(what: str) -> Iterator[None]:
+    try:
+        yield
+    except RecursionError:
+        raise InputError(what, "is nested too deeply") from None
+
+
+def _hint(name: Any, names: Iterable[str]) -> str:
+    near = nearest(name, names)
+    return f"; did you mean {near}?" if near else ""
+
+
+def _as_table(value: Any) -> Table:
+    return value if isinstance(value, dict) else {}
+
+
+def _as_name(stem: str) -> str:
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem)[:60]
+    return name if re.match(r"[A-Za-z]", name) else f"scenario_{name}"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value

@@ -1,0 +1,286 @@
+"""The finger as data: links, joints, tendon routing, friction, limiters. SI units throughout.
+
+Every description is frozen and validated; nothing here computes physics.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from finger_pin.description.validation import (
+    IN_RADIANS,
+    MOST_ANGLE,
+    Description,
+    Name,
+    Numbers,
+    check_size,
+    choice,
+    problem,
+    quantity,
+    real,
+    reals,
+    vector,
+)
+from finger_pin.exceptions import toml_like
+
+_MILLIMETRES = " m (is it in millimetres?)"
+
+
+class Link(Description):
+    """A link that runs along its x axis, from its own joint to the next one (Table I)."""
+
+    length: Annotated[float, real(0.0, 2.0, above=True, hint=_MILLIMETRES)] = quantity(
+        ..., unit="m", source="Table I", doc="a, distance from this joint's axis to the next along x."
+    )
+    twist: Annotated[float, real(-math.pi, math.pi, hint=IN_RADIANS)] = quantity(
+        0.0, unit="rad", source="Table I", doc="alpha, rotation about x from this joint's axis to the next."
+    )
+    section: Annotated[Literal["round", "square"], choice("round", "square")] = quantity(
+        "round", unit="1", source="design", doc="Cross-section: a cylinder or a square box."
+    )
+    width: Annotated[float, real(0.0, 1.0, above=True, hint=_MILLIMETRES)] = quantity(
+        ..., unit="m", source="design", doc="Diameter, or side of the square."
+    )
+    mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] = quantity(
+        ..., unit="kg", source="design", doc="Mass of the link."
+    )
+    centre_of_mass: Annotated[float, real(-2.0, 2.0)] | None = quantity(
+        None, unit="m", source="half length", doc="Mass centre along x from the joint axis."
+    )
+    transverse_inertia: Annotated[float, real(0.0, 100.0, above=True)] | None = quantity(
+        None, unit="kg m2", source="solid of this section", doc="About the mass centre, across x."
+    )
+    axial_inertia: Annotated[float, real(0.0, 100.0, above=True)] | None = quantity(
+        None, unit="kg m2", source="solid of this section", doc="About the x axis."
+    )
+
+    @model_validator(mode="after")
+    def _fill(self) -> Self:
+        square = self.section == "square"
+        axial = self.mass * self.width**2 / (6.0 if square else 8.0)
+        lateral = self.mass * (self.width**2 / (12.0 if square else 16.0) + self.length**2 / 12.0)
+        defaults = {"centre_of_mass": self.length / 2, "transverse_inertia": lateral, "axial_inertia": axial}
+        for name, value in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+        if self.inertia[0] > 2.0 * self.inertia[1]:
+            raise problem(
+                "axial_inertia", "must be at most twice the transverse inertia (no body has more)", self.inertia[0]
+            )
+        return self
+
+    @property
+    def inertia(self) -> tuple[float, float]:
+        """Axial and transverse inertia about the mass centre, kg m2."""
+        assert self.axial_inertia is not None and self.transverse_inertia is not None
+        return self.axial_inertia, self.transverse_inertia
+
+    @property
+    def mass_centre(self) -> float:
+        """Mass centre along x, m."""
+        assert self.centre_of_mass is not None
+        return self.centre_of_mass
+
+
+class Joint(Description):
+    """A joint, its range (2) and, for a finger that is built here, the link that it carries."""
+
+    range: Annotated[tuple[float, float], vector(2, -MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] = quantity(
+        ..., unit="rad", source="(2)", doc="Lower and upper limit that the stroke limiter guards."
+    )
+    link: Link | None = Field(None, description="The link that this joint moves; none on a foreign model.")
+
+    @field_validator("range")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[0] >= value[1]:
+            raise problem("", "the lower limit must be below the upper one", list(value))
+        return value
+
+
+class Crossing(Description):
+    """How a tendon crosses a joint: winding radius (3) and whether the joint bends its path (15)."""
+
+    radius: Annotated[float, real(-0.5, 0.5, hint=_MILLIMETRES)] = quantity(
+        ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."
+    )
+    bends: bool = Field(False, strict=True, description="Whether the joint's rotation adds to the curvature (15).")
+
+
+class Tendon(Description):
+    """A tendon: the joints that it crosses, in order from its actuator or proximal anchor."""
+
+    kind: Annotated[Literal["actuated", "passive"], choice("actuated", "passive")] = quantity(
+        "actuated", unit="1", source="Sec. III", doc="Pulled by an actuator, or anchored at both ends."
+    )
+    curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="rad", source="(15)", doc="phi_off, curvature of the path at theta = 0."
+    )
+    crossings: dict[Name, Crossing] = Field(min_length=1, description="By joint, in order along the tendon.")
+    mass_after: int | None = Field(
+        None,
+        ge=0,
+        strict=True,
+        description="Passive only: crossings between the proximal anchor and the lumped mass; default half of them.",
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.kind == "actuated" and self.mass_after is not None:
+            raise problem("mass_after", "is for passive tendons only", self.mass_after)
+        if self.mass_after is not None and self.mass_after > len(self.crossings):
+            raise problem("mass_after", f"must be at most the {len(self.crossings)} crossings", self.mass_after)
+        if all(crossing.radius == 0.0 for crossing in self.crossings.values()):
+            raise problem("crossings", "at least one radius must differ from zero")
+        return self
+
+    @property
+    def proximal_crossings(self) -> int:
+        """Number of crossings between the proximal anchor and the lumped mass of a passive tendon."""
+        return len(self.crossings) // 2 if self.mass_after is None else self.mass_after
+
+
+class TendonFriction(Description):
+    """Law (9) for tendons: one number for all, or one per tendon."""
+
+    coulomb: Annotated[Numbers, reals(0.0, 10.0)] = quantity(
+        0.11, unit="1", source="Sec. IV-B", doc="mu_e, Coulomb coefficient between tendon and canal."
+    )
+    stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] = quantity(
+        1.5, unit="1", source="estimate", doc="rho = mu^c / mu^d."
+    )
+    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
+        5e4, unit="N/m", source="estimate", doc="sigma_0, bristle stiffness."
+    )
+    viscous: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        1.0, unit="N s/m", source="estimate", doc="b, viscous coefficient."
+    )
+    stribeck_velocity: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
+        0.01, unit="m/s", source="estimate", doc="omega, Stribeck velocity."
+    )
+    floor: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
+        1e-4, unit="N", source="guards (9a) at F^n = 0", doc="g_min, least friction level F^n M."
+    )
+    stribeck_exponent: Annotated[Numbers, reals(1.0, 2.0, whole=True)] = quantity(
+        1.0, unit="1", source="(9b)", doc="Exponent of |v| / omega: 1 as in the paper, or 2 as in the LuGre model."
+    )
+    micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N s/m", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
+    )
+
+
+class JointFriction(Description):
+    """Law (9) for joints: one number for all, or one per joint."""
+
+    coulomb: Annotated[Numbers, reals(0.0, 0.1, hint=_MILLIMETRES)] = quantity(
+        2.5e-4, unit="m", source="estimate", doc="M^d, Coulomb coefficient times pin radius."
+    )
+    stiction: Annotated[Numbers, reals(0.0, 0.1, hint=_MILLIMETRES)] = quantity(
+        3.5e-4, unit="m", source="estimate", doc="M^c, stiction coefficient times pin radius."
+    )
+    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
+        5.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness."
+    )
+    viscous: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        1e-3, unit="N m s/rad", source="estimate", doc="b, viscous coefficient."
+    )
+    stribeck_velocity: Annotated[Numbers, reals(0.0, 1e4, above=True)] = quantity(
+        0.1, unit="rad/s", source="estimate", doc="omega, Stribeck velocity."
+    )
+    floor: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
+        1e-7, unit="N m", source="guards (9a) at R = 0", doc="g_min, least friction level R M."
+    )
+    stribeck_exponent: Annotated[Numbers, reals(1.0, 2.0, whole=True)] = quantity(
+        1.0, unit="1", source="(9b)", doc="Exponent of |v| / omega: 1 as in the paper, or 2 as in the LuGre model."
+    )
+    micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N m s/rad", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
+    )
+
+    @model_validator(mode="after")
+    def _stiction_above_coulomb(self) -> Self:
+        both = isinstance(self.coulomb, tuple) and isinstance(self.stiction, tuple)
+        if both and len(self.coulomb) != len(self.stiction):  # type: ignore[arg-type]
+            return self
+        size = max(len(value) if isinstance(value, tuple) else 1 for value in (self.coulomb, self.stiction))
+        low = self.coulomb if isinstance(self.coulomb, tuple) else (self.coulomb,) * size
+        high = self.stiction if isinstance(self.stiction, tuple) else (self.stiction,) * size
+        if any(kinetic > static for kinetic, static in zip(low, high, strict=True)):
+            allowed = f"must be at least the Coulomb coefficient {toml_like(self.coulomb)}"
+            raise problem("stiction", allowed, self.stiction)
+        return self
+
+
+class PassiveTendon(Description):
+    """Passive tendons (12), (13): one number for all, or one per passive tendon."""
+
+    stiffness: Annotated[Numbers, reals(0.0, 1e10, above=True)] = quantity(
+        5e4, unit="N/m", source="estimate", doc="K_t, stiffness of the whole tendon; each half has 2 K_t."
+    )
+    mass: Annotated[Numbers, reals(0.0, 1.0, above=True, hint=" kg (is it in grams?)")] = quantity(
+        8.8e-6, unit="kg", source="estimate", doc="m_5, lumped mass."
+    )
+
+
+class StrokeLimiter(Description):
+    """Hunt-Crossley stroke limiter (2): one number for all, or one per joint."""
+
+    stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(50.0, unit="N m/rad", source="estimate", doc="k.")
+    damping: Annotated[Numbers, reals(0.0, 1e5)] = quantity(0.5, unit="s/rad", source="estimate", doc="c.")
+
+
+class FingerDescription(Description):
+    """A whole finger. Tendons are kept with the actuated ones first.
+
+    Lists of numbers follow the order of the joints, of all tendons, or of the passive tendons.
+    """
+
+    file_keys = ("base",)
+
+    name: Name = Field(description="Also the name of the robot in the URDF.")
+    title: str = Field("", strict=True, max_length=200, description="One line for listings.")
+    gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
+        (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="In the base frame."
+    )
+    joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
+    tendons: dict[Name, Tendon] = Field(min_length=1, description="By name.")
+    tendon_friction: TendonFriction = TendonFriction()
+    joint_friction: JointFriction = JointFriction()
+    passive_tendon: PassiveTendon = PassiveTendon()
+    stroke_limiter: StrokeLimiter = StrokeLimiter()
+
+    @field_validator("tendons")
+    @classmethod
+    def _actuated_first(cls, value: dict[str, Tendon]) -> dict[str, Tendon]:
+        return dict(sorted(value.items(), key=lambda item: item[1].kind))
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        joints, tendons = tuple(self.joints), tuple(self.tendons)
+        for name, tendon in self.tendons.items():
+            for joint in tendon.crossings:
+                if joint not in self.joints:
+                    allowed = f"no such joint; the joints are {', '.join(joints)}"
+                    raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        for group, names, what in (
+            ("tendon_friction", tendons, "tendon"),
+            ("joint_friction", joints, "joint"),
+            ("passive_tendon", self.passive_names, "passive tendon"),
+            ("stroke_limiter", joints, "joint"),
+        ):
+            for field, value in getattr(self, group):
+                check_size(value, names, f"{group}.{field}", what)
+        return self
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """Names of the passive tendons."""
+        return tuple(name for name, tendon in self.tendons.items() if tendon.kind == "passive")
+
+    @property
+    def actuated_names(self) -> tuple[str, ...]:
+        """Names of the actuated tendons."""
+        return tuple(name for name, tendon in self.tendons.items() if tendon.kind == "actuated")

@@ -1,0 +1,201 @@
+"""The routing table and the matrices that follow from it: (3), (10), (15), (17) and force closure.
+
+Forces come in two orders. *Tendons*: one entry per tendon, actuated first. *Strands*: one entry per actuated tendon,
+then for each passive tendon its proximal and its distal half, since friction makes their tensions differ (10).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+from numpy.typing import NDArray
+
+from finger_pin.description.parameters import FingerDescription
+
+Array = NDArray[np.float64]
+
+# Below this share of the largest, an internal tension counts as none.
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Routing:
+    """Matrices of a tendon network with n joints, t tendons (a actuated, p passive) and s = a + 2 p strands.
+
+    Attributes:
+        joints: Names of the n joints.
+        tendons: Names of the t tendons, actuated first.
+        actuated: Number a of actuated tendons.
+        coupling: H_c, shape (t, n), m; l = H_c theta, equation (3).
+        strand_coupling: H_c2, shape (s, n), m, equation (10).
+        curvature_matrix: Phi, shape (t, n), zeros and ones, equation (15).
+        curvature_offset: phi_off, shape (t,), rad.
+        loads: Shape (n, s), one where a strand loads a joint, equation (17).
+    """
+
+    joints: tuple[str, ...]
+    tendons: tuple[str, ...]
+    actuated: int
+    coupling: Array
+    strand_coupling: Array
+    curvature_matrix: Array
+    curvature_offset: Array
+    loads: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription) -> Routing:
+        """Build the matrices from the crossings of every tendon."""
+        joints = tuple(description.joints)
+        column = {name: index for index, name in enumerate(joints)}
+        coupling, curvature, strands, loads = [], [], [], []
+        for tendon in description.tendons.values():
+            radii, bends, crossed = np.zeros((3, len(joints), len(tendon.crossings)))
+            for order, (joint, crossing) in enumerate(tendon.crossings.items()):
+                radii[column[joint], order] = crossing.radius
+                bends[column[joint], order] = float(crossing.bends)
+                crossed[column[joint], order] = 1.0
+            coupling.append(radii.sum(axis=1))
+            curvature.append(bends.sum(axis=1))
+            split = tendon.proximal_crossings
+            halves = [slice(None)] if tendon.kind == "actuated" else [slice(None, split), slice(split, None)]
+            for half in halves:
+                strands.append(radii[:, half].sum(axis=1))
+                loads.append(crossed[:, half].sum(axis=1))
+        return cls(
+            joints=joints,
+            tendons=tuple(description.tendons),
+            actuated=len(description.actuated_names),
+            coupling=np.array(coupling),
+            strand_coupling=np.array(strands),
+            curvature_matrix=np.array(curvature),
+            curvature_offset=np.array([t.curvature_offset for t in description.tendons.values()]),
+            loads=np.array(loads).T,
+        )
+
+    @property
+    def passive(self) -> int:
+        """Number p of passive tendons."""
+        return len(self.tendons) - self.actuated
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """Names of the passive tendons."""
+        return self.tendons[self.actuated :]
+
+    @property
+    def actuated_coupling(self) -> Array:
+        """Rows of H_c of the actuated tendons, shape (a, n), m."""
+        return self.coupling[: self.actuated]
+
+    @property
+    def proximal_coupling(self) -> Array:
+        """Rows of H_c2 of the proximal halves of the passive tendons, shape (p, n), m."""
+        return self.strand_coupling[self.actuated :: 2]
+
+    @property
+    def distal_coupling(self) -> Array:
+        """Rows of H_c2 of the distal halves of the passive tendons, shape (p, n), m."""
+        return self.strand_coupling[self.actuated + 1 :: 2]
+
+    def strand(self, tendon: str, *, distal: bool = False) -> int:
+        """Return the index of a tendon's strand; ``distal`` asks for the distal half of a passive tendon."""
+        index = self.tendons.index(tendon)
+        return index if index < self.actuated else 2 * index - self.actuated + int(distal)
+
+    def force_closure(self) -> ForceClosure:
+        """Report whether tensions exist that are all positive and turn no joint."""
+        return ForceClosure.of(self.coupling, self.tendons)
+
+    def curvature(self, position: Array) -> Array:
+        """Return phi(theta) of (15), shape (..., t), rad, at joint positions of shape (..., n)."""
+        curvature: Array = np.abs(position) @ self.curvature_matrix.T + self.curvature_offset
+        return curvature
+
+    def strand_tension(self, tension: Array) -> Array:
+        """Return the tensions of all strands, shape (..., s): both halves of a passive tendon have its own."""
+        halves = np.repeat(tension[..., self.actuated :], 2, axis=-1)
+        return np.concatenate([tension[..., : self.actuated], halves], axis=-1)
+
+    def tendon_tension(self, strands: Array) -> Array:
+        """Return the delivered tension of every tendon, shape (..., t), of strands (..., s): a passive one's distal."""
+        distal = strands[..., self.actuated + 1 :: 2]
+        return np.concatenate([strands[..., : self.actuated], distal], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceClosure:
+    """Whether a tendon network can keep all its tendons taut at zero joint torque.
+
+    Attributes:
+        null_space: Basis of the null space of H_c^T, shape (t, k).
+        tension: f^k, shape (t,): internal tensions with the largest entry 1 and the smallest as large as possible;
+            zero where there are none.
+        tendons: Names of the tendons.
+    """
+
+    null_space: Array
+    tension: Array
+    tendons: tuple[str, ...]
+
+    @classmethod
+    def of(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
+        """Find the internal tensions of a coupling matrix H_c, shape (t, n)."""
+        # The radii differ by less than a few orders of magnitude, so a relative rank tolerance is safe.
+        null_space = scipy.linalg.null_space(coupling.T, rcond=1e-10)
+        count = null_space.shape[1]
+        tension = np.zeros(len(tendons))
+        if count == 1:
+            vector = _largest_one(null_space[:, 0])
+            # Where signs are mixed, any multiple but zero would make some tendon push.
+            tension = vector if vector.min() >= -_SLACK else np.zeros(len(tendons))
+        elif count > 1:
+            tension = _tautest(null_space)
+        return cls(null_space, tension, tendons)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every internal tension is positive."""
+        return bool(np.all(self.tension > _SLACK))
+
+    def __str__(self) -> str:
+        """Say in one line what holds or what is missing."""
+        if self.holds:
+            listed = ", ".join(f"{n} {f:.3g}" for n, f in zip(self.tendons, self.tension, strict=True))
+            return f"force closure: internal tensions in the ratio {listed}"
+        if self.null_space.shape[1] == 0:
+            return "no force closure: no tensions balance each other at zero torque (too few tendons)"
+        balance = self.tension
+        if self.null_space.shape[1] == 1:
+            balance = _largest_one(self.null_space[:, 0])
+        worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
+        return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
+
+
+def _largest_one(vector: Array) -> Array:
+    return np.asarray(vector / vector[np.argmax(np.abs(vector))])
+
+
+def _tautest(null_space: Array) -> Array:
+    """Return the internal tensions N y whose least entry is largest, or that leave the fewest tendons slack."""
+    size, count = null_space.shape
+    # The largest least entry e of N y subject to N y <= 1 is a linear programme in (y, e).
+    ones = np.ones((size, 1))
+    solution = scipy.optimize.linprog(
+        np.append(np.zeros(count), -1.0),
+        A_ub=np.block([[-null_space, ones], [null_space, 0.0 * ones]]),
+        b_ub=np.append(np.zeros(size), np.ones(size)),
+        bounds=[(None, None)] * count + [(None, 1.0)],
+    )
+    if solution.x[-1] <= _SLACK:
+        # Not all can be taut: most entries e_i in [0, 1] with N y >= e; a tendon that can be taut reaches 1.
+        solution = scipy.optimize.linprog(
+            np.append(np.zeros(count), -np.ones(size)),
+            A_ub=np.hstack([-null_space, np.eye(size)]),
+            b_ub=np.zeros(size),
+            bounds=[(None, None)] * count + [(0.0, 1.0)] * size,
+        )
+    tension = np.asarray(null_space @ solution.x[:count])
+    return tension / tension.max() if tension.max() > _SLACK else np.zeros(size)

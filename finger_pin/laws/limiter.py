@@ -1,0 +1,44 @@
+"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range, which never pull."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def penetration(position: Any, lower: Any, upper: Any) -> Any:
+    """Return how far a joint is beyond its range, positive above the upper limit, negative below the lower one."""
+    return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
+
+
+def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> Any:
+    """Return tau^r = max(0, k d (1 + c d')) with the sign of the penetration, N m.
+
+    It enters (18) as -tau^r, so a positive torque acts against positive rotation.
+
+    Args:
+        depth: Signed penetration, rad; d is its magnitude.
+        velocity: theta', rad/s.
+        stiffness: k, N m/rad.
+        damping: c, s/rad.
+    """
+    return stiffness * depth * np.maximum(0.0, 1.0 + damping * velocity * np.sign(depth))
+
+
+def limiter_slopes(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> tuple[Any, Any]:
+    """Return the derivatives of the limiter torque with respect to theta and theta'; zero inside the range."""
+    sign = np.sign(depth)
+    factor = 1.0 + damping * velocity * sign
+    touching = np.abs(sign) * (factor > 0.0)
+    return stiffness * factor * touching, stiffness * damping * np.abs(depth) * touching
+
+
+def limiter_energy(depth: Any, stiffness: Any) -> Any:
+    """Return the elastic energy k d^2 / 2, J."""
+    return 0.5 * stiffness * depth * depth
+
+
+def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
+    """Return the power that the contact does not store, (tau^r - k d) theta', W; never negative."""
+    return (torque - stiffness * depth) * velocity

@@ -1,0 +1,180 @@
+"""How one tendon winds: straight spans at rest in the links, and arcs around the joints between them.
+
+Between two joints the common tangent of their pulleys is at rest in the link, so only the arcs change when a joint
+turns, by r theta, and the path obeys (3) for any constant radius. The signed radius r puts the path at y = r in the
+frame of its joint, whose axis is z and whose link runs along x. A path that would leave its pulley on the inner side
+of a bend goes once around it, as on an idler. The last arc ends on the pulley of the link that the tendon moves.
+Angles are directions of the path against x, about the joint axis.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.geometry.lanes import Lanes
+
+#: Least wrap over the range of a joint, rad: of a path that passes, and of one that ends there.
+PASSING_WRAP, ENDING_WRAP = 0.05, 0.35
+#: Largest tilt of the first span that is preferred to a full turn around the first pulley, rad.
+LARGEST_TILT = 0.6
+#: Length of the first span behind the base, in widths of the first link; inside a link, in lengths of that link.
+BASE_LEAD, LINK_LEAD = 2.5, 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """A straight piece.
+
+    Attributes:
+        link: Index of the link at which it rests; 0 is the base, 1 the link after the first joint.
+        points: In the frame of that link, shape (P, 3), m.
+        sag: Shape of its sag, 1 at its middle and 0 at its ends, times its length, shape (P,), m.
+        distal: Whether a point lies beyond the lumped mass of a passive tendon, shape (P,).
+    """
+
+    link: int
+    points: Array
+    sag: Array
+    distal: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """A piece around a joint.
+
+    Attributes:
+        joint: Index of the joint, 1 for the first.
+        radius: r, m.
+        entry: Direction of the path where it meets the pulley, in the frame of the link before the joint, rad.
+        turn: Turn of the path from entry to exit at theta = 0, rad.
+        offset: Of each point along the joint axis, shape (P,), m.
+        fraction: Of each point along the arc, 0 to 1, shape (P,).
+        distal: As for `Span`.
+    """
+
+    joint: int
+    radius: float
+    entry: float
+    turn: float
+    offset: Array
+    fraction: Array
+    distal: NDArray[np.bool_]
+
+
+def wind(
+    description: FingerDescription, model: pin.Model, lanes: Lanes, tendon: str, resolution: int
+) -> tuple[Span | Arc, ...]:
+    """Return the pieces of a tendon from its actuator or proximal anchor to its insertion.
+
+    Args:
+        description: The finger.
+        model: Its Pinocchio model.
+        lanes: Of its tendons.
+        tendon: Which one.
+        resolution: Points per span and per radian of arc.
+    """
+    indices = {name: index for index, name in enumerate(description.joints, start=1)}
+    crossings = description.tendons[tendon].crossings
+    crossed = [indices[name] for name in crossings]
+    path = range(min(crossed), max(crossed) + 1)
+    radius = dict.fromkeys(path, 0.0) | {indices[name]: crossing.radius for name, crossing in crossings.items()}
+    ranges = dict(enumerate((joint.range for joint in description.joints.values()), start=1))
+    side = {j: math.copysign(1.0, r) if r else 0.0 for j, r in radius.items()}
+    # How far each joint can unwrap its arc.
+    unwrap = {j: min(max(side[j] * limit for limit in ranges[j]), 2.0 * math.pi) for j in path}
+
+    def directions(skew: dict[int, float]) -> tuple[dict[int, float], dict[int, float]]:
+        entry, leave = {}, {}
+        for a, b in itertools.pairwise(path):
+            leave[a], entry[b] = _tangent(
+                model.jointPlacements[b],
+                (radius[a], lanes.offset[tendon, a] + skew[a]),
+                (radius[b], lanes.offset[tendon, b] - skew[b]),
+            )
+        first, last = path[0], path[-1]
+        tilt = unwrap[first] + side[first] * leave[first] + PASSING_WRAP if first != last else 0.0
+        entry[first] = side[first] * tilt if 0.0 < tilt < LARGEST_TILT else 0.0
+        leave[last] = entry[last] - side[last] * (ENDING_WRAP + unwrap[last])
+        return entry, leave
+
+    entry, leave = directions(dict.fromkeys(path, 0.0))
+    least = {j: -unwrap[j] - side[j] * (leave[j] - entry[j]) for j in path}
+    turns = {j: math.ceil(max(0.0, -least[j] - PASSING_WRAP) / (2.0 * math.pi)) for j in path}
+    # The two ends of a full turn lie beside each other.
+    skew = {j: 0.25 * lanes.spacing * turns[j] for j in path}
+    entry, leave = directions(skew)
+
+    mass_link = _mass_link(description, tendon, crossed)
+    start = _start(description, model, path[0])
+    begin = _on_pulley(radius[path[0]], lanes.offset[tendon, path[0]] - skew[path[0]], entry[path[0]])
+    back = np.array([math.cos(entry[path[0]]), math.sin(entry[path[0]]), 0.0])
+    placement = model.jointPlacements[path[0]]
+    ends = np.array([placement.act(begin - start * back), placement.act(begin)])
+    pieces: list[Span | Arc] = [_span(path[0] - 1, ends, resolution, mass_link, whole=True)]
+    for j in path:
+        offset = lanes.offset[tendon, j]
+        if radius[j]:
+            turn = leave[j] - entry[j] - side[j] * 2.0 * math.pi * turns[j]
+            widest = max(abs(turn + limit) for limit in ranges[j])
+            count = max(3, math.ceil(resolution * min(widest, 4.0 * math.pi)))
+            fraction = np.arange(1, count + 1) / (count if j == path[-1] else count + 1)
+            offsets = offset + skew[j] * (2.0 * fraction - 1.0)
+            pieces.append(Arc(j, radius[j], entry[j], turn, offsets, fraction, np.full(count, j > mass_link)))
+        if j != path[-1]:
+            leaving = _on_pulley(radius[j], offset + skew[j], leave[j])
+            arriving = _on_pulley(radius[j + 1], lanes.offset[tendon, j + 1] - skew[j + 1], entry[j + 1])
+            ends = np.array([leaving, model.jointPlacements[j + 1].act(arriving)])
+            pieces.append(_span(j, ends, resolution, mass_link, whole=radius[j] != 0.0))
+    return tuple(pieces)
+
+
+def _tangent(placement: pin.SE3, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float]:
+    # Directions in which a taut path leaves one pulley and meets the next, each (signed radius, offset). Each end is
+    # the tangent from the other end's point; for parallel axes this converges quadratically to the common tangent.
+    leave, entry = 0.0, 0.0
+    for _ in range(8):
+        x, y, _ = placement.act(_on_pulley(*there, entry))
+        leave = math.atan2(y, x) - _asin(here[0], math.hypot(x, y))
+        x, y, _ = placement.actInv(_on_pulley(*here, leave))
+        entry = math.atan2(-y, -x) + _asin(there[0], math.hypot(x, y))
+    return leave, entry
+
+
+def _asin(radius: float, distance: float) -> float:
+    return math.asin(max(-1.0, min(1.0, radius / distance))) if distance else 0.0
+
+
+def _on_pulley(radius: float, offset: float, direction: float) -> Array:
+    return np.array([-radius * math.sin(direction), radius * math.cos(direction), offset])
+
+
+def _start(description: FingerDescription, model: pin.Model, joint: int) -> float:
+    if joint == 1:
+        link = next(iter(description.joints.values())).link
+        return BASE_LEAD * link.width if link is not None else 0.0
+    return LINK_LEAD * float(np.linalg.norm(model.jointPlacements[joint].translation))
+
+
+def _mass_link(description: FingerDescription, tendon: str, crossed: list[int]) -> int:
+    # The lumped mass is drawn on the link after its last proximal crossing; nowhere on an actuated tendon.
+    if description.tendons[tendon].kind == "actuated":
+        return len(description.joints) + 1
+    before = description.tendons[tendon].proximal_crossings
+    return crossed[before - 1] if before else crossed[0] - 1
+
+
+def _span(link: int, ends: Array, resolution: int, mass_link: int, *, whole: bool) -> Span:
+    # Not whole: without the first point, which the piece before has already.
+    fraction = np.linspace(0.0, 1.0, max(3, resolution))[0 if whole else 1 :]
+    points = ends[0] + fraction[:, None] * (ends[1] - ends[0])
+    sag = 4.0 * fraction * (1.0 - fraction) * np.linalg.norm(ends[1] - ends[0])
+    distal = fraction > 0.5 if link == mass_link else np.full(len(fraction), link > mass_link)
+    return Span(link, points, sag, distal)

@@ -1,0 +1,150 @@
+"""Rigid-body dynamics (18) on Pinocchio: M, C, G, J, forward and inverse dynamics of any fixed-base model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Positions and velocities of the rigid body; leading dimensions such as time are kept.
+
+    Attributes:
+        tip: p, fingertip position, shape (..., 3), m.
+        tip_velocity: p', shape (..., 3), m/s.
+        jacobian: J of (6), shape (..., 3, n).
+        directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+    """
+
+    tip: Array
+    tip_velocity: Array
+    jacobian: Array
+    directions: Array
+    kinetic_energy: Array
+    potential_energy: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where the fingertip is and what energy the rigid body has; leading dimensions are kept.
+
+    Attributes:
+        tip: p, shape (..., 3), m.
+        kinetic_energy: Shape (...,), J.
+        potential_energy: Of gravity, shape (...,), J.
+    """
+
+    tip: Array
+    kinetic_energy: Array
+    potential_energy: Array
+
+
+class RigidBody:
+    """A Pinocchio model of revolute and prismatic joints, with a fingertip frame.
+
+    Attributes:
+        model: The Pinocchio model.
+        tip_frame: Index of the fingertip frame.
+        joints: Names of the joints, in the order of the model.
+        proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
+        carriers: Index of the joint that carries that body, 0 for the base.
+    """
+
+    def __init__(self, model: pin.Model, tip_frame: str = "fingertip", base_axis: Sequence[float] = (1, 0, 0)) -> None:
+        """Take a model whose joints have one degree of freedom each.
+
+        Args:
+            model: Pinocchio model with a fixed base.
+            tip_frame: Name of the frame at the fingertip.
+            base_axis: e_1, along which the tendons run at the joints next to the base; base frame.
+
+        Raises:
+            InputError: If a joint has more than one coordinate, or there is no such frame.
+        """
+        for name, joint in zip(model.names[1:], model.joints[1:], strict=True):
+            if joint.nq != 1 or joint.nv != 1:
+                raise InputError(f"joint {name}", "only revolute and prismatic joints are supported", joint.shortname())
+        if not model.existFrame(tip_frame):
+            raise InputError("tip_frame", "no such frame in the model", tip_frame)
+        self.model = model
+        self.tip_frame = int(model.getFrameId(tip_frame))
+        self.joints: tuple[str, ...] = tuple(model.names[1:])
+        self._data = model.createData()
+        self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
+        self.carriers: list[int] = [0]
+        for index in range(1, model.njoints):
+            offset, parent = np.array(model.jointPlacements[index].translation), int(model.parents[index])
+            length = float(np.linalg.norm(offset))
+            # At the base, and where axes meet in a point, no link lies in between: the joint has the link of the other.
+            shared = parent == 0 or length == 0.0
+            self.carriers.append(self.carriers[parent] if shared else parent)
+            self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
+
+    def tip_position(self, q: Array) -> Array:
+        """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
+        pin.framesForwardKinematics(self.model, self._data, q)
+        return np.array(self._data.oMf[self.tip_frame].translation)
+
+    def jacobian(self, q: Array) -> Array:
+        """Return J = dp/dtheta of (6), shape (3, n)."""
+        reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return np.array(pin.computeFrameJacobian(self.model, self._data, q, self.tip_frame, reference)[:3])
+
+    def mass_matrix(self, q: Array) -> Array:
+        """Return M(theta) by the composite rigid body algorithm, shape (n, n)."""
+        return np.array(pin.crba(self.model, self._data, q, pin.Convention.WORLD))
+
+    def coriolis_matrix(self, q: Array, v: Array) -> Array:
+        """Return C(theta, theta') with M' - 2 C skew-symmetric, shape (n, n)."""
+        return np.array(pin.computeCoriolisMatrix(self.model, self._data, q, v))
+
+    def gravity_torque(self, q: Array) -> Array:
+        """Return G(theta), shape (n,), N m."""
+        return np.array(pin.computeGeneralizedGravity(self.model, self._data, q))
+
+    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
+        """Return M a + C v + G by recursive Newton-Euler, shape (n,), N m."""
+        return np.array(pin.rnea(self.model, self._data, q, v, a))
+
+    def forward_dynamics(self, q: Array, v: Array, torque: Array) -> Array:
+        """Return theta'' by the articulated body algorithm, shape (..., n), rad/s2."""
+        if q.ndim == 1:
+            return np.array(pin.aba(self.model, self._data, q, v, torque))
+        return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
+
+    def link_directions(self, q: Array) -> Array:
+        """Return e_j of (17), shape (n, 3): along the proximal link, from its joint to this one; base frame."""
+        pin.forwardKinematics(self.model, self._data, q)
+        return self._directions()
+
+    def distal_weights(self) -> Array:
+        """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
+        pin.computeSubtreeMasses(self.model, self._data)
+        return np.outer(np.array(self._data.mass)[1:], self.model.gravity.linear)
+
+    def kinematics(self, q: Array, v: Array) -> Kinematics:
+        """Return what follows from position and velocity, for shapes (..., n)."""
+        if q.ndim > 1:
+            each = [self.kinematics(*row) for row in zip(q, v, strict=True)]
+            return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
+        jacobian = self.jacobian(q)
+        tip = np.array(self._data.oMf[self.tip_frame].translation)
+        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
+        # Only now is every branch placed: the Jacobian places the fingertip's alone.
+        directions = self._directions()
+        potential = pin.computePotentialEnergy(self.model, self._data, q)
+        return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
+
+    def _directions(self) -> Array:
+        placements = self._data.oMi
+        rows = [placements[at].rotation @ axis for at, axis in zip(self.carriers, self.proximal_axes, strict=True)]
+        return np.array(rows[1:])

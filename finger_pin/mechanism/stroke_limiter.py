@@ -1,0 +1,47 @@
+"""Stroke limiters (2): Hunt-Crossley contacts at both ends of a joint's range, which never pull."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import expand
+from finger_pin.laws.limiter import limiter_torque, penetration
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeLimiter:
+    """Stroke limiters of all joints.
+
+    Attributes:
+        lower: Shape (n,), rad.
+        upper: Shape (n,), rad.
+        stiffness: k, shape (n,), N m/rad.
+        damping: c, shape (n,), s/rad.
+    """
+
+    lower: Array
+    upper: Array
+    stiffness: Array
+    damping: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription) -> StrokeLimiter:
+        """Read the ranges and the contact's stiffness and damping."""
+        ranges = np.array([joint.range for joint in description.joints.values()])
+        settings = description.stroke_limiter
+        size = len(ranges)
+        return cls(ranges[:, 0], ranges[:, 1], expand(settings.stiffness, size), expand(settings.damping, size))
+
+    def depth(self, position: Array) -> Array:
+        """Return the signed penetration, shape (..., n), rad."""
+        depth: Array = penetration(position, self.lower, self.upper)
+        return depth
+
+    def torque(self, depth: Array, velocity: Array) -> Array:
+        """Return tau^r, shape (..., n), N m."""
+        torque: Array = limiter_torque(depth, velocity, self.stiffness, self.damping)
+        return torque

@@ -1,0 +1,125 @@
+"""URDF of a finger, and the Pinocchio model read from it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+
+import pinocchio as pin
+
+from finger_pin.description.parameters import FingerDescription, Link
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
+
+BASE_FRAME = "base"
+TIP_FRAME = "fingertip"
+
+#: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
+#: They are for readers of the URDF that want some; the simulation applies neither.
+TENSION_LIMIT = 100.0
+VELOCITY_LIMIT = 20.0
+
+# Names that the URDF or Pinocchio gives to something else, so that looking them up would be ambiguous.
+_RESERVED = (TIP_FRAME, f"{TIP_FRAME}_fixed", "universe")
+
+
+def to_urdf(description: FingerDescription) -> str:
+    """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
+
+    Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
+    and the link runs along x. Numbers are written so that reading them gives the same floats.
+
+    Raises:
+        InputError: If a joint has no link, or a name that the URDF needs itself.
+    """
+    links = _links(description)
+    shapes = link_shapes(description, links)
+    first, last = next(iter(links)), next(reversed(links.values()))
+    robot = ET.Element("robot", name=description.name)
+    for material, colour in MATERIALS.items():
+        ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=_numbers(*colour))
+    _add_link(robot, BASE_FRAME, palm_shapes(description, first, links[first]))
+    parent, length, twist = BASE_FRAME, 0.0, 0.0
+    for name, link in links.items():
+        child = f"{name}_link"
+        _add_link(robot, child, shapes[name], inertia_of=link)
+        joint = _add_joint(robot, name, "revolute", parent, child, length, twist)
+        ET.SubElement(joint, "axis", xyz=_numbers(0, 0, 1))
+        lower, upper = description.joints[name].range
+        limits = {"lower": lower, "upper": upper, "effort": effort_limit(description, name)}
+        limits["velocity"] = VELOCITY_LIMIT
+        ET.SubElement(joint, "limit", {key: _numbers(value) for key, value in limits.items()})
+        parent, length, twist = child, link.length, link.twist
+    _add_link(robot, TIP_FRAME, pad_shapes(last))
+    _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, length, twist)
+    ET.indent(robot)
+    return ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def effort_limit(description: FingerDescription, joint: str) -> float:
+    """Return the torque on a joint, N m, when the tendons on its stronger side all carry `TENSION_LIMIT`."""
+    crossings = [tendon.crossings.get(joint) for tendon in description.tendons.values()]
+    radii = [crossing.radius for crossing in crossings if crossing]
+    return TENSION_LIMIT * max(sum(r for r in radii if r > 0.0), -sum(r for r in radii if r < 0.0))
+
+
+def build_rigid_body(description: FingerDescription) -> RigidBody:
+    """Return the rigid body of a finger: its URDF read by Pinocchio, with its gravity."""
+    model = pin.buildModelFromXML(to_urdf(description))
+    model.gravity.linear[:] = description.gravity
+    return RigidBody(model, TIP_FRAME)
+
+
+def _links(description: FingerDescription) -> dict[str, Link]:
+    links = {}
+    for name, joint in description.joints.items():
+        if name in _RESERVED:
+            raise InputError(f"finger.joints.{name}", f"a joint cannot be called {' or '.join(_RESERVED)}")
+        if joint.link is None:
+            raise InputError(f"finger.joints.{name}.link", "is needed to generate a URDF")
+        links[name] = joint.link
+    return links
+
+
+def _add_link(robot: ET.Element, name: str, shapes: Iterable[Shape], inertia_of: Link | None = None) -> None:
+    element = ET.SubElement(robot, "link", name=name)
+    if inertia_of is not None:
+        axial, transverse = inertia_of.inertia
+        inertial = ET.SubElement(element, "inertial")
+        ET.SubElement(inertial, "origin", xyz=_numbers(inertia_of.mass_centre, 0, 0), rpy=_numbers(0, 0, 0))
+        ET.SubElement(inertial, "mass", value=_numbers(inertia_of.mass))
+        moments = {"ixx": axial, "ixy": 0.0, "ixz": 0.0, "iyy": transverse, "iyz": 0.0, "izz": transverse}
+        ET.SubElement(inertial, "inertia", {key: _numbers(value) for key, value in moments.items()})
+    for shape in shapes:
+        visual = _add_shape(element, "visual", shape)
+        ET.SubElement(visual, "material", name=shape.material)
+    for shape in shapes:
+        if shape.collides:
+            _add_shape(element, "collision", shape)
+
+
+def _add_shape(link: ET.Element, role: str, shape: Shape) -> ET.Element:
+    element = ET.SubElement(link, role)
+    ET.SubElement(element, "origin", xyz=_numbers(*shape.position), rpy=_numbers(*shape.rotation))
+    geometry = ET.SubElement(element, "geometry")
+    if shape.kind == "box":
+        ET.SubElement(geometry, "box", size=_numbers(*shape.size))
+    else:
+        sizes = zip(("radius", "length"), shape.size, strict=False)
+        ET.SubElement(geometry, shape.kind, {key: _numbers(value) for key, value in sizes})
+    return element
+
+
+def _add_joint(
+    robot: ET.Element, name: str, kind: str, parent: str, child: str, length: float, twist: float
+) -> ET.Element:
+    joint = ET.SubElement(robot, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
+    ET.SubElement(joint, "origin", xyz=_numbers(length, 0, 0), rpy=_numbers(twist, 0, 0))
+    return joint
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)

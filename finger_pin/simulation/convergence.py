@@ -1,0 +1,172 @@
+"""Does a result depend on its tolerance? The run repeated at a tighter one, and where the two part."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.control.closed_loop import Reference
+from finger_pin.control.proportional import Controller
+from finger_pin.core.textbook import Stop
+from finger_pin.description.loading import to_toml
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
+from finger_pin.exceptions import InputError, SelfLockingWarning
+from finger_pin.simulation.simulate import simulate
+
+FACTOR, LIMIT = 100.0, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Convergence:
+    """A run against its repetition at a tighter tolerance.
+
+    As long as the runs stay together, their difference is the error of the run, because the repetition's is far less.
+
+    Attributes:
+        time: Shape (m,), s.
+        joints: Names, n of them.
+        difference: theta of the run less that of the repetition, shape (m, n), rad.
+        limit: Runs that differ by more than this have parted, rad.
+        rtol: Relative tolerance of the repetition.
+        atol_scale: Absolute tolerance of the repetition over the scale of each kind of state.
+    """
+
+    time: Array
+    joints: tuple[str, ...]
+    difference: Array
+    limit: float
+    rtol: float
+    atol_scale: float
+
+    @property
+    def largest(self) -> Array:
+        """The largest difference of each joint, shape (n,), rad."""
+        return np.asarray(np.abs(self.difference).max(axis=0))
+
+    @property
+    def parting_time(self) -> float | None:
+        """The first time at which a joint differs by more than the limit, s; None if the runs stay together."""
+        parted = np.flatnonzero(np.abs(self.difference).max(axis=1) > self.limit)
+        return float(self.time[parted[0]]) if len(parted) else None
+
+    @property
+    def converged(self) -> bool:
+        """Whether the runs stay together."""
+        return self.parting_time is None
+
+    @property
+    def verdict(self) -> str:
+        """What a user should know, in a sentence or two."""
+        repeated = f"repeated at rtol {self.rtol:g}, atol_scale {self.atol_scale:g}"
+        if self.parting_time is None:
+            return f"Converged: {repeated}, the motion is the same within {self.largest.max():.1e} rad."
+        return (
+            f"Warning: {repeated}, the run parts at t = {self.parting_time:.6g} s, by more than {self.limit:g} rad. "
+            "What comes after that depends on the tolerance. Loops that hunt are that sensitive: "
+            "try a smaller simulation.rtol and atol_scale, or a smaller controller.gain."
+        )
+
+    def attach(self, result: xr.Dataset) -> xr.Dataset:
+        """Return a result with the difference as a variable and the rest as attributes."""
+        attributes = {
+            "units": "rad",
+            "long_name": "joint angle less that of the run repeated at a tighter tolerance",
+        }
+        # A run that was interrupted may be longer than its repetition, or shorter.
+        values = np.full((result.sizes["time"], len(self.joints)), np.nan)
+        values[: len(self.time)] = self.difference
+        checked = result.assign(convergence_difference=(("time", "joint"), values, attributes))
+        return checked.assign_attrs(
+            convergence=self.verdict,
+            convergence_rtol=self.rtol,
+            convergence_atol_scale=self.atol_scale,
+            convergence_limit=self.limit,
+            convergence_parting_time=math.nan if self.parting_time is None else self.parting_time,
+        )
+
+
+def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
+    """Return a scenario with tolerances divided by a factor, as far as tolerances go.
+
+    Raises:
+        InputError: If the factor is not above 1, or a tolerance is as tight as it can be.
+    """
+    if not 1.0 < factor < math.inf:
+        raise InputError("factor", "must be above 1 and finite", factor)
+    settings = scenario.simulation
+    least = {"rtol": LEAST_RTOL, "atol_scale": LEAST_ATOL_SCALE}
+    tolerances = {name: max(getattr(settings, name) / factor, bound) for name, bound in least.items()}
+    for name, value in tolerances.items():
+        if not value < getattr(settings, name):
+            allowed = f"must be above {least[name]:g}, so that the run can be repeated at a tighter tolerance"
+            raise InputError(f"simulation.{name}", allowed, getattr(settings, name))
+    return scenario.model_copy(update={"simulation": settings.model_copy(update=tolerances)})
+
+
+def check_convergence(
+    scenario: Scenario,
+    result: xr.Dataset | None = None,
+    *,
+    factor: float = FACTOR,
+    limit: float = LIMIT,
+    controller: Controller | None = None,
+    reference: Reference | None = None,
+    control_period: float | None = None,
+    progress: Callable[[float], None] | None = None,
+    stop: Stop | None = None,
+) -> Convergence:
+    """Repeat a run at a tighter tolerance, and tell how far and where the two part.
+
+    Args:
+        scenario: What was or is to be simulated.
+        result: What `simulate` returned for it; simulated now by default.
+        factor: By which both tolerances are divided.
+        limit: Joints that differ by more than this have parted, rad.
+        controller: As for `simulate`.
+        reference: As for `simulate`.
+        control_period: As for `simulate`.
+        progress: Called with the simulated time of each run, s.
+        stop: Asked now and then; true ends the simulation that is running.
+
+    Raises:
+        InputError: If the tolerances cannot be tightened, or the result is of another scenario.
+        IntegrationError: If an integrator cannot go on.
+        Interrupted: If ``stop`` returned true.
+    """
+    tighter = tightened(scenario, factor)
+    if not 0.0 < limit < math.inf:
+        raise InputError("limit", "must be above 0 and finite", limit)
+    if result is not None and result.attrs["scenario"] != to_toml(scenario):
+        raise InputError("result", "is of another scenario")
+
+    def run(each: Scenario) -> xr.Dataset:
+        return simulate(
+            each,
+            controller=controller,
+            reference=reference,
+            control_period=control_period,
+            progress=progress,
+            stop=stop,
+        )
+
+    first = run(scenario) if result is None else result
+    with warnings.catch_warnings():
+        # The first run has said it.
+        warnings.simplefilter("ignore", SelfLockingWarning)
+        second = run(tighter)
+    count = min(first.sizes["time"], second.sizes["time"])
+    angles = [each["joint_position"].transpose("time", "joint").values[:count] for each in (first, second)]
+    return Convergence(
+        time=np.asarray(second["time"].values[:count]),
+        joints=tuple(map(str, first["joint"].values)),
+        difference=angles[0] - angles[1],
+        limit=limit,
+        rtol=tighter.simulation.rtol,
+        atol_scale=tighter.simulation.atol_scale,
+    )

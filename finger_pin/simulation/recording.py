@@ -1,0 +1,178 @@
+"""Results as an xarray Dataset: every signal with its unit, name and equation."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.core.textbook import Trajectory
+from finger_pin.description.loading import to_toml
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.files import replacing
+from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.publishing import settle
+from finger_pin.simulation.account import Account, account
+
+_JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
+_PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
+_STORED = {
+    "kinetic": "kinetic energy",
+    "gravity": "potential energy of gravity",
+    "passive_tendon": "elastic energy of the passive tendons",
+    "limiter": "elastic energy of the stroke limiters",
+    "tendon_bristles": "elastic energy of the tendons' bristles",
+    "joint_bristles": "elastic energy of the joints' bristles",
+}
+_EXCHANGED = {
+    "actuators": "supplied by the actuators",
+    "fingertip": "supplied by the fingertip force",
+    "tendon_coulomb": "lost by tendons sliding",
+    "tendon_viscous": "lost in the tendons' viscous friction",
+    "tendon_micro_damping": "lost in the tendons' micro-damping",
+    "joint_coulomb": "lost by joints sliding",
+    "joint_viscous": "lost in the joints' viscous friction",
+    "joint_micro_damping": "lost in the joints' micro-damping",
+    "limiter": "lost in the stroke limiters",
+    "slack": "booked where a tension is cut at zero",
+}
+
+
+def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str) -> xr.Dataset:
+    """Return all signals of a trajectory at the scenario's sample times, as far as the trajectory goes.
+
+    The signals are recomputed from the states by the evaluation that the dynamics use.
+    """
+    times = scenario.sample_times()
+    times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
+    signals = loop.evaluate(times, trajectory.interpolate(times))
+    state = signals.finger.state
+    motion = loop.dynamics.motion(state.position, state.velocity)
+    kept = account(loop, trajectory, times, signals, motion)
+    routing = loop.finger.routing
+    variables = _signals(loop, signals, motion) | _energies(kept)
+    dataset = xr.Dataset(
+        {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
+        coords={
+            "time": ("time", times, {"units": "s", "long_name": "time"}),
+            "joint": ("joint", list(routing.joints), {"long_name": "joint"}),
+            "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
+            "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
+        },
+        attrs=_attributes(scenario, trajectory, method),
+    )
+    if routing.passive > 1:
+        dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
+    return dataset
+
+
+def save(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a result to a netCDF4 file, whole or not at all."""
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+
+
+def load_result(path: str | Path) -> xr.Dataset:
+    """Read a result that `save` wrote into memory.
+
+    In a folder of results whose run was killed while it moved them into place, the moves are finished before.
+    """
+    with contextlib.suppress(OSError):
+        settle(Path(path).parent)
+    return xr.load_dataset(path, engine="netcdf4")
+
+
+def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+    finger, tendons, joints, state = signals.finger, signals.finger.tendons, signals.finger.joints, signals.finger.state
+    actuated, passive = loop.finger.routing.actuated, loop.finger.routing.passive
+    halves = tendons.strands[..., actuated:]
+    tension = loop.finger.routing.tendon_tension(tendons.strands)
+    error = signals.reference.position - state.position
+    table: dict[str, tuple[Any, Array, dict[str, str]]] = {
+        "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
+        "joint_velocity": _entry(_JOINT, state.velocity, "rad/s", "joint velocity"),
+        "joint_acceleration": _entry(_JOINT, finger.acceleration, "rad/s2", "joint acceleration", "18"),
+        "joint_reference": _entry(_JOINT, signals.reference.position, "rad", "desired joint angle", "20"),
+        "tracking_error": _entry(_JOINT, error, "rad", "desired less actual joint angle"),
+        "fingertip_position": _entry(("time", "axis"), motion.tip, "m", "fingertip position", "1"),
+        "tendon_command": _entry(_TENDON, signals.control.tension, "N", "commanded or planned tension", "21b"),
+        "tendon_tension": _entry(_TENDON, tension, "N", "delivered tension; distal half of a passive tendon", "12"),
+        "tendon_velocity": _entry(_TENDON, tendons.velocity, "m/s", "sliding velocity", "3"),
+        "tendon_friction": _entry(_TENDON, tendons.friction, "N", "tendon friction force", "9c"),
+        "tendon_stiction": _entry(_TENDON, state.tendon_stiction, "N", "tendon stiction force", "9a"),
+        "tendon_normal_force": _entry(_TENDON, tendons.normal, "N", "sum of the tensions at both ends", "14"),
+        "tendon_friction_coefficient": _entry(_TENDON, tendons.coefficient, "1", "Coulomb coefficient", "16"),
+        "tendon_curvature": _entry(_TENDON, tendons.curvature, "rad", "total curvature of the path", "15"),
+        "joint_torque_command": _entry(_JOINT, signals.control.torque, "N m", "desired joint torque", "19"),
+        "joint_torque": _entry(_JOINT, finger.tendon_torque, "N m", "torque of the tendons", "11"),
+        "joint_friction": _entry(_JOINT, joints.friction, "N m", "joint friction torque", "9c"),
+        "joint_stiction": _entry(_JOINT, state.joint_stiction, "N m", "joint stiction torque", "9a"),
+        "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
+        "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
+        "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
+    }
+    if signals.control.shortfall is not None:
+        text = "desired torque that tension limits keep from being planned"
+        table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)
+    if passive:
+        shared = {
+            "passive_tension_proximal": (halves[..., 0::2], "N", "tension of the proximal half", "12"),
+            "passive_position": (state.passive_position, "m", "position of the lumped mass", "13"),
+            "passive_velocity": (state.passive_velocity, "m/s", "velocity of the lumped mass", "13"),
+        }
+        for name, (values, unit, long_name, equation) in shared.items():
+            # One passive tendon, the common case, needs no dimension of its own.
+            single = passive == 1
+            dims = ("time",) if single else _PASSIVE
+            table[name] = _entry(dims, values[:, 0] if single else values, unit, long_name, equation)
+    return table
+
+
+def _energies(kept: Account) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+    table = {}
+    for name, text in _STORED.items():
+        table[f"energy_{name}"] = _entry("time", getattr(kept.stored, name), "J", text)
+    for name, text in _EXCHANGED.items():
+        table[f"power_{name}"] = _entry("time", getattr(kept.powers, name), "W", f"power {text}")
+        table[f"energy_exchanged_{name}"] = _entry("time", getattr(kept.works, name), "J", f"energy {text}")
+    text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
+    table["energy_residual"] = _entry("time", kept.residual, "J", text)
+    return table
+
+
+def _entry(
+    dims: Any, values: Array, units: str, long_name: str, equation: str = ""
+) -> tuple[Any, Array, dict[str, str]]:
+    attributes = {"units": units, "long_name": long_name}
+    if equation:
+        attributes["equation"] = f"({equation})"
+    return dims, np.asarray(values), attributes
+
+
+def _attributes(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
+    settings = scenario.simulation
+    statistics: Mapping[str, Any] = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
+    return {
+        "title": scenario.title or scenario.name,
+        "scenario": to_toml(scenario),
+        "method": method,
+        "rtol": settings.rtol,
+        "atol_scale": settings.atol_scale,
+        "end_time": float(trajectory.breakpoints[-1]),
+        **statistics,
+        **_versions(),
+    }
+
+
+@cache
+def _versions() -> Mapping[str, str]:
+    return {f"version_{name.replace('-', '_')}": metadata.version(name) for name in _PACKAGES}

@@ -1,0 +1,184 @@
+"""Simulate a scenario: from its description to a Dataset of everything that happened."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.analysis.locking_margin import warn_of_self_locking
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Reference
+from finger_pin.control.compiled import build_control
+from finger_pin.control.measurement import MeasuringController
+from finger_pin.control.proportional import Controller, ProportionalController
+from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.sampling import SampledController
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.cvode import integrate_cvode
+from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
+from finger_pin.core.plant import Control, held_control
+from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
+from finger_pin.description.controller import SamplingSettings
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.simulation.recording import record
+
+_ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
+# Where tolerances are tight already, it is rounding that an integrator cannot get below.
+_TIGHT = 1e-8
+_ADVICE_TIGHT = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
+_CONTINUOUS = "Radau"
+# Steps between two looks at a compiled simulation: rarely for a progress bar, often for an observer.
+_CHUNK, _CHUNK_OBSERVED = 256, 4
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    controller: Controller | None = None,
+    reference: Reference | None = None,
+    control_period: float | None = None,
+    progress: Callable[[float], None] | None = None,
+    observe: Callable[[float, LoopSignals], None] | None = None,
+    stop: Stop | None = None,
+) -> xr.Dataset:
+    """Simulate a scenario from rest on its reference.
+
+    The compiled methods run without Python inside as long as controller and reference are the paper's. A controller or
+    reference of one's own is Python, and so is what a scenario adds to the paper's controller: with a
+    ``control_period``, or ``controller.sampling`` in the scenario, it is sampled and held, and the compiled core runs
+    between the samples; without one it acts continuously, which calls it at every evaluation of scipy's Radau method:
+    that takes seconds for a simulated second.
+
+    Args:
+        scenario: What to simulate, from `load_scenario`.
+        controller: Replaces the scenario's controller.
+        reference: Replaces the scenario's reference.
+        control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
+            without either it is continuous. Compiled methods only.
+        progress: Called with the simulated time, s, now and then.
+        observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
+        stop: Asked now and then; when it returns true the simulation ends there.
+
+    Returns:
+        Every signal of the model at the scenario's sample rate, and the energy account.
+
+    Raises:
+        InputError: If the control period is not positive, the method cannot sample, or the controller must be sampled.
+        IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
+        Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
+
+    Warns:
+        SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
+            the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
+            there is neither.
+    """
+    method = scenario.simulation.method
+    loop = ClosedLoop.from_scenario(scenario, controller, reference)
+    # The margin is that of the paper's controller on the scenario's reference.
+    own = controller is None and reference is None
+    margin = warn_of_self_locking(scenario) if own else None
+    sampling = _sampling(scenario, control_period)
+    if sampling is None and isinstance(loop.controller, MeasuringController):
+        raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
+    if sampling is None and method in TABLEAUS and _control(loop) is None:
+        method = _CONTINUOUS
+    if scenario.simulation.method not in METHODS_IN_NUMPY:
+        loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
+    if sampling is not None:
+        loop = replace(loop, controller=SampledController(loop, sampling))
+
+    def watch(time: float, x: Array) -> None:
+        if progress is not None:
+            progress(time)
+        if observe is not None:
+            observe(time, loop.evaluate(time, x))
+
+    chunk = _CHUNK if observe is None else _CHUNK_OBSERVED
+    trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
+    reached = float(trajectory.breakpoints[-1])
+    # A motion at the edge of what numbers hold has energies beyond it: that is told below, in one line.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        result = record(scenario, loop, trajectory, method)
+    if margin is not None:
+        result.attrs["self_locking_margin"] = margin
+    result, excess = _finite_part(result)
+    if trajectory.failure:
+        tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT
+        raise IntegrationError(reached, trajectory.failure, _ADVICE_TIGHT if tight else _ADVICE, result)
+    if excess:
+        raise IntegrationError(float(result.attrs["end_time"]), f"{excess} is not finite after that", _ADVICE, result)
+    if trajectory.interrupted:
+        raise Interrupted(reached, result)
+    return result
+
+
+def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
+    length, excess = result.sizes["time"], ""
+    for name, values in result.data_vars.items():
+        finite = np.isfinite(values.to_numpy())
+        if not finite.all():
+            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
+            if first < length:
+                length, excess = first, str(name)
+    if excess:
+        result = result.isel(time=slice(max(length, 1)))
+        result.attrs["end_time"] = float(result["time"][-1])
+    return result, excess
+
+
+def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:
+    """Return how the controller is sampled, or None if it is continuous."""
+    settings, method = scenario.controller.sampling, scenario.simulation.method
+    if period is not None and not 0.0 < period < math.inf:
+        raise InputError("control_period", "must be above 0", period)
+    if (settings is not None or period is not None) and method not in TABLEAUS:
+        raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
+    if period is None:
+        return settings
+    return (settings or SamplingSettings()).model_copy(update={"period": float(period)})
+
+
+def _control(loop: ClosedLoop) -> Control | None:
+    """Return the loop's controller and reference as arrays, or None if they are Python."""
+    controller, reference = loop.controller, loop.reference
+    if isinstance(controller, ProportionalController) and isinstance(reference, HarmonicReference):
+        return build_control(controller, reference, loop.finger.routing.actuated)
+    return None
+
+
+def _integrate(
+    scenario: Scenario, loop: ClosedLoop, method: str, watch: Watch, chunk: int, stop: Stop | None
+) -> Trajectory:
+    settings, controller = scenario.simulation, loop.controller
+    start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
+    if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
+        plant = loop.dynamics.plant
+        return integrate_compiled(
+            Stepper(plant, _control(loop) or held_control(plant), start, TABLEAUS[method](), settings.rtol, atol),
+            settings.duration,
+            loop.finger.layout.names,
+            held=controller if isinstance(controller, SampledController) else None,
+            watch=watch,
+            chunk=chunk,
+            stop=stop,
+        )
+    if method == "CVODE":
+        return integrate_cvode(
+            loop.rhs, start, settings.duration, rtol=settings.rtol, atol=atol, watch=watch, stop=stop
+        )
+    return integrate(
+        loop.rhs,
+        start,
+        settings.duration,
+        method=method,
+        rtol=settings.rtol,
+        atol=atol,
+        watch=watch,
+        stop=stop,
+    )

@@ -1,0 +1,145 @@
+"""A finger in steps, for loops of one's own: controllers, learning, hardware in the loop."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.integrator import TABLEAUS, Stepper
+from finger_pin.core.plant import held_control
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import nearest
+from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.mechanism.finger import Finger, FingerSignals
+from finger_pin.mechanism.state import State
+
+_ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
+
+
+class Simulator:
+    """A finger that is stepped under tensions held over each step; deterministic, and compiled.
+
+        sim = Simulator(Finger(load_finger("ub")), position=[0.0, 0.3, 0.3, 0.2])
+        for _ in range(1000):
+            state = sim.step(tension, 1e-3)
+
+    Attributes:
+        finger: The finger.
+    """
+
+    def __init__(
+        self,
+        finger: Finger,
+        position: ArrayLike | None = None,
+        *,
+        method: str = "Rodas4",
+        rtol: float = 1e-3,
+        atol_scale: float = 1e-3,
+    ) -> None:
+        """Start at rest, at time zero.
+
+        Args:
+            finger: The finger.
+            position: theta at the start, shape (n,), rad; by default the middle of the ranges.
+            method: A compiled method.
+            rtol: Relative tolerance.
+            atol_scale: Absolute tolerance over the scale of each kind of state.
+
+        Raises:
+            InputError: Naming the argument that is wrong.
+        """
+        if method not in TABLEAUS:
+            near = nearest(method, TABLEAUS)
+            raise InputError(
+                "method", f"must be one of {', '.join(TABLEAUS)}{f'; did you mean {near}?' if near else ''}", method
+            )
+        for name, value in (("rtol", rtol), ("atol_scale", atol_scale)):
+            if not 0.0 < value <= 0.1:
+                raise InputError(name, "must be above 0 and at most 0.1", value)
+        limiter = finger.stroke_limiter
+        start = 0.5 * (limiter.lower + limiter.upper) if position is None else position
+        self.finger = finger
+        self._compiled = CompiledFinger(finger)
+        self._tension = np.zeros(finger.routing.actuated)
+        self._stepper = Stepper(
+            self._compiled.plant,
+            held_control(self._compiled.plant),
+            finger.rest_state(_vector("position", start, len(finger.routing.joints))),
+            TABLEAUS[method](),
+            rtol,
+            atol_scale * finger.layout.scales(),
+        )
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._stepper.time
+
+    @property
+    def x(self) -> Array:
+        """The packed state, shape (size,); a copy. Setting it continues from there, at the same time."""
+        return self._stepper.x.copy()
+
+    @x.setter
+    def x(self, value: ArrayLike) -> None:
+        self._stepper.restart(_vector("x", value, self.finger.layout.size))
+
+    @property
+    def state(self) -> State:
+        """The state by name; a copy."""
+        return self.finger.layout.unpack(self.x)
+
+    def step(self, tension: ArrayLike, dt: float, fingertip_force: ArrayLike | None = None) -> State:
+        """Advance by a time under constant tensions; return the state then.
+
+        Args:
+            tension: f^a, shape (a,), N.
+            dt: s.
+            fingertip_force: F over the step, shape (3,), N, base frame; none by default.
+
+        Raises:
+            InputError: If an argument is not finite or has the wrong size; nothing has moved then.
+            IntegrationError: If the integrator cannot go on; the state is where it stopped.
+        """
+        command = _vector("tension", tension, self._tension.size)
+        if not 0.0 < dt < math.inf:
+            raise InputError("dt", "must be above 0 and finite", dt)
+        stepper = self._stepper
+        if fingertip_force is not None:
+            stepper.load(_vector("fingertip_force", fingertip_force, 3))
+        elif stepper.plant.loaded:
+            stepper.load(np.zeros(3))
+        self._tension[:] = command
+        stepper.control.tension[:] = command
+        status, _ = stepper.advance(stepper.time + dt)
+        if status:
+            raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), _ADVICE)
+        return self.finger.layout.unpack(stepper.x.copy())
+
+    def signals(self) -> FingerSignals:
+        """Return all signals at the present state, under the tensions and force of the last step."""
+        return self._compiled.evaluate(self.x, self._tension, self._stepper.plant.fingertip_force.copy())
+
+    def copy(self) -> Simulator:
+        """Return an independent simulator in the same condition: both go on bit by bit alike."""
+        twin = copy.copy(self)
+        twin._compiled = CompiledFinger(self.finger)
+        twin._tension = self._tension.copy()
+        twin._stepper = self._stepper.copy()
+        return twin
+
+
+def _vector(name: str, value: ArrayLike, size: int) -> Array:
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(name, f"must be {size} numbers", value) from None
+    if vector.shape != (size,):
+        raise InputError(name, f"must be {size} numbers, not an array of shape {vector.shape}")
+    if not np.isfinite(vector).all():
+        raise InputError(name, "must be finite", vector.tolist())
+    return vector

@@ -1,0 +1,38 @@
+"""The paper's conclusions as experiments: many runs, what was measured in them, and what it says.
+
+Every experiment takes a scenario, so that the same questions can be put to any finger.
+"""
+
+from __future__ import annotations
+
+from finger_pin.studies.conclusions.delivery import DELIVERY_RUNS, PassiveDelivery, check_delivery, passive_delivery
+from finger_pin.studies.conclusions.findings import Finding, Verdict, findings_table, write_findings
+from finger_pin.studies.conclusions.influence import (
+    INFLUENCE_RUNS,
+    FrictionInfluence,
+    check_influence,
+    friction_influence,
+)
+from finger_pin.studies.conclusions.posture import TRANSMISSION_RUNS, Transmission, transmission
+from finger_pin.studies.conclusions.verdicts import delivery_findings, influence_findings, transmission_findings
+
+__all__ = [
+    "DELIVERY_RUNS",
+    "INFLUENCE_RUNS",
+    "TRANSMISSION_RUNS",
+    "Finding",
+    "FrictionInfluence",
+    "PassiveDelivery",
+    "Transmission",
+    "Verdict",
+    "check_delivery",
+    "check_influence",
+    "delivery_findings",
+    "findings_table",
+    "friction_influence",
+    "influence_findings",
+    "passive_delivery",
+    "transmission",
+    "transmission_findings",
+    "write_findings",
+]

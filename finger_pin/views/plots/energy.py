@@ -1,0 +1,115 @@
+"""The energy account: where energy is stored, what is supplied and lost, and what is left unexplained."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from finger_pin.description.routing import Array
+from finger_pin.views.plots.lines import shade, trace
+from finger_pin.views.plots.panels import labelled, stack, title
+from finger_pin.views.plots.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    YELLOW,
+    new_figure,
+    styled,
+)
+
+_STORED = {
+    "kinetic": "kinetic",
+    "gravity": "gravity",
+    "passive_tendon": "passive tendons",
+    "limiter": "limiters",
+    "tendon_bristles": "tendon bristles",
+    "joint_bristles": "joint bristles",
+}
+_SUPPLIED = ("actuators", "fingertip")
+_LOST = {
+    "tendon_coulomb": ("tendons sliding", VERMILLION),
+    "tendon_viscous": ("tendons viscous", ORANGE),
+    "tendon_micro_damping": ("tendons' micro-damping", YELLOW),
+    "joint_coulomb": ("joints sliding", BLUE),
+    "joint_viscous": ("joints viscous", SKY),
+    "joint_micro_damping": ("joints' micro-damping", BLACK),
+    "limiter": ("stroke limiters", GREEN),
+    "slack": ("tensions cut at zero", PURPLE),
+}
+_MILLI = 1e3
+
+
+@styled
+def plot_energy(result: xr.Dataset) -> Figure:
+    """Draw the energy account from a result.
+
+    (a) Every stored energy that is not zero throughout, mJ. (b) What has been supplied, mJ, and on top of each other
+    what has been lost; with the change of the stored energy this must reach what was supplied. (c) The part of the
+    supplied energy that the account cannot explain.
+
+    Args:
+        result: Dataset of `simulate`, of any finger.
+    """
+    time = result["time"].values
+    stored = {name: result[f"energy_{name}"].values for name in _STORED}
+    shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
+    supplied = np.asarray(sum(result[f"energy_exchanged_{name}"].values for name in _SUPPLIED))
+    figure = new_figure(11.0, 6.6)
+    strips = stack(figure, 0.0, 5.0, [labelled(_STORED[name], "mJ") for name in shown], bottom=0.5)
+    title(strips[0], "(a) stored energy")
+    for axes, values in zip(strips, shown.values(), strict=True):
+        trace(axes, time, _MILLI * values, color=BLUE, linewidth=1.1)
+    labels = ["energy (mJ)", "|residual| / supplied"]
+    above, below = stack(figure, 5.1, 10.8, labels, heights=[2.2, 1.0], gap=0.4, bottom=0.5)
+    _balance(above, result, supplied, np.asarray(sum(stored.values())))
+    _residual(below, result, supplied)
+    return figure
+
+
+def _balance(axes: Axes, result: xr.Dataset, supplied: Array, stored: Array) -> None:
+    time = result["time"].values
+    losses = {name: _MILLI * result[f"energy_exchanged_{name}"].values for name in _LOST}
+    level = np.zeros(len(time))
+    for name, (label, colour) in _LOST.items():
+        if np.any(losses[name]):
+            shade(axes, time, level, level + losses[name], color=colour, alpha=0.8, label=label)
+            level = level + losses[name]
+    change = _MILLI * (stored - stored[0])
+    shade(axes, time, level, level + change, color=GREY, alpha=0.35, label="change of stored energy")
+    trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=1.6)
+    if axes.dataLim.y0 >= 0.0:
+        axes.set_ylim(bottom=0.0)
+    title(axes, "(b) what was supplied, and where it went")
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda index: (labels[index] != "supplied", -index))
+    axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
+
+
+def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
+    time, residual = result["time"].values, result["energy_residual"].values
+    scale = float(np.max(np.abs(supplied)))
+    share = np.abs(residual) / (scale or 1.0)
+    worst = float(np.max(share))
+    if worst > 0.0:
+        # Zeros have no place on a logarithmic axis: they go below its end.
+        axes.set_yscale("log")
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.set_ylim(1e-4 * worst, 10.0 * worst)
+        share = np.maximum(share, 1e-6 * worst)
+    trace(axes, time, share, color=BLUE, linewidth=0.9)
+    title(axes, f"(c) unexplained: at most {_scientific(worst)} {'of the supplied energy' if scale else 'J'}")
+    if not scale:
+        axes.set_ylabel("|residual| (J)")
+
+
+def _scientific(value: float) -> str:
+    mantissa, exponent = f"{value:.0e}".split("e")
+    return rf"${mantissa} \times 10^{{{int(exponent)}}}$" if value else "0"

@@ -1,0 +1,53 @@
+"""Fig. 3: the friction law (9) in steady sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from finger_pin.laws.bristle import friction_coefficient, steady_force
+from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.style import new_figure, styled
+
+#: The paper's normal force, N. It prints none of the other values: these are of the tendons' order.
+NORMAL = 10.0
+KINETIC = 0.10
+RATIOS = (1.0, 1.5, 2.0, 3.0)
+RATIO = 2.0
+STRIBECK = (0.002, 0.005, 0.010, 0.020)
+STRIBECK_TOP = 0.010
+FASTEST = 0.05
+
+
+@styled
+def plot_friction_law() -> Figure:
+    """Draw Fig. 3: F^s of (9) with F^s' = 0 against the velocity, for F^n = 10 N.
+
+    Top: varying M^c / M^d. Bottom: varying the Stribeck velocity omega. The viscous part of (9c) is left out.
+    """
+    figure = new_figure(7.5, 6.4, "constrained")
+    top, bottom = figure.subplots(2, 1, sharex=True, sharey=True)
+    _curves(top, ((ratio * KINETIC, STRIBECK_TOP, f"{ratio:g}") for ratio in RATIOS))
+    top.set_title(rf"varying $M^c$:  $M^d$ = {KINETIC:g},  $\omega$ = {1e3 * STRIBECK_TOP:g} mm/s")
+    top.legend(title=r"$M^c\,/\,M^d$", loc="upper left", alignment="left")
+    _curves(bottom, ((RATIO * KINETIC, stribeck, f"{1e3 * stribeck:g} mm/s") for stribeck in STRIBECK))
+    bottom.set_title(rf"varying $\omega$:  $M^d$ = {KINETIC:g},  $M^c$ = {RATIO * KINETIC:g}")
+    bottom.legend(title=r"$\omega$", loc="upper left", alignment="left")
+    bottom.set_xlabel("velocity $v$ (mm/s)")
+    figure.suptitle(rf"Friction law for $F^n$ = {NORMAL:g} N", x=0.02, ha="left", fontsize=12)
+    return figure
+
+
+def _curves(axes: Axes, variants: Iterable[tuple[float, float, str]]) -> None:
+    # Denser towards zero, where the curves are steep; the step at zero is the line between the two branches.
+    branch = FASTEST * np.linspace(1e-4, 1.0, 250) ** 2
+    velocity = np.concatenate([-branch[::-1], branch])
+    for index, (static, stribeck, label) in enumerate(variants):
+        coefficient = friction_coefficient(velocity, KINETIC, static, stribeck)
+        force = steady_force(velocity, NORMAL, coefficient, 0.0)
+        axes.plot(1e3 * velocity, force, label=label, linewidth=1.8, **series(index))
+    axes.set_xlim(-1e3 * FASTEST, 1e3 * FASTEST)
+    axes.set_ylabel("friction force $F^s$ (N)")

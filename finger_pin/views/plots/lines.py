@@ -1,0 +1,55 @@
+"""Long signals as lines and areas of few points that hide no spike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from finger_pin.description.routing import Array
+from finger_pin.views.plots.style import COLOURS, DASHES
+
+#: Bins of a decimated line, two points each: more than a panel has columns of pixels.
+BINS = 800
+
+
+def extremes(values: Array, bins: int = BINS) -> NDArray[np.intp]:
+    """Return the indices that draw a long line as it looks: the least and the greatest of every bin, and both ends.
+
+    Args:
+        values: Shape (m,).
+        bins: Number of bins of equal length.
+
+    Returns:
+        Increasing indices, at most 2 bins + 2 of them; all of them where there are few.
+    """
+    size = len(values)
+    if size <= 2 * bins:
+        return np.arange(size)
+    width = -(-size // bins)
+    filled = np.append(values, np.full(-size % width, values[-1])).reshape(-1, width)
+    start = np.arange(len(filled)) * width
+    chosen = np.concatenate([[0, size - 1], start + filled.argmin(axis=1), start + filled.argmax(axis=1)])
+    return np.unique(np.minimum(chosen, size - 1))
+
+
+def trace(axes: Axes, time: Array, values: Array, **options: Any) -> Line2D:
+    """Draw a signal, shape (m,), against time, shape (m,), thinned by `extremes`; return the line."""
+    kept = extremes(values)
+    if len(values) == 1:
+        options["marker"] = "."
+    return axes.plot(time[kept], values[kept], **options)[0]
+
+
+def shade(axes: Axes, time: Array, first: Array, second: Array, **options: Any) -> None:
+    """Fill between two signals, thinned so that no extreme of either is lost."""
+    kept = np.union1d(extremes(first), extremes(second))
+    axes.fill_between(time[kept], first[kept], second[kept], linewidth=0.0, **options)
+
+
+def series(index: int) -> dict[str, Any]:
+    """Return colour and dashes of the series with this index."""
+    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}

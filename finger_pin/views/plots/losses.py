@@ -1,0 +1,66 @@
+"""Torques and forces before and after the friction of tendons and joints."""
+
+from __future__ import annotations
+
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from finger_pin.description.routing import Array
+from finger_pin.views.plots.lines import shade, trace
+from finger_pin.views.plots.panels import labelled, legend, stack, title
+from finger_pin.views.plots.signals import names, passive_proximal
+from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
+
+
+@styled
+def plot_losses(result: xr.Dataset) -> Figure:
+    """Draw what friction takes, from a result.
+
+    (a) One panel per tendon, N: the tension before its friction (the command; of a passive tendon, the proximal half)
+    and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d of (19), the
+    torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
+
+    Args:
+        result: Dataset of `simulate`, of any finger.
+    """
+    rows = max(result.sizes["tendon"], result.sizes["joint"])
+    figure = new_figure(11.0, max(6.6, 1.3 * rows))
+    _tendons(figure, result)
+    _joints(figure, result)
+    return figure
+
+
+def _tendons(figure: Figure, result: xr.Dataset) -> None:
+    time, tendons = result["time"].values, names(result, "tendon")
+    before = result["tendon_command"].transpose("time", "tendon").values
+    after = result["tendon_tension"].transpose("time", "tendon").values
+    proximal = passive_proximal(result)
+    titles = [f"{name}, passive" if name in proximal else name for name in tendons]
+    panels = stack(figure, 0.0, 5.4, [labelled(each, "N") for each in titles])
+    for index, (axes, name) in enumerate(zip(panels, tendons, strict=True)):
+        _gap(axes, time, proximal.get(name, before[:, index]), after[:, index], "before", "after tendon friction")
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    title(panels[0], "(a) tendon tension before and after tendon friction")
+    legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=3)
+
+
+def _joints(figure: Figure, result: xr.Dataset) -> None:
+    time, joints = result["time"].values, names(result, "joint")
+    command, torque, friction = (
+        1e3 * result[name].transpose("time", "joint").values
+        for name in ("joint_torque_command", "joint_torque", "joint_friction")
+    )
+    panels = stack(figure, 5.5, 10.8, [labelled(name, "mN m") for name in joints])
+    for index, axes in enumerate(panels):
+        trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=1.0)
+        net = torque[:, index] - friction[:, index]
+        _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
+    title(panels[0], "(b) joint torque before and after joint friction")
+    legend(panels[-1], panels[0].get_lines(), columns=3)
+
+
+def _gap(axes: Axes, time: Array, before: Array, after: Array, first: str, second: str) -> None:
+    shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="taken by friction")
+    trace(axes, time, before, label=first, color=BLUE, linewidth=1.1)
+    trace(axes, time, after, label=second, color=VERMILLION, linewidth=1.1)

@@ -1,0 +1,128 @@
+"""What a search found: the designs over each two objectives, their front, and the design that it began with."""
+
+from __future__ import annotations
+
+import textwrap
+from itertools import combinations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
+
+# Percentiles of the designs that are in view whatever they are, and the room around them, in shares of their span.
+_IN_VIEW, _ROOM = (0.0, 95.0), 0.08
+# Of more designs on a front than this not all are numbered.
+_NUMBERED = 16
+
+
+@styled
+def plot_pareto(result: xr.Dataset) -> Figure:
+    """Draw every design that keeps the constraints over each two objectives, the front, and the design at the start.
+
+    Of one objective its course is drawn: every design, and the best so far. Designs that break a constraint are left
+    out, but for the one at the start.
+
+    Args:
+        result: Dataset of `optimise`.
+    """
+    names = [name for kind in ("minimise", "maximise") for name in result.attrs[kind].split(", ") if name]
+    if len(names) == 1:
+        return _course(result, names[0])
+    if len(names) == 2:
+        figure = new_figure(11.0, 5.2, "constrained")
+        whole, close = figure.subplots(1, 2)
+        _pair(whole, result, *names)
+        _magnify(whole, close, result, *names)
+        panels = [whole]
+    else:
+        pairs = list(combinations(names, 2))
+        columns = min(len(pairs), 3)
+        rows = -(-len(pairs) // columns)
+        figure = new_figure(max(7.5, 4.6 * columns), max(5.4, 4.2 * rows), "constrained")
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for spare in grid[len(pairs) :]:
+            spare.remove()
+        panels = list(grid[: len(pairs)])
+        for axes, (first, second) in zip(panels, pairs, strict=True):
+            _pair(axes, result, first, second)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
+    """Draw designs that keep the bounds, front and start, with all but the farthest designs in view."""
+    x, y, front = (result[name].values for name in (first, second, "front"))
+    kept = result["feasible"].values & (front == 0)
+    axes.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=4.0, markeredgewidth=0.0, label="kept bounds")
+    axes.plot(x[front > 0], y[front > 0], "o", color=VERMILLION, markersize=5.0, label="front")
+    if result["status"].values[0] == "done":
+        note = "start" if result["feasible"].values[0] else "start, breaks a bound"
+        axes.plot(x[:1], y[:1], "*", color=BLACK, markersize=12.0, label=note)
+    axes.set_xlabel(textwrap.fill(_label(result, first), 60))
+    axes.set_ylabel(textwrap.fill(_label(result, second), 60))
+    always = front > 0
+    always[0] = True
+    for values, limit in ((x, axes.set_xlim), (y, axes.set_ylim)):
+        most = values[kept & np.isfinite(values)]
+        shown = np.concatenate([values[always], np.percentile(most, _IN_VIEW) if most.size else most])
+        shown = shown[np.isfinite(shown)]
+        if shown.size and np.ptp(shown) > 0.0:
+            limit(shown.min() - _ROOM * np.ptp(shown), shown.max() + _ROOM * np.ptp(shown))
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    beyond = int((kept & ~((x >= left) & (x <= right) & (y >= low) & (y <= high))).sum())
+    axes.set_title(f"{int(result['feasible'].sum())} designs" + (f", {beyond} beyond the edges" if beyond else ""))
+
+
+def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: str) -> None:
+    """Draw the front with its numbers, and where it lies in the whole."""
+    x, y, front = (result[name].values for name in (first, second, "front"))
+    order = np.argsort(np.where(front > 0, front, np.inf))[: int((front > 0).sum())]
+    close.set_xlabel(whole.get_xlabel())
+    if not order.size:
+        close.set_axis_off()
+        close.text(0.5, 0.5, "no design keeps all bounds", transform=close.transAxes, ha="center", color=GREY)
+        return
+    kept = result["feasible"].values & (front == 0)
+    close.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=4.0, markeredgewidth=0.0)
+    # Between two designs of a front nothing is known to be better than the worse value of either.
+    falls = second in result.attrs["minimise"].split(", ")
+    close.step(x[order], y[order], where="post" if falls else "pre", color=VERMILLION, linewidth=1.0, alpha=0.6)
+    close.plot(x[order], y[order], "o", color=VERMILLION, markersize=5.0)
+    every = -(-len(order) // _NUMBERED)
+    for row in order[::every]:
+        close.annotate(str(front[row]), (x[row], y[row]), xytext=(5, 4), textcoords="offset points", fontsize=8.5)
+    for values, limit in ((x[order], close.set_xlim), (y[order], close.set_ylim)):
+        span = np.ptp(values) or 0.02 * abs(values[0]) or 1.0
+        limit(values.min() - 0.35 * span, values.max() + 0.35 * span)
+    close.set_title(f"the front: {len(order)} designs")
+    close.xaxis.set_major_locator(MaxNLocator(6))
+    whole.indicate_inset(
+        (*(e[0] for e in (close.get_xlim(), close.get_ylim())), *map(np.ptp, (close.get_xlim(), close.get_ylim()))),
+        edgecolor=GREY, alpha=0.8,
+    )  # fmt: skip
+
+
+def _course(result: xr.Dataset, name: str) -> Figure:
+    figure = new_figure(7.5, 4.6, "constrained")
+    axes = figure.subplots()
+    rows = np.flatnonzero(result["feasible"].values)
+    values = result[name].values[rows]
+    pick = np.minimum if result.attrs["minimise"] else np.maximum
+    axes.plot(rows, values, "o", color=BLUE, alpha=0.35, markersize=3.5, markeredgewidth=0.0, label="kept bounds")
+    if rows.size:
+        axes.step(rows, pick.accumulate(values), where="post", color=VERMILLION, label="best so far")
+    else:
+        axes.text(0.5, 0.5, "no design keeps all bounds", transform=axes.transAxes, ha="center", color=GREY)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("design, in the order of the search")
+    axes.set_ylabel(_label(result, name))
+    axes.legend(loc="best")
+    return figure
+
+
+def _label(result: xr.Dataset, name: str) -> str:
+    return f"{result[name].attrs['long_name']} ({result[name].attrs['units']})"

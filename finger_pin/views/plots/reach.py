@@ -1,0 +1,123 @@
+"""Where the fingertip can go: images of the joint ranges under (1), with the passive tendons' constraint (4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
+
+_PARALLEL = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """The flexion plane of a finger: the joints parallel to the last one move, the others are held.
+
+    Attributes:
+        patches: Fingertip positions, shape (patches, m, m, 3), m.
+        plane: Indices of the two axes of the base frame that the section is drawn in.
+        poses: Joints and fingertip of the finger at three poses, straight to flexed, shape (3, n + 1, 3), m.
+    """
+
+    patches: Array
+    plane: tuple[int, int]
+    poses: Array
+
+
+def fingertip_surface(finger: Finger, samples: int = 45) -> Array:
+    """Return the surface that bounds the fingertip's workspace.
+
+    Joints that passive tendons drive follow the others as inextensible tendons demand, H_c theta = 0 in their rows:
+    equation (4). Of the other joints, two at a time run through their ranges while the rest sit at their limits. The
+    reach of an outstretched finger that never folds back past its own base is bounded by these surfaces.
+
+    Args:
+        finger: Any finger.
+        samples: Points along either side of a patch.
+
+    Returns:
+        Shape (patches, samples, samples, 3), m, base frame; not a number where a driven joint would leave its range.
+    """
+    return _patches(finger, _free(finger), _rest(finger), samples)
+
+
+def flexion_section(finger: Finger, samples: int = 61) -> Section:
+    """Return the planar section of the workspace: as `fingertip_surface`, with all but parallel joints held."""
+    held = _rest(finger)
+    axes = _joint_axes(finger, held)
+    parallel = [j for j in range(len(held)) if np.linalg.norm(np.cross(axes[j], axes[-1])) < _PARALLEL]
+    moving = [j for j in _free(finger) if j in parallel]
+    patches = _patches(finger, moving, held, samples)
+    normal = int(np.argmax(np.abs(axes[-1])))
+    first, second = (axis for axis in range(3) if axis != normal)
+    low, high = _limits(finger)
+    poses = []
+    for share in (0.0, 0.5, 1.0):
+        pose = held.copy()
+        pose[moving] = (1.0 - share) * held[moving] + share * high[moving]
+        poses.append(_skeleton(finger, np.clip(_constraint(finger).matrix @ pose, low, high)))
+    return Section(patches, (first, second), np.array(poses))
+
+
+def _constraint(finger: Finger) -> PassiveCoupling:
+    passive = finger.routing.passive
+    return PassiveCoupling.from_routing(finger.routing, np.zeros(passive), np.ones(passive))
+
+
+def _free(finger: Finger) -> list[int]:
+    followers = _constraint(finger).followers
+    return [j for j in range(len(finger.routing.joints)) if j not in followers]
+
+
+def _limits(finger: Finger) -> Array:
+    return np.array([joint.range for joint in finger.description.joints.values()]).T
+
+
+def _rest(finger: Finger) -> Array:
+    low, high = _limits(finger)
+    return np.asarray(np.clip(0.0, low, high))
+
+
+def _patches(finger: Finger, moving: list[int], held: Array, samples: int) -> Array:
+    low, high = _limits(finger)
+    matrix = _constraint(finger).matrix
+    # A patch of fewer than two joints is a curve or a point: the missing ones stay where they are.
+    pairs: list[tuple[int, ...]] = list(combinations(moving, 2)) or [tuple(moving)]
+    patches = []
+    for pair in pairs:
+        rest = [j for j in moving if j not in pair]
+        for corner in product(*((low[j], high[j]) for j in rest)):
+            position = np.tile(held, (samples, samples, 1))
+            position[..., rest] = corner
+            for axis, j in enumerate(pair):
+                along = np.linspace(low[j], high[j], samples)
+                position[..., j] = along[:, None] if axis == 0 else along
+            patches.append(position @ matrix.T)
+    positions = np.array(patches)
+    tips = np.array([finger.rigid_body.tip_position(q) for q in positions.reshape(-1, len(held))])
+    outside = np.any((positions < low - 1e-9) | (positions > high + 1e-9), axis=-1)
+    tips = tips.reshape(*positions.shape[:-1], 3)
+    tips[outside] = np.nan
+    return tips
+
+
+def _joint_axes(finger: Finger, position: Array) -> Array:
+    model = finger.rigid_body.model
+    data = model.createData()
+    pin.computeJointJacobians(model, data, position)
+    frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    return np.array([pin.getJointJacobian(model, data, j, frame)[3:, j - 1] for j in range(1, model.njoints)])
+
+
+def _skeleton(finger: Finger, position: Array) -> Array:
+    model = finger.rigid_body.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, position)
+    joints = [np.array(data.oMi[j].translation) for j in range(1, model.njoints)]
+    return np.array([*joints, finger.rigid_body.tip_position(position)])

@@ -1,0 +1,224 @@
+"""What a sweep found: lines over one key, maps over two, parallel coordinates over more."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from numpy.typing import NDArray
+
+from finger_pin.description.routing import Array
+from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
+
+_MAP = "cividis"
+# Values that differ by more than this factor are coloured by their logarithm.
+_WIDE = 50.0
+# Parts of a key that tell a reader nothing.
+_SILENT = {"finger", "joints", "link", "tendons", "crossings"}
+
+
+@styled
+def plot_sweep(result: xr.Dataset) -> Figure:
+    """Draw the metrics of a sweep: lines over one key, maps over two, parallel coordinates over more or over samples.
+
+    Runs that failed are marked in lines and maps; in parallel coordinates they end at the last key.
+
+    Args:
+        result: Dataset of `sweep`.
+    """
+    keys = [str(name) for name in result.coords]
+    if "sample" not in result.dims:
+        keys = [key for key in keys if result.sizes[key] > 1] or keys[:1]
+        result = result.squeeze([name for name in result.dims if name not in keys], drop=True)
+    if len(keys) == 1:
+        return _lines(result, keys[0])
+    if len(keys) == 2 and "sample" not in result.dims:
+        return _maps(result, keys[0], keys[1])
+    return _parallel(result, keys)
+
+
+def short_key(key: str) -> str:
+    """Return what a key says to a reader, such as ``T3 medial radius``."""
+    return " ".join(part.replace("_", " ") for part in key.split(".") if part not in _SILENT)
+
+
+def _lines(result: xr.Dataset, key: str) -> Figure:
+    figure, panels = _panels(result, 4.6, 2.5)
+    order = np.argsort(result[key].values)
+    values = result[key].values[order]
+    failed = result["status"].values[order] == "failed"
+    for name, axes in panels.items():
+        found = result[name].values[order]
+        axes.plot(values, found, color=BLUE, marker="o" if len(values) <= 40 else "", markersize=3.5)
+        _scale(axes.set_xscale, axes.xaxis, values)
+        axes.margins(x=0.02)
+        if not np.any(np.nan_to_num(found)):
+            axes.set_ylim(0.0, 1.0)
+        axes.set_ylabel(_unit(result, name))
+        if failed.any():
+            low = np.full(int(failed.sum()), 0.03)
+            marks: Any = axes.get_xaxis_transform()
+            axes.plot(values[failed], low, "x", color=VERMILLION, transform=marks, clip_on=False, label="failed")
+    _legend(figure, panels)
+    _name_axes(panels, _label(result, key), None)
+    return figure
+
+
+def _maps(result: xr.Dataset, first: str, second: str) -> Figure:
+    figure, panels = _panels(result, 4.9, 3.6)
+    x, y = result[first].values, result[second].values
+    status = result["status"].transpose(first, second).values
+    for name, axes in panels.items():
+        values = result[name].transpose(first, second).values
+        axes.grid(visible=False)
+        shown = np.ma.masked_invalid(values)
+        if shown.count():
+            wide = shown.min() > 0.0 and shown.max() > _WIDE * shown.min()
+            norm = LogNorm() if wide else None
+            drawn = axes.pcolormesh(_edges(x), _edges(y), shown.T, cmap=_MAP, norm=norm)
+            bar = figure.colorbar(drawn, ax=axes, label=_unit(result, name))
+            if shown.min() == shown.max():
+                # A scale of made-up width would look like a range that was found.
+                bar.set_ticks([float(shown.min())])
+        _scale(axes.set_xscale, axes.xaxis, x)
+        _scale(axes.set_yscale, axes.yaxis, y)
+        for which, colour in (("failed", VERMILLION), ("missing", GREY)):
+            i, j = np.nonzero(status == which)
+            if i.size:
+                axes.plot(x[i], y[j], "x", color=colour, markersize=5.0, label=which)
+    _legend(figure, panels)
+    _name_axes(panels, _label(result, first), _label(result, second))
+    return figure
+
+
+def _parallel(result: xr.Dataset, keys: list[str]) -> Figure:
+    metrics = _metrics(result)
+    columns = [*keys, *metrics]
+    table = np.stack([_column(result, name) for name in columns], axis=1)
+    figure = new_figure(max(8.0, 1.45 * len(columns) + 1.6), 5.2, "constrained")
+    axes = figure.subplots()
+    low, high = (pick(table, axis=0, where=np.isfinite(table), initial=start) for pick, start in _EXTREMES)
+    low, high = (np.where(np.isfinite(each), each, 0.0) for each in (low, high))
+    span = np.where(high > low, high - low, 1.0)
+    heights = np.where(high > low, (table - low) / span, np.where(np.isfinite(table), 0.5, np.nan))
+    done = np.isfinite(table).all(axis=1)
+    colours = table[:, len(keys)]
+    order = np.argsort(-colours[done])
+    places = np.arange(len(columns))
+    width, opacity = (1.2, 0.8) if len(table) <= 200 else (0.6, 0.45)
+    lines = [np.column_stack([places, row]) for row in heights[done][order]]
+    norm = Normalize(low[len(keys)], high[len(keys)])
+    drawn = LineCollection(lines, array=colours[done][order], cmap=_MAP, norm=norm, linewidth=width, alpha=opacity)
+    axes.add_collection(drawn)
+    for row in heights[~done]:
+        axes.plot(places[: len(keys)], row[: len(keys)], color=GREY, linewidth=0.6, linestyle=":", alpha=0.7)
+    for place, (least, most) in enumerate(zip(low, high, strict=True)):
+        axes.axvline(place, color="black" if place >= len(keys) else GREY, linewidth=1.0)
+        for height, value in ((0.0, least), (1.0, most)) if most > least else ((0.5, least),):
+            text = axes.annotate(f"{value:.3g}", (place, height), xytext=(3, 0), textcoords="offset points", fontsize=9)
+            text.set(va={0.0: "top", 0.5: "center", 1.0: "bottom"}[height])
+    axes.set_xlim(-0.15, len(columns) - 0.5)
+    axes.set_ylim(-0.06, 1.06)
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    axes.tick_params(axis="x", length=0.0)
+    labels = [_label(result, key) for key in keys] + [f"{_spaced(n)} ({result[n].attrs['units']})" for n in metrics]
+    axes.set_xticks(places, [textwrap.fill(label, 16) for label in labels], fontsize=9.0)
+    count = f"{done.sum()} runs" + (f", {(~done).sum()} failed or missing (dotted)" if (~done).any() else "")
+    axes.set_title(f"{count}; coloured by {_spaced(metrics[0])}")
+    figure.colorbar(drawn, ax=axes, label=f"{_spaced(metrics[0])} ({result[metrics[0]].attrs['units']})", pad=0.01)
+    return figure
+
+
+_EXTREMES: tuple[tuple[Any, float], ...] = ((np.min, np.inf), (np.max, -np.inf))
+
+
+def _column(result: xr.Dataset, name: str) -> Array:
+    """Return a metric or a key at every point, shape (m,)."""
+    values, status = result[name], result["status"]
+    return np.asarray(values.broadcast_like(status).transpose(*status.dims).values, dtype=float).ravel()
+
+
+def _panels(result: xr.Dataset, width: float, height: float) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure with a panel per metric, entitled; widths and heights in inches."""
+    names = _metrics(result)
+    columns = {1: 1, 2: 2, 4: 2}.get(len(names), 3)
+    rows = -(-len(names) // columns)
+    figure = new_figure(max(6.5, width * columns), height * rows + 0.6, "constrained")
+    grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    for spare in grid.ravel()[len(names) :]:
+        spare.remove()
+    panels = dict(zip(names, grid.ravel(), strict=False))
+    for name, axes in panels.items():
+        axes.set_title(textwrap.fill(str(result[name].attrs["long_name"]), 46))
+    return figure, panels
+
+
+def _name_axes(panels: dict[str, Axes], first: str, second: str | None) -> None:
+    """Write the names of the keys at the outer panels: the first one below, the second one at the left."""
+    spots = {name: axes.get_subplotspec() for name, axes in panels.items()}
+    lowest = {spot.colspan.start: name for name, spot in spots.items() if spot is not None}
+    for name, axes in panels.items():
+        spot = spots[name]
+        assert spot is not None
+        if lowest[spot.colspan.start] == name:
+            axes.set_xlabel(first)
+            axes.tick_params(labelbottom=True)
+        if second is not None and spot.colspan.start == 0:
+            axes.set_ylabel(second)
+
+
+def _legend(figure: Figure, panels: dict[str, Axes]) -> None:
+    handles, labels = next(iter(panels.values())).get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
+
+
+def _metrics(result: xr.Dataset) -> list[str]:
+    return [str(name) for name in result.data_vars if name not in ("status", "reason")]
+
+
+def _label(result: xr.Dataset, key: str) -> str:
+    return f"{short_key(key)} ({result[key].attrs['units']})"
+
+
+def _unit(result: xr.Dataset, name: str) -> str:
+    unit = str(result[name].attrs["units"])
+    return "" if unit == "1" else unit
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _logarithmic(values: Array) -> bool:
+    """Return whether steps are even in the logarithm, and uneven as they are."""
+    if len(values) < 3 or np.min(values) <= 0.0:
+        return False
+    steps, ratios = np.diff(values), np.diff(np.log(values))
+    return bool(np.allclose(ratios, ratios[0], rtol=1e-3) and not np.allclose(steps, steps[0], rtol=1e-2))
+
+
+def _scale(set_scale: Any, axis: Axis, values: Array) -> None:
+    if _logarithmic(values):
+        set_scale("log")
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_locator(NullLocator())
+
+
+def _edges(values: Array) -> Array:
+    """Return the edges of cells around values, halfway between them on the axis as it is drawn."""
+    places = np.log(values) if _logarithmic(values) else values
+    middle = 0.5 * (places[1:] + places[:-1])
+    edges = np.concatenate([[2.0 * places[0] - middle[0]], middle, [2.0 * places[-1] - middle[-1]]])
+    return np.exp(edges) if _logarithmic(values) else edges

@@ -1,0 +1,115 @@
+"""Fig. 2: the workspace of a finger, as a surface and as a section in its flexion plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
+from finger_pin.views.plots.reach import fingertip_surface, flexion_section
+from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
+
+_MILLI = 1e3
+_AXES = "xyz"
+_ISOLINES = 7
+
+
+@styled
+def plot_workspace(finger: Finger | FingerDescription) -> Figure:
+    """Draw Fig. 2: where the fingertip can go when the passive tendons do not stretch, equation (4).
+
+    Left the surface in space, right the section in the flexion plane with the finger at three poses; mm, base frame.
+
+    Args:
+        finger: A finger, or the description of one.
+    """
+    if isinstance(finger, FingerDescription):
+        finger = Finger(finger)
+    surface, section = fingertip_surface(finger), flexion_section(finger)
+    figure = new_figure(11.0, 5.2)
+    space = figure.add_axes((0.0, 0.0, 0.475, 0.92), projection="3d")
+    assert isinstance(space, Axes3D)
+    _surface(space, _MILLI * surface, _MILLI * section.poses)
+    plane = figure.add_axes((0.575, 0.12, 0.415, 0.74))
+    _section(plane, _MILLI * section.patches, _MILLI * section.poses, section.plane)
+    imposed = ", with (4) imposed" if finger.routing.passive else ""
+    for left, text in (
+        (0.03, f"(a) where the fingertip can go{imposed}\n{_ranges(surface, range(3))}"),
+        (0.575, f"(b) section in the flexion plane{imposed}\n{_ranges(section.patches, section.plane)}"),
+    ):
+        figure.text(left, 0.985, text, va="top", fontsize=10.5, linespacing=1.4)
+    return figure
+
+
+def _surface(axes: Axes3D, patches: Array, poses: Array) -> None:
+    quads = _quads(patches)
+    colours = _lit(quads)
+    axes.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=0.88 * colours, linewidths=0.3))
+    axes.plot(*poses[0].T, color=BLACK, marker="o", markersize=3.5, linewidth=2.0)
+    corners = np.concatenate([quads.reshape(-1, 3), poses[0]])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    span = np.maximum(high - low, 0.2 * np.max(high - low))
+    for index, name in enumerate(_AXES):
+        middle = 0.5 * (low + high)[index]
+        getattr(axes, f"set_{name}lim")(middle - 0.52 * span[index], middle + 0.52 * span[index])
+        getattr(axes, f"set_{name}label")(f"{name} (mm)")
+        few = span[index] < 0.5 * np.max(span)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(2 if few else 5, steps=[1, 2, 5, 10]))
+    axes.set_box_aspect(tuple(span), zoom=1.0)
+    axes.view_init(elev=20, azim=-55)
+
+
+def _section(axes: Axes, patches: Array, poses: Array, plane: tuple[int, int]) -> None:
+    flat = patches[..., plane]
+    # Without smooth edges the cells leave no seams between them.
+    cells = list(_quads(flat))
+    axes.add_collection(PolyCollection(cells, facecolors="#D3E9F7", edgecolors="none", antialiaseds=False))
+    if len(flat) == 1:
+        # A single patch: lines along which one joint moves while the other stands.
+        step = np.linspace(0, flat.shape[1] - 1, _ISOLINES).round().astype(int)
+        lines = [*flat[0][step], *flat[0][:, step].swapaxes(0, 1)]
+        axes.add_collection(LineCollection(lines, colors=BLUE, linewidths=0.8))
+    styles = zip(poses[..., plane], ("straight", "half flexed", "flexed"), (BLACK, ORANGE, VERMILLION), strict=True)
+    for pose, label, colour in styles:
+        axes.plot(*pose.T, color=colour, label=label, marker="o", markersize=4, linewidth=2.2)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.autoscale_view()
+    axes.set_xlabel(f"{_AXES[plane[0]]} (mm)")
+    axes.set_ylabel(f"{_AXES[plane[1]]} (mm)")
+    axes.legend(loc="upper right")
+
+
+def _ranges(patches: Array, axes: Iterable[int]) -> str:
+    """Return the extent of fingertip positions, m, along the given axes, as text in mm."""
+    texts = []
+    for axis in axes:
+        low, high = _MILLI * np.nanmin(patches[..., axis]), _MILLI * np.nanmax(patches[..., axis])
+        texts.append(f"{_AXES[axis]}: {low + 0.0:.1f} to {high + 0.0:.1f} mm".replace("-", "\N{MINUS SIGN}"))
+    return ",   ".join(texts)
+
+
+def _quads(patches: Array) -> Array:
+    """Return the cells of grids, shape (patches, m, m, d), as polygons of shape (cells, 4, d), without gaps."""
+    corners = [patches[:, :-1, :-1], patches[:, 1:, :-1], patches[:, 1:, 1:], patches[:, :-1, 1:]]
+    quads = np.stack(corners, axis=-2).reshape(-1, 4, patches.shape[-1])
+    return np.asarray(quads[np.isfinite(quads).all(axis=(1, 2))])
+
+
+def _lit(quads: Array) -> Array:
+    """Return a shade of blue for every quad, shape (cells, 3), lighter where it faces the light."""
+    normal = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    light = np.array([0.9, -0.25, 0.75])
+    share = 0.15 + 0.85 * np.abs(normal @ (light / np.linalg.norm(light)))
+    dark, pale = np.array([0.0, 0.30, 0.55]), np.array([0.72, 0.88, 0.97])
+    rgb = dark + share[:, None] * (pale - dark)
+    return np.asarray(rgb)

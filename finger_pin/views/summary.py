@@ -1,0 +1,140 @@
+"""A result in words and numbers: how well it tracked, how hard it pulled, where the energy went, what it cost."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.description.routing import Array
+
+_SETTLING = 1.0
+_LONG = 2.0
+_SUPPLIES = ("actuators", "fingertip")
+
+
+def summarize(result: xr.Dataset) -> str:
+    """Return a summary of a result as plain text, at most 80 columns wide where its names allow.
+
+    Args:
+        result: What `simulate` returned, or what an exception of it carries, whole or partial.
+    """
+    head = [*_head(result), *_locking(result)]
+    blocks = [head, _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
+    return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _head(result: xr.Dataset) -> list[str]:
+    attributes = result.attrs
+    title = " ".join(str(attributes["title"]).split())
+    tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
+    return [title, f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"]
+
+
+def _locking(result: xr.Dataset) -> list[str]:
+    advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
+    return [f"Warning: {advice}"] if advice else []
+
+
+def _tracking(result: xr.Dataset) -> list[str]:
+    error, span = result["tracking_error"], "whole run"
+    if result.attrs["end_time"] > _LONG:
+        error, span = error.sel(time=slice(_SETTLING, None)), f"after the first {_SETTLING:g} s"
+    degrees = np.rad2deg(np.asarray(error.transpose("time", "joint")))
+    rows = [
+        (str(joint), f"{np.sqrt(np.mean(column**2)):.4f}", f"{np.max(np.abs(column)):.4f}")
+        for joint, column in zip(result["joint"].values, degrees.T, strict=True)
+    ]
+    return [f"Tracking error, deg ({span})", *_table(("", "rms", "max"), rows)]
+
+
+def _tension(result: xr.Dataset) -> list[str]:
+    tension = result["tendon_tension"]
+    rows = [_range(str(name), np.asarray(tension.sel(tendon=name))) for name in result["tendon"].values]
+    if "passive_tension_proximal" in result:
+        proximal = result["passive_tension_proximal"]
+        halves = np.asarray(proximal.transpose("time", ...)).reshape(proximal.sizes["time"], -1)
+        passive = len(rows) - halves.shape[1]
+        pairs = zip(rows[passive:], halves.T, strict=True)
+        rows[passive:] = [
+            row
+            for distal, half in pairs
+            for row in (_range(f"{distal[0]}, proximal half", half), (f"{distal[0]}, distal half", *distal[1:]))
+        ]
+    return ["Tension, N", *_table(("", "least", "greatest"), rows)]
+
+
+def _energy(result: xr.Dataset) -> list[str]:
+    exchanged = {
+        name.removeprefix("energy_exchanged_"): result[name]
+        for name in map(str, result)
+        if name.startswith("energy_exchanged_")
+    }
+    stored = sum(
+        _final(result[name]) - float(result[name][0])
+        for name in map(str, result)
+        if name.startswith("energy_") and name.removeprefix("energy_exchanged_") == name and name != "energy_residual"
+    )
+    supplies = [_final(exchanged[name]) for name in _SUPPLIES]
+    came_in = sum(max(value, 0.0) for value in (*supplies, -stored))
+    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in _SUPPLIES]
+    entries += [(_label(values), _final(values)) for name, values in exchanged.items() if name not in _SUPPLIES]
+    entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
+    rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]
+    return ["Energy, and its share of what was supplied or drawn from store", *_table(("", "mJ", "share"), rows)]
+
+
+def _convergence(result: xr.Dataset) -> list[list[str]]:
+    """Return a block about a convergence check if there was one."""
+    if "convergence_difference" not in result:
+        return []
+    difference = np.abs(np.asarray(result["convergence_difference"].transpose("time", "joint")))
+    rows = [
+        (str(joint), f"{column:.1e}")
+        for joint, column in zip(result["joint"].values, np.nanmax(difference, axis=0), strict=True)
+    ]
+    verdict = textwrap.wrap(str(result.attrs["convergence"]), 80)
+    return [["Difference from the run at a tighter tolerance, rad", *_table(("", "largest"), rows), *verdict]]
+
+
+def _cost(result: xr.Dataset) -> list[str]:
+    attributes = result.attrs
+    wall = float(attributes["solver_wall_time"])
+    factor = f"{attributes['end_time'] / wall:.3g}" if wall > 0.0 else "-"
+    return [
+        f"Solver: {attributes['solver_steps']} steps, {attributes['solver_evaluations']} evaluations, "
+        f"{attributes['solver_jacobians']} Jacobians",
+        f"Wall time {wall:.3g} s, real-time factor {factor} (simulated over wall time)",
+    ]
+
+
+def _final(values: xr.DataArray) -> float:
+    return float(values[-1])
+
+
+def _label(values: xr.DataArray) -> str:
+    return str(values.attrs["long_name"]).removeprefix("energy ")
+
+
+def _range(name: str, values: Array) -> tuple[str, str, str]:
+    return name, f"{values.min():.3f}", f"{values.max():.3f}"
+
+
+def _share(value: float, total: float) -> str:
+    """Return a share in percent, or a dash where there is nothing to share."""
+    if not total > 0.0:
+        return "-"
+    percent = 100.0 * value / total
+    return f"{percent:.2f} %" if percent == 0.0 or abs(percent) >= 0.01 else f"{percent:.1e} %"
+
+
+def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return lines of aligned columns: the first to the left, numbers to the right."""
+    first, *widths = (max(map(len, column)) for column in zip(header, *rows, strict=True))
+    return [
+        f"  {name.ljust(first)}" + "".join(c.rjust(max(w, 9) + 3) for c, w in zip(numbers, widths, strict=True))
+        for name, *numbers in (header, *rows)
+    ]

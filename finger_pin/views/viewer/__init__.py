@@ -1,0 +1,11 @@
+"""The finger in a browser: meshcat with tendons along their paths, coloured by tension.
+
+The page is meshcat's own viewer with a player beside it. It is the same page as a file (`write_animation`), served
+while somebody looks at a result (`view`), and during a simulation (`LiveView`). Meshcat's server is not used: it
+listens on every network interface, while this one is bound to the loopback address.
+"""
+
+from finger_pin.views.viewer.animation import write_animation
+from finger_pin.views.viewer.serving import LiveView, Viewing, view, view_forces
+
+__all__ = ["LiveView", "Viewing", "view", "view_forces", "write_animation"]

@@ -1,0 +1,123 @@
+"""A result as a page that plays it."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from finger_pin.analysis import ForcePolytope
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.files import replacing
+from finger_pin.views.viewer.page import render
+from finger_pin.views.viewer.scene import Scene
+
+Indices = NDArray[np.intp]
+
+#: Frames per second of motion, and most frames of one page: a longer motion gets fewer per second.
+FRAME_RATE, MOST_FRAMES = 60.0, 3000
+#: Positions out of which the camera's view is found.
+_POSITIONS_IN_VIEW = 40
+
+
+def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces: ForcePolytope | None = None) -> Path:
+    """Write a result as one HTML file that plays it, without a network.
+
+    The file appears whole or not at all; an earlier one is replaced.
+
+    Args:
+        result: What `simulate` returned or saved.
+        path: Of the file.
+        forces: Drawn at the fingertip of its posture, if given.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        InputError: If the result lacks something that is shown.
+    """
+    target, text = Path(path), animation_page(result, forces)
+    with replacing(target) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8", newline="\n")
+    return target
+
+
+def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None) -> str:
+    """Return the page that plays a result, with a set of fingertip forces if given."""
+    scenario = _scenario(result)
+    scene = Scene(FingerDescription.model_validate(scenario["finger"]))
+    time = _variable(result, "time")
+    if len(time) == 0:
+        raise InputError("result.time", "must have at least one sample")
+    frames = _frame_indices(time)
+    time = time[frames]
+    position = _variable(result, "joint_position")[frames]
+    tension = strand_tensions(scene, result, frames)
+    for name, values in (("joint_position", position), ("tendon_tension", tension)):
+        if not np.isfinite(values).all():
+            raise InputError(f"result.{name}", "must be finite")
+    in_view = position[:: max(1, len(position) // _POSITIONS_IN_VIEW)]
+    title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
+    header = scene.header(title, in_view, float(tension.max()), live=False, forces=forces)
+    return render({**header, "chunks": [scene.chunk(time, position, tension)]})
+
+
+def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
+    """Return the page of a finger at rest in the posture of its fingertip forces.
+
+    Args:
+        description: The finger.
+        forces: Its forces.
+        strands: Tensions to show, shape (s,), N; none by default.
+    """
+    scene = Scene(description)
+    tension = np.zeros((1, len(scene.strands))) if strands is None else np.asarray(strands, dtype=float)[None]
+    position = forces.position[None]
+    title = description.title or description.name
+    header = scene.header(title, position, float(tension.max()), live=False, forces=forces)
+    return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
+
+
+def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
+    """Return the tension of every strand at some samples of a result, shape (m, s), N.
+
+    The proximal half of a passive tendon has the result's ``passive_tension_proximal``.
+    """
+    description = scene.geometry.description
+    tension = _variable(result, "tendon_tension")[frames]
+    actuated, passive = len(description.actuated_names), len(description.passive_names)
+    if not passive:
+        return tension
+    distal = tension[:, actuated:]
+    proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
+    halves = np.stack([proximal, distal], axis=-1).reshape(len(frames), 2 * passive)
+    return np.concatenate([tension[:, :actuated], halves], axis=1)
+
+
+def _frame_indices(time: Array) -> Indices:
+    # Samples as they are, none between them: a frame shows what was computed.
+    wanted = int(np.clip(round((time[-1] - time[0]) * FRAME_RATE) + 1, 1, MOST_FRAMES))
+    return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
+
+
+def _variable(result: xr.Dataset, name: str) -> Array:
+    if name not in result.variables:
+        raise InputError(f"result.{name}", "is missing; the viewer shows what simulate returned")
+    return np.asarray(result[name].values, dtype=float)
+
+
+def _scenario(result: xr.Dataset) -> dict[str, Any]:
+    try:
+        scenario = tomllib.loads(result.attrs["scenario"])
+    except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
+        raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
+    if not isinstance(scenario.get("finger"), dict):
+        raise InputError("result.attrs.scenario", "must hold the resolved table [finger]")
+    return scenario

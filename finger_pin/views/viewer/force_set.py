@@ -1,0 +1,93 @@
+"""The set of forces that a fingertip can exert, as a translucent body that starts at the fingertip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.analysis import ForcePolytope
+from finger_pin.description.routing import Array
+from finger_pin.views.viewer.solids import ROOT, Command
+
+_PATH = f"{ROOT}/forces"
+_COLOUR, _RIM, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22
+#: Largest extent of the drawn set, in parts of the finger's length.
+_SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSet:
+    """A force polytope at a scale.
+
+    Attributes:
+        polytope: The forces, N.
+        scale: Length that stands for a newton, m/N: 1, 2 or 5 times a power of ten.
+    """
+
+    polytope: ForcePolytope
+    scale: float
+
+    @classmethod
+    def of(cls, polytope: ForcePolytope, length: float) -> ForceSet:
+        """Choose a scale at which the set is at most half as large as a finger of some length, m."""
+        extent = float(np.max(np.linalg.norm(polytope.vertices, axis=1)))
+        wanted = _SHARE * length / extent if extent > 0.0 else 1.0
+        decade = 10.0 ** math.floor(math.log10(wanted))
+        return cls(polytope, max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-9)))
+
+    @property
+    def corners(self) -> Array:
+        """Where the vertices stand, shape (v, 3), m, base frame."""
+        return np.asarray(self.polytope.tip + self.scale * self.polytope.vertices)
+
+    @property
+    def note(self) -> str:
+        """What the drawing means, for the panel."""
+        return f"forces at the tip, {1e3 * self.scale:.4g} mm per N"
+
+    def commands(self) -> Iterator[Command]:
+        """Yield meshcat's commands: the body where there is one, its edges, and its origin, the fingertip."""
+        triangles = self.polytope.triangles()
+        if len(triangles):
+            normals = np.repeat(_normals(self.polytope.vertices[triangles]), 3, axis=0)
+            body = {"position": self.corners[triangles].reshape(-1, 3), "normal": normals}
+            # Both sides, without hiding what is inside.
+            look = {"type": "MeshPhongMaterial", "color": _COLOUR, "opacity": _OPACITY, "side": 2, "shininess": 20}
+            yield _object(f"{_PATH}/body", "Mesh", body, look)
+        edges = self.corners[np.array(self.polytope.ridges(), dtype=int).reshape(-1, 2)]
+        rim = {"type": "LineBasicMaterial", "color": _RIM, "opacity": 0.9}
+        yield _object(f"{_PATH}/edges", "LineSegments", {"position": edges.reshape(-1, 3)}, rim)
+
+
+def _normals(triangles: Array) -> Array:
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300))
+
+
+def _object(path: str, kind: str, attributes: dict[str, Array], material: Command) -> Command:
+    buffers = {
+        name: {"itemSize": 3, "type": "Float32Array", "array": [float(each) for each in values.ravel()]}
+        for name, values in attributes.items()
+    }
+    shape = {"uuid": f"{path}:geometry", "type": "BufferGeometry", "data": {"attributes": buffers}}
+    look = {"uuid": f"{path}:material", "transparent": True, "depthWrite": False, **material}
+    identity = [float(entry) for entry in np.eye(4).ravel()]
+    return {
+        "type": "set_object",
+        "path": path,
+        "object": {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": [shape],
+            "materials": [look],
+            "object": {
+                "uuid": path,
+                "type": kind,
+                "geometry": shape["uuid"],
+                "material": look["uuid"],
+                "matrix": identity,
+            },
+        },
+    }

@@ -1,0 +1,179 @@
+"""What the page is told: once the scene, then frames of poses, tendon paths and tensions."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from finger_pin.analysis import ForcePolytope
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.geometry import BASE_LEAD, LinkPoses, TendonGeometry
+from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
+from finger_pin.views.viewer.force_set import ForceSet
+from finger_pin.views.viewer.solids import link_names, root_command, solid_commands
+
+#: Below this tension a tendon is drawn loose, wholly at none, N.
+SLACK_TENSION = 0.05
+#: Radius of the tube that is drawn for a tendon: most, in parts of the distance between neighbouring tendons and of
+#: the width of the narrowest link.
+_TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
+#: Points per span and per radian of the tendons drawn, so that sags and arcs look smooth.
+_RESOLUTION = 11
+_LARGEST = 32767
+
+
+class Scene:
+    """A finger prepared for the page.
+
+    Attributes:
+        geometry: Its tendons in space.
+        strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
+    """
+
+    def __init__(self, description: FingerDescription) -> None:
+        """Prepare solids and tendons."""
+        self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
+        self._urdf = to_urdf(description)
+        halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
+        self.strands = (*description.actuated_names, *halves)
+        links = [joint.link for joint in description.joints.values() if joint.link is not None]
+        self._widths = [link.width for link in links]
+        size = self._size = BASE_LEAD * links[0].width + sum(link.length for link in links)
+        # Points travel as 16-bit integers; this is their unit, a few micrometres.
+        self._quantum = 1.5 * size / _LARGEST
+        self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
+
+    def header(
+        self,
+        title: str,
+        joint_positions: ArrayLike,
+        largest_tension: float,
+        *,
+        live: bool,
+        forces: ForcePolytope | None = None,
+    ) -> dict[str, Any]:
+        """Return what the page needs to know before the first frame.
+
+        Args:
+            title: Shown above the legend.
+            joint_positions: That the camera must have in view, shape (m, n), rad.
+            largest_tension: That the legend must reach, N.
+            live: Whether frames will come from the server.
+            forces: Drawn at the fingertip of its posture, if given.
+        """
+        geometry, widths = self.geometry, self._widths
+        tube = min(_TUBE_IN_LANE * geometry.lanes.spacing, _TUBE_IN_LINK * min(widths))
+        poses = geometry.poses(joint_positions)
+        paths = geometry.paths(joint_positions, poses=poses)
+        turn = self._view()
+        shown = ForceSet.of(forces, self._size) if forces is not None else None
+        seen = [poses.translation, self._tips(poses)[:, None, :], *(path.points for path in paths)]
+        if shown is not None:
+            seen.append(shown.corners)
+        corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
+        drawn = list(shown.commands()) if shown is not None else []
+        return {
+            "title": title,
+            "live": live,
+            "commands": [root_command(turn), *solid_commands(geometry, self._urdf, tube), *drawn],
+            "forces": shown.note if shown is not None else "",
+            "links": link_names(geometry),
+            "joints": list(geometry.description.joints),
+            "strands": list(self.strands),
+            "tendons": [self._tendon(path.name, path.distal.tolist()) for path in paths],
+            "tubeRadius": tube,
+            "quantum": self._quantum,
+            "grid": self._grid,
+            "inView": np.round(_outermost(corners), 5).tolist(),
+            "margin": 0.55 * max(widths),
+            "tensionScale": _scale_above(largest_tension),
+            "slackTension": SLACK_TENSION,
+            "chunks": [],
+        }
+
+    def chunk(self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike) -> dict[str, str]:
+        """Return frames for the page.
+
+        Args:
+            time: Shape (m,), s.
+            joint_position: theta, shape (m, n), rad.
+            tension: Of every strand, shape (m, s), N.
+        """
+        q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
+        poses = self.geometry.poses(q)
+        loose = np.clip(1.0 - self._per_tendon(f) / SLACK_TENSION, 0.0, 1.0)
+        paths = np.concatenate([path.points for path in self.geometry.paths(q, loose, poses)], axis=-2)
+        quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
+        return {
+            "time": _encode(time, "<f8"),
+            "pose": _encode(np.concatenate([poses.translation, quaternions.reshape(*q.shape[:-1], -1, 4)], -1), "<f4"),
+            "path": _encode(np.clip(np.rint(paths / self._quantum), -_LARGEST, _LARGEST), "<i2"),
+            "tension": _encode(f, "<f4"),
+            "tip": _encode(self._tips(poses), "<f4"),
+            "joint": _encode(q, "<f4"),
+        }
+
+    @property
+    def _tip_placement(self) -> pin.SE3:
+        model = self.geometry.model
+        return model.frames[model.getFrameId(TIP_FRAME)].placement
+
+    def _tips(self, poses: LinkPoses) -> Array:
+        offset = np.array(self._tip_placement.translation)
+        return np.asarray(poses.rotation[..., -1, :, :] @ offset + poses.translation[..., -1, :])
+
+    def _per_tendon(self, strand_tension: Array) -> Array:
+        # A passive tendon is drawn loose when both its halves are.
+        actuated = len(self.geometry.description.actuated_names)
+        passive = strand_tension[..., actuated:]
+        halves = passive.reshape(*passive.shape[:-1], -1, 2)
+        return np.concatenate([strand_tension[..., :actuated], halves.max(axis=-1)], axis=-1)
+
+    def _tendon(self, name: str, distal: Sequence[bool]) -> dict[str, Any]:
+        description, last = self.geometry.description, len(distal) - 1
+        if description.tendons[name].kind == "actuated":
+            return {"name": name, "strand": [self.strands.index(name)] * len(distal), "knots": [last]}
+        first = self.strands.index(f"{name} proximal")
+        knots = sorted({0, last, *([distal.index(True)] if True in distal else [])})
+        return {"name": name, "strand": [first + int(flag) for flag in distal], "knots": knots}
+
+    def _view(self) -> Array:
+        # From the base frame to the scene's: z is up, the camera stands on the side of -y, where the axes of most
+        # joints point, so that flexion is seen from the side and runs counter-clockwise.
+        model, data = self.geometry.model, self.geometry.model.createData()
+        pin.forwardKinematics(model, data, np.zeros(model.nq))
+        frame = data.oMi[self.geometry.lanes.families[0][0]].rotation
+        gravity = np.array(self.geometry.description.gravity)
+        up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array(frame[:, 1])
+        if abs(up @ frame[:, 2]) > 0.9:
+            up = np.array(frame[:, 1])
+        back = -(frame[:, 2] - (frame[:, 2] @ up) * up)
+        back /= np.linalg.norm(back)
+        return np.array([np.cross(back, up), back, up])
+
+
+def _outermost(points: Array) -> Array:
+    # The points that are farthest out in some direction of a fan around the sphere: enough to frame them all.
+    index = np.arange(200) + 0.5
+    polar, azimuth = np.arccos(1.0 - index / 100.0), math.pi * (1.0 + math.sqrt(5.0)) * index
+    fan = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)])
+    return np.asarray(points[np.unique(np.argmax(points @ fan, axis=0))])
+
+
+def _scale_above(tension: float) -> float:
+    # The upper end of the legend: its quarters are short numbers. The page goes on in the same steps.
+    if not tension > 0.0:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(tension))
+    return float(next(step * decade for step in (1, 2, 4, 6, 8, 10) if step * decade >= tension * (1.0 - 1e-9)))
+
+
+def _encode(values: ArrayLike, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,0 +1,211 @@
+"""Looking at a result, or at a simulation in progress, in a browser on this machine."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+import time
+import webbrowser
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from finger_pin.analysis import ForcePolytope
+from finger_pin.control.closed_loop import LoopSignals
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.views.viewer.animation import animation_page, posture_page
+from finger_pin.views.viewer.page import render
+from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.server import PageServer
+
+#: Upper end of the legend before a live tension exceeds it, N.
+LIVE_TENSION = 10.0
+
+
+class Viewing:
+    """A page that is being served; a context manager that ends it.
+
+    Attributes:
+        url: Where it is, on the loopback address.
+    """
+
+    def __init__(self, server: PageServer) -> None:
+        """Take a running server."""
+        self._server = server
+        self.url = server.url
+
+    def wait(self) -> None:
+        """Serve until the user interrupts (Ctrl-C)."""
+        try:
+            self._server.join()
+        except KeyboardInterrupt:
+            self.close()
+
+    def close(self) -> None:
+        """Stop serving; open pages keep what they have."""
+        self._server.close()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop serving."""
+        self.close()
+
+
+def view(
+    result: xr.Dataset,
+    *,
+    forces: ForcePolytope | None = None,
+    open_browser: bool = True,
+    block: bool | None = None,
+) -> Viewing:
+    """Show a result in meshcat: the finger moves, its tendons run along their paths in the colour of their tension.
+
+    Args:
+        result: What `simulate` returned or saved.
+        forces: What `force_polytope` returned, drawn translucent at the fingertip of its posture.
+        open_browser: Whether to open the page in the user's browser.
+        block: Whether to serve until Ctrl-C; by default where Python is not interactive.
+
+    Returns:
+        The page in service, with its address; already closed if the call has blocked.
+
+    Raises:
+        InputError: If the result lacks something that is shown.
+    """
+    return _served(animation_page(result, forces), open_browser, block)
+
+
+def view_forces(
+    finger: FingerDescription,
+    forces: ForcePolytope,
+    *,
+    tension: ArrayLike | None = None,
+    open_browser: bool = True,
+    block: bool | None = None,
+) -> Viewing:
+    """Show the forces that a fingertip can exert: a translucent body at the tip of the finger at rest.
+
+    Args:
+        finger: The finger.
+        forces: What `force_polytope` returned.
+        tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
+        open_browser: Whether to open the page in the user's browser.
+        block: Whether to serve until Ctrl-C; by default where Python is not interactive.
+
+    Returns:
+        The page in service, with its address; already closed if the call has blocked.
+    """
+    return _served(posture_page(finger, forces, tension), open_browser, block)
+
+
+def _served(page: str, open_browser: bool, block: bool | None) -> Viewing:
+    viewing = Viewing(PageServer(page))
+    if open_browser:
+        webbrowser.open(viewing.url, new=2)
+    if block is None:
+        block = not (sys.flags.interactive or "ps1" in vars(sys))
+    if block:
+        print(f"The finger moves at {viewing.url} (Ctrl-C ends this)", flush=True)
+        viewing.wait()
+    return viewing
+
+
+class LiveView(Viewing):
+    """A page that shows a simulation while it runs."""
+
+    def __init__(
+        self, description: FingerDescription, *, title: str = "", open_browser: bool = True, rate: float = 30.0
+    ) -> None:
+        """Serve the page; frames come with `update`.
+
+        Args:
+            description: The finger.
+            title: Shown above the legend; the finger's title when left out.
+            open_browser: Whether to open the page in the user's browser.
+            rate: Most frames per second of real time.
+        """
+        self._scene = Scene(description)
+        self._interval = 1.0 / rate
+        self._due = -np.inf
+        self._started = np.inf
+        self._pending: tuple[float, Array, Array, Array | None] | None = None
+        limits = np.array([joint.range for joint in description.joints.values()]).clip(-np.pi, np.pi)
+        # The camera must see all of the range: poses with the joints bent alike, and every combination of the first
+        # joints' limits.
+        alike = np.linspace(limits[:, 0], limits[:, 1], 9)
+        combined = np.tile(limits[:, 0], (2 ** min(len(limits), 6), 1))
+        combined[:, :6] = list(itertools.product(*limits[:6]))
+        reach = np.concatenate([alike, combined])
+        header = self._scene.header(title or description.title or description.name, reach, LIVE_TENSION, live=True)
+        super().__init__(PageServer(render(header), live=True))
+        if open_browser:
+            webbrowser.open(self.url, new=2)
+
+    def update(
+        self,
+        t: float,
+        joint_position: ArrayLike,
+        tendon_tension: ArrayLike,
+        passive_tension_proximal: ArrayLike | None = None,
+    ) -> None:
+        """Show a state, unless the last one has just been shown; cheap enough for every step of a simulation.
+
+        Args:
+            t: Simulated time, s, never decreasing.
+            joint_position: theta, shape (n,), rad.
+            tendon_tension: Shape (t,), actuated first, N; of a passive tendon its distal half.
+            passive_tension_proximal: Of the passive tendons, shape (p,) or one number, N; as distal when left out.
+        """
+        now = time.monotonic()
+        # Copies: a caller may reuse its arrays before the state is shown.
+        proximal = None if passive_tension_proximal is None else np.array(passive_tension_proximal, dtype=float)
+        self._pending = (t, np.array(joint_position, dtype=float), np.array(tendon_tension, dtype=float), proximal)
+        if now >= self._due:
+            self._due = now + self._interval
+            self._show()
+
+    def observe(self, t: float, signals: LoopSignals) -> None:
+        """Show a simulation in progress, held back to real time: an observer for `simulate`.
+
+        Args:
+            t: Simulated time, s.
+            signals: All signals then.
+        """
+        now = time.monotonic()
+        self._started = min(self._started, now - t)
+        time.sleep(max(0.0, self._started + t - now))
+        strands = signals.finger.tendons.strands
+        actuated = signals.finger.command.size
+        tension = np.concatenate([strands[:actuated], strands[actuated + 1 :: 2]])
+        self.update(t, signals.finger.state.position, tension, strands[actuated::2])
+
+    def close(self) -> None:
+        """Show the last state and stop serving; open pages keep what they have."""
+        self._show()
+        super().close()
+
+    def _show(self) -> None:
+        if self._pending is None:
+            return
+        t, joint_position, tension, proximal = self._pending
+        self._pending = None
+        description = self._scene.geometry.description
+        actuated = len(description.actuated_names)
+        if tension.shape != (len(description.tendons),):
+            raise InputError("tendon_tension", f"must have {len(description.tendons)} entries", tension.shape)
+        distal = tension[actuated:]
+        near = distal if proximal is None else np.broadcast_to(proximal, distal.shape)
+        strands = np.concatenate([tension[:actuated], np.stack([near, distal], axis=-1).ravel()])
+        chunk = self._scene.chunk([t], joint_position[None], strands[None])
+        self._server.publish(json.dumps(chunk))

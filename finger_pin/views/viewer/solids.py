@@ -1,0 +1,119 @@
+"""Everything that is rigid, as meshcat commands: the visuals of the URDF, and a groove for every winding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.geometry import TendonGeometry
+
+ROOT = "/finger_pin"
+Command = dict[str, Any]
+
+#: Opacity of the solids, so that the tendons show inside, and of the grooves.
+_SOLID_OPACITY, _GROOVE_OPACITY = 0.28, 0.28
+_GROOVE_COLOUR = (0.55, 0.62, 0.72)
+
+# Three.js runs its cylinders along y, URDF along z.
+_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+
+def link_names(geometry: TendonGeometry) -> list[str]:
+    """Return the names under which the base and the links stand in the scene."""
+    return ["base", *(f"{name}_link" for name in geometry.description.joints)]
+
+
+def solid_commands(geometry: TendonGeometry, urdf: str, tube_radius: float) -> Iterator[Command]:
+    """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
+
+    Args:
+        geometry: The finger and its tendons.
+        urdf: Its URDF, as text.
+        tube_radius: Radius with which tendons are drawn, m; grooves are smaller by as much.
+
+    Raises:
+        InputError: If a visual is no box, cylinder or sphere.
+    """
+    links = link_names(geometry)
+    visuals = pin.buildGeomFromUrdfString(geometry.model, urdf, pin.GeometryType.VISUAL)
+    for visual in visuals.geometryObjects:
+        placement = visual.placement
+        shape, turn = _primitive(visual.name, visual.geometry)
+        colour, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * _SOLID_OPACITY
+        path = f"{ROOT}/{links[visual.parentJoint]}/{visual.name}"
+        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour, opacity)
+    thickness = 0.8 * geometry.lanes.spacing
+    for pulley in geometry.pulleys:
+        path = f"{ROOT}/{links[pulley.joint]}/groove_{pulley.tendon}"
+        shape = _cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
+        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), _GROOVE_COLOUR, _GROOVE_OPACITY)
+
+
+def root_command(rotation: Array) -> Command:
+    """Return meshcat's ``set_transform`` command that turns the base frame into the frame of the scene."""
+    return {"type": "set_transform", "path": ROOT, "matrix": _matrix(rotation, np.zeros(3))}
+
+
+def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
+    kind = type(shape).__name__
+    if kind == "Cylinder":
+        return _cylinder(shape.radius, 2.0 * shape.halfLength), _Y_TO_Z
+    if kind == "Sphere":
+        return {"type": "SphereGeometry", "radius": shape.radius, "widthSegments": 40, "heightSegments": 28}, np.eye(3)
+    if kind == "Box":
+        width, height, depth = (2.0 * float(half) for half in shape.halfSide)
+        return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, np.eye(3)
+    raise InputError(f"visual {name}", "must be a box, a cylinder or a sphere", kind)
+
+
+def _cylinder(radius: float, height: float) -> Command:
+    return {
+        "type": "CylinderGeometry",
+        "radiusTop": radius,
+        "radiusBottom": radius,
+        "height": height,
+        "radialSegments": 48,
+    }
+
+
+def _mesh(
+    path: str, shape: Command, rotation: Array, translation: Array, colour: tuple[float, ...], opacity: float
+) -> Command:
+    red, green, blue = (round(255 * float(part)) for part in colour)
+    material = {
+        "uuid": f"{path}:material",
+        "type": "MeshPhongMaterial",
+        "color": (red << 16) + (green << 8) + blue,
+        "shininess": 30,
+        "transparent": True,
+        "opacity": float(opacity),
+        "depthWrite": False,
+    }
+    mesh = {
+        "uuid": path,
+        "type": "Mesh",
+        "geometry": f"{path}:geometry",
+        "material": material["uuid"],
+        "matrix": _matrix(rotation, translation),
+    }
+    return {
+        "type": "set_object",
+        "path": path,
+        "object": {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": [{"uuid": mesh["geometry"], **shape}],
+            "materials": [material],
+            "object": mesh,
+        },
+    }
+
+
+def _matrix(rotation: Array, translation: Array) -> list[float]:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, translation
+    return [float(entry) for entry in matrix.T.ravel()]

@@ -1,0 +1,200 @@
+"""The benchmark's arithmetic, its bookkeeping and its jobs; not its times."""
+
+import importlib
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+
+
+@pytest.fixture(scope="module")
+def load():
+    """Return a function that imports a module from scripts/."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(SCRIPTS))
+        yield importlib.import_module
+
+
+@pytest.fixture(scope="module")
+def brief():
+    return fp.load_scenario("fig6", {"simulation.duration": 0.02})
+
+
+def test_costs_lie_on_straight_lines_in_log_log_and_are_bounds_beyond_the_ends(load):
+    cost_at = load("benchmarks.timing").cost_at
+    points = [(1e-2, 0.1), (1e-4, 1.0), (1e-6, 10.0), (float("nan"), 0.001), (0.0, 0.001)]
+    assert cost_at(points, 1e-3) == (pytest.approx(10**-0.5), "=")
+    assert cost_at(points, 1e-4) == (pytest.approx(1.0), "=")
+    assert cost_at(points, 1e-7) == (10.0, ">=")
+    assert cost_at(points, 1.0) == (0.1, "<=")
+    assert cost_at([(float("nan"), 1.0)], 1e-3) is None
+
+
+def test_a_run_that_is_both_slower_and_less_accurate_than_another_does_not_count(load):
+    cost_at = load("benchmarks.timing").cost_at
+    points = [(1e-2, 0.1), (1e-4, 1.0)]
+    assert cost_at([*points, (1e-3, 5.0)], 1e-3) == cost_at(points, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "value, relation, sense, passed",
+    [
+        (6.0, "=", ">=", True),
+        (4.0, "=", ">=", False),
+        (6.0, ">=", ">=", True),
+        (4.0, ">=", ">=", None),
+        (6.0, "<=", ">=", None),
+        (4.0, "<=", ">=", False),
+        (4.0, "=", "<=", True),
+        (6.0, ">=", "<=", False),
+        (6.0, "?", ">=", None),
+        (4.0, "?", ">=", None),
+    ],
+)
+def test_a_bound_passes_or_fails_a_target_only_where_it_decides_it(load, value, relation, sense, passed):
+    assert load("benchmarks.targets").target("speed", value, sense, 5.0, "x", relation).passed is passed
+
+
+def test_a_part_is_measured_once_until_the_code_changes(load, tmp_path, monkeypatch):
+    store = load("benchmarks.store")
+    measured = []
+
+    def measure():
+        measured.append(len(measured))
+        return {"value": (len(measured), None)}
+
+    first = store.Store(tmp_path, quick=False).part("part", measure)
+    assert first == store.Store(tmp_path, quick=False).part("part", measure) == {"value": [1, None]}
+    assert store.Store(tmp_path, quick=True).part("part", measure) == {"value": [2, None]}
+    assert store.Store(tmp_path, quick=False, fresh=True).part("part", measure) == {"value": [3, None]}
+    monkeypatch.setattr(store, "digest", lambda: "other")
+    assert store.Store(tmp_path, quick=False).part("part", measure) == {"value": [4, None]}
+
+
+def test_what_was_measured_while_the_code_changed_is_not_kept(load, tmp_path, monkeypatch):
+    store = load("benchmarks.store")
+    opened = store.Store(tmp_path, quick=False)
+    monkeypatch.setattr(store, "digest", lambda: "other")
+    assert opened.part("part", lambda: 1) == 1
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_a_stage_that_does_not_exist_is_named(load, capsys):
+    with pytest.raises(SystemExit) as caught:
+        load("benchmark").main(["--only", "joints,mujocco"])
+    assert caught.value.code == 2
+    assert "mujocco: no such stage" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("method", ["Rodas5P", "Rodas4"])
+def test_the_compiled_job_is_what_simulate_integrates(load, brief, method):
+    runs = load("benchmarks.runs")
+    found, statistics = runs.compiled(brief, method, 1e-6)()
+    result = fp.simulate(runs.settled(brief, method=method, rtol=1e-6, atol_scale=1e-6))
+    np.testing.assert_array_equal(found, result["joint_position"].values)
+    assert statistics.steps == result.attrs["solver_steps"]
+
+
+def test_the_textbook_job_comes_to_the_same_motion(load, brief):
+    runs = load("benchmarks.runs")
+    exact, agreement = runs.truth(brief)
+    assert agreement["worst"] < 1e-9
+    assert runs.point("BDF", 1e-6, runs.textbook(brief, "BDF", 1e-6), exact).error < 1e-6
+
+
+def test_a_run_that_fails_has_no_error_and_costs_nothing(load):
+    runs = load("benchmarks.runs")
+
+    def job():
+        raise runs.Failed("too stiff")
+
+    assert runs.point("BDF", 1e-3, job, np.zeros((1, 4))).error is None
+
+
+@pytest.mark.parametrize("joints", [1, 2, 8])
+def test_generated_chains_have_one_tendon_more_than_joints_and_follow_their_reference(load, joints):
+    scenario = load("benchmarks.chains").chain(joints, 0.05)
+    assert len(scenario.finger.tendons) == joints + 1
+    closure = fp.Finger(scenario.finger).routing.force_closure()
+    np.testing.assert_allclose(closure.tension, 1.0, rtol=1e-9)
+    result = fp.simulate(scenario)
+    assert abs(result["tracking_error"]).max() < 0.3
+
+
+def test_mujoco_s_own_loop_repeats_the_python_loop(load, brief):
+    pytest.importorskip("mujoco")
+    compared = load("benchmarks.mujoco_loop")
+    start = fp.simulate(brief)["joint_position"].values[0]
+    for step, samples in ((2.5e-4, 21), (1e-3, 21), (2e-3, 11)):
+        model = compared._model(brief, True, "implicitfast", start, step)
+        loop = compared.Loop(brief, model, step)
+        path = loop.run()
+        assert path.shape == (samples, 4)
+        np.testing.assert_array_equal(loop.rollout(), path)
+
+
+@pytest.fixture
+def stages():
+    """Results of all stages, made up."""
+    points = [
+        {"method": method, "rtol": rtol, "error": rtol, "worst": rtol, "integration": cost * rtol**-0.2}
+        | {"whole": None if method == "BDF" else 2.0 * cost * rtol**-0.2, "steps": 10, "evaluations": 80}
+        for method, cost in (("Rodas5P", 0.001), ("BDF", 0.1))
+        for rtol in (1e-3, 1e-6)
+    ]
+    costs = {"Rodas5P": {"integration": [0.01, "="], "whole": [0.02, "="]}, "BDF": {"integration": [1.0, "="]}}
+    study = {"duration": 8.0, "target": 1e-5, "agreement": {"rms": 1e-10}, "points": points, "at_target": costs}
+    row = {"measure": "worst", "integrator": "Euler", "massless": False, "step": 1e-5, "error": 1e-4}
+    row |= {"rollout_error": 1e-4, "ours": 0.01, "loop": 0.5, "rollout": 0.1, "loop_over_ours": 50.0}
+    joint = {"states": 5, "wall_time": 0.1, "real_time_factor": 20.0, "steps": 9, "time_per_step": 1e-5}
+    job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
+    return {
+        "work-precision": {"fig6": study, "stick_slip": study},
+        "step-interface": {"duration": 8.0, "period": 1e-3, "whole": 0.5, "stepping": 0.2, "real_time_factor": 16.0}
+        | {"real_time_factor_stepping": 40.0, "error": 1e-5, "worst": 1e-4},
+        "joints": {"duration": 2.0, "rtol": 1e-5, "exponent": 1.5}
+        | {"rows": [{"joints": n, "time_per_textbook_evaluation": 2e-4, **joint} for n in (1, 2, 3)]},
+        "mujoco": {"version": "3", "duration": 8.0, "limit": 1e-3, "ours": {"worst": {"method": "Rodas4", "rtol": 0.1}}}
+        | {"rows": [row | {"rollout_over_ours": 10.0}]},
+        "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}
+        | {"speed_up_without_start": None},
+        "main-job": job | {"later": 3.0, "later_processor_time": 3.0, "later_memory": 2**21},
+    }
+
+
+def test_the_report_judges_every_target_and_the_figures_are_written(load, stages, tmp_path, monkeypatch, capsys):
+    script = load("benchmark")
+
+    class Stage:
+        def __init__(self, name):
+            self.measure = lambda store: stages[name]
+
+    monkeypatch.setattr(script, "stage", Stage)
+    assert script.main(["--output", str(tmp_path)]) == 0
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written == {"benchmark.json", "benchmark.txt", "work_precision.png", "joints.png"}
+    verdicts = {
+        each["name"]: each["passed"] for each in json.loads((tmp_path / "benchmark.json").read_text())["targets"]
+    }
+    assert verdicts["fig6 at 1e-05 rad, integration: real-time factor"] is True
+    assert verdicts["fig6 at 1e-05 rad, integration: over the textbook"] is True
+    assert verdicts["stick_slip at 1e-05 rad, whole simulate(): over the textbook"] is False
+    assert verdicts["step interface at 1 kHz, steps"] is True
+    assert verdicts["step interface at 1 kHz, with controller"] is False
+    assert verdicts["MuJoCo, lumped mass, worst error 0.001 rad: Python loop"] is True
+    assert verdicts["main job, first run"] is False
+    output = capsys.readouterr().out
+    assert "pass" in output and "FAIL" in output and "Rodas5P" in output
+
+
+def test_a_stage_whose_needs_are_missing_is_left_out(load, tmp_path, monkeypatch, capsys):
+    script = load("benchmark")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert script.main(["--only", "mujoco", "--output", str(tmp_path)]) == 0
+    assert "mujoco: left out" in capsys.readouterr().err

@@ -1,0 +1,307 @@
+"""Compensations against the finger that they compensate: what is cancelled is gone, no more and no less."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.direction import direction
+from finger_pin.control.proportional import ProportionalController
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.exceptions import InputError
+
+WISH = 4.0
+#: Only the passive tendon's minimum counts, so that it is planned to carry exactly what (20) makes it carry.
+CONSISTENT = {
+    "controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH],
+    "controller.passive_tension": WISH,
+    "controller.gravity_compensation": True,
+}
+FRICTIONLESS = {
+    "finger.tendon_friction.coulomb": 0.0,
+    "finger.joint_friction.coulomb": 0.0,
+    "finger.joint_friction.stiction": 0.0,
+}
+FEEDFORWARD = {"controller.tendon_friction_feedforward.share": 1.0}
+JOINTS = {"controller.joint_friction_compensation.share": 1.0}
+#: So sharp that away from reversals the direction is 1 to rounding.
+SHARP = {
+    "controller.tendon_friction_feedforward.reversal_speed": 1e-6,
+    "controller.joint_friction_compensation.reversal_speed": 1e-4,
+}
+
+
+def fig6(*overrides):
+    merged = {}
+    for each in overrides:
+        merged |= each
+    return fp.load_scenario("fig6", merged)
+
+
+def postures(count, seed):
+    """Postures that satisfy (20) for the wish, and velocities that satisfy its derivative."""
+    random = np.random.default_rng(seed)
+    position, velocity = np.zeros((2, count, 4))
+    position[:, :3] = random.uniform([-0.1, 0.3, 0.4], [0.1, 1.0, 1.0], (count, 3))
+    # No tendon stands still: joint 1 is slower than joint 2, and 1.7 times joint 3 faster.
+    speeds = random.uniform([0.2, 0.8, 1.0], [0.5, 1.5, 1.5], (count, 3))
+    velocity[:, :3] = speeds * random.choice([-1.0, 1.0], (count, 3))
+    position[:, 3] = (3.5e-3 * position[:, 2] - WISH / 5e4) / 5e-3
+    velocity[:, 3] = 0.7 * velocity[:, 2]
+    return position, velocity
+
+
+def still(position):
+    return ReferenceSignals(position, np.zeros_like(position))
+
+
+def test_gravity_compensation_holds_a_frictionless_finger_exactly_at_its_reference():
+    """At rest on the reference nothing accelerates; without the compensation it falls with - M^-1 G."""
+    for settings in ({}, {"controller.gravity_compensation": False}):
+        scenario = fig6(CONSISTENT, FRICTIONLESS, settings)
+        finger = fp.Finger(scenario.finger)
+        controller = fp.build_controller(scenario, finger)
+        for position in postures(5, 1)[0]:
+            command = controller.command(0.0, still(position), position, np.zeros(4)).tension[:4]
+            found = finger.evaluate(finger.rest_state(position), command).acceleration
+            body = finger.rigid_body
+            falls = np.linalg.solve(body.mass_matrix(position), -body.gravity_torque(position))
+            np.testing.assert_allclose(found, falls if settings else 0.0, rtol=1e-8, atol=1e-6)
+
+
+def test_a_frictionless_finger_settles_on_its_reference_without_a_steady_error():
+    """Viscous friction brings it there, from the drop that a weak start makes.
+
+    What law (9) keeps is its floor: 1e-4 N on two tendons at 8 mm, 1.6e-6 N m over K_P = 1 N m/rad.
+    """
+    viscous = {"finger.joint_friction.viscous": 0.01, "simulation.duration": 1.2, "simulation.sample_rate": 100.0}
+    still_reference = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
+    offset = {"reference.joints.medial.offset": 0.7, "controller.sampling.period": 2e-3}
+    scenario = fig6(CONSISTENT, FRICTIONLESS, viscous, still_reference, offset)
+
+    class Late:
+        controller = fp.build_controller(scenario)
+
+        def command(self, time, reference, position, velocity):
+            slack = 0.5 if time < 0.1 else 1.0
+            signals = self.controller.command(time, reference, position, velocity)
+            return replace(signals, tension=slack * signals.tension)
+
+    error = fp.simulate(scenario, controller=Late()).tracking_error
+    assert float(abs(error).max()) > 3e-3
+    assert float(abs(error[-1]).max()) < 2e-6
+
+
+def test_damping_is_a_torque_against_the_error_of_velocity():
+    scenario = fig6({"controller.damping": [0.1, 0.2, 0.3, 0.4], "controller.gain": 2.0})
+    controller = fp.build_controller(scenario)
+    reference = ReferenceSignals(np.array([0.1, 0.5, 0.5, 0.3]), np.array([1.0, 0.0, -1.0, 0.5]))
+    signals = controller.command(0.0, reference, np.array([0.0, 0.5, 0.6, 0.3]), np.array([0.5, 0.5, -1.0, 1.5]))
+    np.testing.assert_allclose(signals.torque, [0.2 + 0.05, -0.1, -0.2, -0.4], rtol=1e-12)
+
+
+def test_without_any_addition_it_is_the_paper_s_controller_and_with_all_shares_zero_it_says_the_same():
+    scenario = fig6()
+    paper = fp.build_controller(scenario)
+    assert type(paper) is ProportionalController
+    shares = {"controller.tendon_friction_feedforward.share": 0.0, "controller.joint_friction_compensation.share": 0.0}
+    nothing = fp.build_controller(fig6(shares))
+    position, velocity = postures(20, 2)
+    reference = ReferenceSignals(position + 0.03, velocity)
+    given, expected = (each.command(0.0, reference, position, velocity) for each in (nothing, paper))
+    np.testing.assert_allclose(given.tension, expected.tension, rtol=1e-12)
+    np.testing.assert_allclose(given.torque, expected.torque, rtol=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_tendon_feedforward_without_stribeck_and_viscous_parts_is_the_capstan_law_upside_down(sign):
+    """f^a = f exp(mu_e phi) when pulling, f exp(-mu_e phi) when releasing; phi of T1 is 1.0 + |theta1|."""
+    plain = {"finger.tendon_friction.stiction_ratio": 1.0, "finger.tendon_friction.viscous": 0.0}
+    controller = fp.build_controller(fig6(FEEDFORWARD, SHARP, plain))
+    position = np.array([0.1, 0.5, 0.6, 0.4])
+    velocity = sign * np.array([0.0, 1.0, 0.0, 0.0])
+    planned = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    command = controller.tendons.command(planned, position, velocity)
+    grips = [1.1, 1.1, None, 0.51 + 0.5 + 0.6, None]
+    for index, direction_of_tendon in ((0, sign), (1, sign), (3, -sign)):
+        expected = planned[index] * math.exp(direction_of_tendon * 0.11 * grips[index])
+        assert command[index] == pytest.approx(expected, rel=1e-9)
+    # T3 does not move with joint 2, and T5 has no command.
+    assert command[2] == planned[2] and command[4] == planned[4]
+
+
+def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
+    """The finger's own law (9), integrated at constant velocity until its bristles have settled, is the judge."""
+    scenario = fig6(FEEDFORWARD, SHARP)
+    finger = fp.Finger(scenario.finger)
+    feedforward = fp.build_controller(scenario, finger).tendons
+    planned = np.array([1.0, 2.5, 3.0, 4.0, 5.0])
+    for position, velocity in zip(*postures(4, 3), strict=True):
+        command = feedforward.command(planned, position, velocity)
+        stiction = np.zeros(5)
+        for _ in range(10000):
+            forces = finger.tendons.forces(position, velocity, np.zeros(1), np.zeros(1), stiction, command[:4])
+            stiction = stiction + 1e-5 * forces.stiction_rate
+        np.testing.assert_allclose(forces.strands[:4], planned[:4], rtol=1e-7)
+
+
+def settled_state(finger, position, velocity, command, halves):
+    """The finger in mid-motion with all friction settled, and its passive tendon with given tensions of its halves."""
+    state = finger.layout.unpack(finger.rest_state(position))
+    passive = 3.5e-3 * position[2] - halves[0] / 1e5
+    assert 1e5 * (passive - 5e-3 * position[3]) == pytest.approx(halves[1], rel=1e-9)
+    speed = 0.5 * (3.5e-3 * velocity[2] + 5e-3 * velocity[3])
+    state = replace(state, velocity=velocity, passive_position=np.array([passive]), passive_velocity=np.array([speed]))
+    for _ in range(10000):
+        rate = finger.layout.unpack(finger.evaluate(finger.layout.pack(state), command).rate)
+        state = replace(
+            state,
+            tendon_stiction=state.tendon_stiction + 1e-5 * rate.tendon_stiction,
+            joint_stiction=state.joint_stiction + 2e-5 * rate.joint_stiction,
+        )
+    return state
+
+
+def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction():
+    """On the reference at the desired velocity, with every bristle settled: theta'' = - M^-1 C theta', and p5'' = 0."""
+    scenario = fig6(CONSISTENT, FEEDFORWARD, JOINTS, SHARP)
+    finger = fp.Finger(scenario.finger)
+    controller = fp.build_controller(scenario, finger)
+    for position, velocity in zip(*postures(3, 4), strict=True):
+        command = controller.command(0.0, ReferenceSignals(position, velocity), position, velocity).tension
+        assert command[4] == pytest.approx(WISH, rel=1e-9)
+        speed = 0.5 * (3.5e-3 + 0.7 * 5e-3) * velocity[2]
+        level = math.tanh(0.5 * 0.11 * 0.58) * (1.0 + 0.5 * math.exp(-abs(speed) / 0.01)) * math.copysign(1.0, speed)
+        state = settled_state(finger, position, velocity, command[:4], (WISH * (1 + level), WISH * (1 - level)))
+        signals = finger.evaluate(finger.layout.pack(state), command[:4])
+        body = finger.rigid_body
+        drift = body.coriolis_matrix(position, velocity) @ velocity
+        np.testing.assert_allclose(
+            body.mass_matrix(position) @ signals.acceleration, -drift, atol=1e-7 * abs(signals.tendon_torque).max()
+        )
+        # The viscous part of T5's friction is no part of the capstan balance of its halves.
+        assert 8.8e-6 * signals.tendons.passive_acceleration[0] == pytest.approx(-1.0 * speed, abs=1e-6)
+
+
+def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
+    actual = fp.build_controller(fig6(FEEDFORWARD, JOINTS))
+    believed = fp.build_controller(
+        fig6(
+            {"controller.tendon_friction_feedforward.coulomb": 0.2},
+            {"controller.joint_friction_compensation.coulomb": [1e-4, 2e-4, 3e-4, 4e-4]},
+        )
+    )
+    np.testing.assert_array_equal(believed.tendons.tendons.surface, 0.2)
+    np.testing.assert_array_equal(actual.tendons.tendons.surface, 0.11)
+    np.testing.assert_array_equal(believed.joints.friction.kinetic, [1e-4, 2e-4, 3e-4, 4e-4])
+    # Nothing slides more easily than it starts: a belief in M^d raises that in M^c where it has to.
+    np.testing.assert_array_equal(believed.joints.friction.static, [3.5e-4, 3.5e-4, 3.5e-4, 4e-4])
+
+
+def test_the_loop_of_friction_and_tension_closes_up_to_the_critical_coefficient():
+    """At 97 % of it, tensions of many times those without friction still satisfy their balance, by (17) by hand."""
+    critical = fp.critical_friction(fp.load_finger("ub")).coefficient
+    coefficient = 0.97 * critical
+    key = "controller.joint_friction_compensation"
+    scenario = fig6(
+        {f"{key}.coulomb": coefficient, f"{key}.stiction": coefficient, f"{key}.viscous": 0.0},
+        {f"{key}.reversal_speed": 1e-4},
+    )
+    controller = fp.build_controller(scenario)
+    position = np.array([0.05, 0.5, 0.6, 0.4])
+    worst = 0.0
+    for signs in np.array(np.meshgrid(*4 * [[-1.0, 1.0]])).reshape(4, -1).T:
+        reference = ReferenceSignals(position + 0.01, signs)
+        signals = controller.command(0.0, reference, position, signs)
+        f1, f2, f3, f4, f5 = signals.tension
+        load = np.array([f1 + f2 + f3 + f4, f1 + f2 + f3 + f4, f3 + f4 + f5, f4 + f5])
+        torque = controller.routing.coupling.T @ signals.tension
+        np.testing.assert_allclose(torque - coefficient * signs * load, 0.01, atol=1e-7)
+        worst = max(worst, f1 + f2 + f3 + f4)
+    assert worst > 60.0
+
+
+@pytest.mark.parametrize("entry", ["stiction", "share"])
+def test_compensating_more_joint_friction_than_locks_the_finger_is_refused(entry):
+    value = {"stiction": 8e-4, "share": 2.0}[entry]
+    with pytest.raises(InputError, match="self-locking") as caught:
+        fp.build_controller(
+            fig6({f"controller.joint_friction_compensation.{entry}": value, "finger.joint_friction.stiction": 4e-4})
+        )
+    assert caught.value.entry == "controller.joint_friction_compensation"
+    assert "\n" not in str(caught.value)
+
+
+def test_the_direction_is_smooth_and_odd_and_zero_where_nothing_is_meant_to_move():
+    speed = np.linspace(-5.0, 5.0, 2001)
+    values = direction(speed, 0.5)
+    assert direction(0.0, 0.5) == 0.0
+    np.testing.assert_allclose(values, -values[::-1], atol=1e-15)
+    assert np.all(np.diff(values) >= 0.0)
+    assert np.max(np.diff(values) / np.diff(speed)) <= 1.0 / 0.5 + 1e-12
+
+
+def test_commands_do_not_chatter_at_a_reversal_whatever_the_measured_velocity_says():
+    """The command passes from one side to the other once.
+
+    x = M(v) tanh(v / v_r) is odd, at most M^c, and has one maximum: over a sweep of v it varies by at most
+    2 (2 M^c - |x_end|). f^a = f (1 + x) / (1 - x) varies by at most 2 f / (1 - M^c)^2 times that, b v by its own sweep.
+    A law on the measured velocity would switch at every one of its 2000 changes of sign.
+    """
+    controller = fp.build_controller(fig6(FEEDFORWARD, {"controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH]}))
+    position = np.array([0.0, 0.5, 0.5, 0.3])
+    sweep = np.linspace(-0.5, 0.5, 2001)[:, None] * np.array([0.0, 1.0, 0.0, 0.0])
+    noise = np.random.default_rng(5).normal(0.0, 1.0, sweep.shape)
+    places = np.broadcast_to(position, sweep.shape)
+    commands = controller.command(0.0, ReferenceSignals(places, sweep), places, noise).tension
+    planned = controller.command(0.0, still(position), position, np.zeros(4)).tension
+    variation = np.abs(np.diff(commands, axis=0)).sum(axis=0)
+    for tendon, radius, curvature in ((0, 8e-3, 1.0), (1, 8e-3, 1.0), (3, 5.3e-3, 0.51 + 1.0)):
+        kinetic = math.tanh(0.5 * 0.11 * curvature)
+        static, speed = 1.5 * kinetic, 0.5 * radius
+        end = (kinetic + 0.5 * kinetic * math.exp(-speed / 0.01)) * math.tanh(speed / 1e-3)
+        friction = 2.0 * planned[tendon] / (1.0 - static) ** 2 * 2.0 * (2.0 * static - end)
+        assert 0.5 * abs(commands[-1, tendon] - commands[0, tendon]) < variation[tendon]
+        assert variation[tendon] < friction + 2.0 * speed / (1.0 - static)
+    assert variation[2] < 1e-9
+
+
+@pytest.mark.parametrize("finger", ["planar", "dexmart_index"])
+def test_commands_of_a_batch_are_those_of_each_row_for_other_fingers_too(finger, tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(
+        f'finger = "{finger}"\n[controller]\ngravity_compensation = true\ndamping = 0.01\n'
+        "[controller.tendon_friction_feedforward]\n[controller.joint_friction_compensation]\n"
+        "[controller.distribution]\nmaximum_tension = 50.0\n"
+    )
+    scenario = fp.load_scenario(path)
+    controller = fp.build_controller(scenario)
+    random, size = np.random.default_rng(6), len(scenario.finger.joints)
+    position, velocity, error = random.uniform(0.1, 0.4, (3, 7, size))
+    batch = controller.command(0.0, ReferenceSignals(position + 0.1 * error, velocity), position, -velocity)
+    for index in range(7):
+        reference = ReferenceSignals(position[index] + 0.1 * error[index], velocity[index])
+        single = controller.command(0.0, reference, position[index], -velocity[index])
+        np.testing.assert_allclose(batch.tension[index], single.tension, rtol=1e-6)
+        np.testing.assert_allclose(batch.torque[index], single.torque, rtol=1e-6)
+
+
+def test_a_continuous_compensated_controller_is_what_a_finely_sampled_one_converges_to():
+    overrides = {"simulation.duration": 0.05, "finger.joint_friction.viscous": 0.02}
+    continuous = fp.simulate(fig6(CONSISTENT, FEEDFORWARD, JOINTS, overrides))
+    assert continuous.attrs["method"] == "Radau"
+    gaps = []
+    for period in (1e-3, 2.5e-4):
+        sampled = fp.simulate(fig6(CONSISTENT, FEEDFORWARD, JOINTS, overrides, {"controller.sampling.period": period}))
+        assert sampled.attrs["method"] == "Rodas5P"
+        gaps.append(float(abs(sampled.joint_position - continuous.joint_position).max()))
+    assert gaps[0] < 1e-4
+    assert 3.0 < gaps[0] / gaps[1] < 5.5
+
+
+def test_the_closed_loop_uses_the_scenario_s_whole_controller():
+    loop = ClosedLoop.from_scenario(fig6(FEEDFORWARD))
+    assert isinstance(loop.controller, fp.CompensatedController) and loop.controller.tendons is not None

@@ -1,0 +1,299 @@
+"""The generated URDF against equation (1), closed forms, and an independent reader (yourdfpy)."""
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
+
+from finger_pin.description.loading import list_fingers, load_finger
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.shapes import MATERIALS
+from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+
+ROOT = Path(__file__).resolve().parents[2]
+
+OTHER_LENGTHS = {
+    f"finger.joints.{name}.link.{key}": value
+    for name, length in {"abduction": 0.013, "proximal": 0.071, "medial": 0.0417, "distal": 0.0093}.items()
+    for key, value in {"length": length, "centre_of_mass": 0.4 * length}.items()
+}
+JOINTS = ("abduction", "proximal", "medial", "distal")
+SQUARE = {f"finger.joints.{name}.link.section": "square" for name in JOINTS}
+
+FINGERS = {
+    "ub": ("ub", {}),
+    "dexmart_index": ("dexmart_index", {}),
+    "planar": ("planar", {}),
+    "other lengths": ("ub", OTHER_LENGTHS),
+    "square": ("ub", SQUARE),
+}
+
+
+@pytest.fixture(params=FINGERS.values(), ids=FINGERS.keys())
+def finger(request):
+    return load_finger(*request.param)
+
+
+def read_by_pinocchio(urdf, kind):
+    """Read the shapes of a URDF from memory."""
+    return pin.buildGeomFromUrdfString(pin.buildModelFromXML(urdf), urdf, kind)
+
+
+def links_of(finger):
+    return [joint.link for joint in finger.joints.values()]
+
+
+@pytest.mark.parametrize(
+    "name, overrides, closed_form",
+    [
+        ("ub", {}, equation_1),
+        ("ub", OTHER_LENGTHS, equation_1),
+        ("dexmart_index", {}, equation_1),
+        ("planar", {}, planar_tip),
+        ("planar", {"finger.joints.distal.link.length": 0.019}, planar_tip),
+    ],
+    ids=["ub", "other lengths", "dexmart_index", "planar", "planar, other length"],
+)
+def test_pinocchio_and_yourdfpy_place_the_fingertip_where_equation_1_does(name, overrides, closed_form):
+    finger = load_finger(name, overrides)
+    lengths = [link.length for link in links_of(finger)]
+    body, robot = build_rigid_body(finger), read_by_yourdfpy(to_urdf(finger))
+    assert body.joints == tuple(finger.joints) == tuple(robot.actuated_joint_names)
+    generator = np.random.default_rng(1)
+    for theta in generator.uniform(-np.pi, np.pi, (1000, len(lengths))):
+        expected = closed_form(lengths, theta)
+        robot.update_cfg(theta)
+        np.testing.assert_allclose(body.tip_position(theta), expected, rtol=0, atol=1e-12)
+        pose = robot.get_transform("fingertip", "base")
+        np.testing.assert_allclose(pose[:3, 3], expected, rtol=0, atol=1e-12)
+
+
+def test_the_straight_finger_reaches_the_sum_of_table_1():
+    tip = build_rigid_body(load_finger("ub")).tip_position(np.zeros(4))
+    np.testing.assert_allclose(tip, [0.0202 + 0.045 + 0.0299 + 0.0218, 0.0, 0.0], rtol=0, atol=1e-15)
+
+
+def test_a_twist_of_the_last_link_turns_the_fingertip_frame_and_does_not_move_it():
+    finger = load_finger("planar", {"finger.joints.distal.link.twist": 0.5})
+    robot = read_by_yourdfpy(to_urdf(finger))
+    pose = robot.get_transform("fingertip", "base")
+    np.testing.assert_allclose(pose[:3, 3], [0.077, 0.0, 0.0], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(pose[1:3, 1], [np.cos(0.5), np.sin(0.5)], rtol=0, atol=1e-15)
+
+
+def test_masses_centres_and_inertias_survive_the_round_trip_in_pinocchio(finger):
+    model = build_rigid_body(finger).model
+    for link, inertia in zip(links_of(finger), list(model.inertias)[1:], strict=True):
+        axial, transverse = link.inertia
+        tensor = np.diag([axial, transverse, transverse])
+        assert inertia.mass == link.mass
+        np.testing.assert_allclose(inertia.lever, [link.mass_centre, 0.0, 0.0], rtol=1e-15, atol=1e-17)
+        np.testing.assert_allclose(inertia.inertia, tensor, rtol=1e-14, atol=1e-22)
+
+
+def test_masses_centres_and_inertias_survive_the_round_trip_in_yourdfpy(finger):
+    robot = read_by_yourdfpy(to_urdf(finger))
+    for name, joint in finger.joints.items():
+        inertial = robot.link_map[f"{name}_link"].inertial
+        axial, transverse = joint.link.inertia
+        assert inertial.mass == joint.link.mass
+        np.testing.assert_array_equal(inertial.origin[:3, 3], [joint.link.mass_centre, 0.0, 0.0])
+        np.testing.assert_array_equal(inertial.origin[:3, :3], np.eye(3))
+        np.testing.assert_array_equal(inertial.inertia, np.diag([axial, transverse, transverse]))
+
+
+def test_the_published_masses_and_inertias_are_those_of_the_shipped_finger():
+    rows = [
+        (0.0050, 2.8e-7, 2.0e-7),
+        (0.0101, 1.9e-6, 3.6e-7),
+        (0.0060, 5.4e-7, 1.9e-7),
+        (0.0038, 2.0e-7, 9.3e-8),
+    ]
+    for inertia, row in zip(list(build_rigid_body(load_finger("ub")).model.inertias)[1:], rows, strict=True):
+        tensor = inertia.inertia
+        np.testing.assert_allclose((inertia.mass, tensor[1, 1], tensor[0, 0]), row, rtol=1e-14)
+
+
+def test_the_dexmart_links_have_the_density_of_the_first_finger():
+    scaled, original = (links_of(load_finger(name)) for name in ("dexmart_index", "ub"))
+    for one, other in zip(scaled, original, strict=True):
+        assert one.width == other.width
+        assert one.mass / one.length == pytest.approx(other.mass / other.length, rel=0.002)
+
+
+def test_joint_limits_are_the_ranges_of_the_description(finger):
+    model, robot = build_rigid_body(finger).model, read_by_yourdfpy(to_urdf(finger))
+    ranges = np.array([joint.range for joint in finger.joints.values()])
+    np.testing.assert_array_equal(model.lowerPositionLimit, ranges[:, 0])
+    np.testing.assert_array_equal(model.upperPositionLimit, ranges[:, 1])
+    limits = [robot.joint_map[name].limit for name in finger.joints]
+    np.testing.assert_array_equal([(limit.lower, limit.upper) for limit in limits], ranges)
+
+
+def test_the_paper_s_finger_abducts_by_ten_degrees_and_flexes_by_ninety():
+    model = build_rigid_body(load_finger("ub")).model
+    np.testing.assert_allclose(np.degrees(model.lowerPositionLimit), [-10, 0, 0, 0], rtol=1e-14)
+    np.testing.assert_allclose(np.degrees(model.upperPositionLimit), [10, 90, 90, 90], rtol=1e-14)
+
+
+def test_effort_limits_are_the_torques_of_a_hundred_newtons_on_each_tendon_of_the_stronger_side():
+    model = build_rigid_body(load_finger("ub")).model
+    by_hand = [100 * 0.008, 100 * (0.008 + 0.008), 100 * (0.0053 + 0.0035), 100 * 0.0053]
+    np.testing.assert_allclose(model.upperEffortLimit, by_hand, rtol=1e-14)
+    np.testing.assert_allclose(model.upperVelocityLimit, 20.0)
+
+
+def test_every_joint_turns_about_its_z_axis(finger):
+    robot = read_by_yourdfpy(to_urdf(finger))
+    for name in finger.joints:
+        joint = robot.joint_map[name]
+        assert joint.type == "revolute"
+        np.testing.assert_array_equal(joint.axis, [0.0, 0.0, 1.0])
+
+
+def test_gravity_of_the_description_acts_in_the_model():
+    finger = load_finger("planar")
+    np.testing.assert_array_equal(build_rigid_body(finger).model.gravity.linear, [0.0, -9.81, 0.0])
+    np.testing.assert_array_equal(build_rigid_body(finger).model.gravity.angular, np.zeros(3))
+
+
+def test_the_urdf_refers_to_no_file(finger):
+    root = ET.fromstring(to_urdf(finger))
+    assert not list(root.iter("mesh"))
+    assert not [element for element in root.iter() if "filename" in element.attrib]
+
+
+def test_every_link_has_visual_and_collision_shapes(finger):
+    robot = read_by_yourdfpy(to_urdf(finger))
+    assert set(robot.link_map) == {"base", "fingertip", *(f"{name}_link" for name in finger.joints)}
+    for link in robot.link_map.values():
+        assert link.visuals and link.collisions, link.name
+
+
+def test_pinocchio_reads_every_shape_of_the_urdf(finger):
+    urdf = to_urdf(finger)
+    root = ET.fromstring(urdf)
+    for kind, tag in ((pin.GeometryType.VISUAL, "visual"), (pin.GeometryType.COLLISION, "collision")):
+        assert read_by_pinocchio(urdf, kind).ngeoms == len(list(root.iter(tag)))
+
+
+def test_every_material_is_defined_once_and_every_visual_uses_one_of_them(finger):
+    root = ET.fromstring(to_urdf(finger))
+    assert [material.get("name") for material in root.findall("material")] == list(MATERIALS)
+    used = [visual.find("material") for visual in root.iter("visual")]
+    assert {material.get("name") for material in used} == set(MATERIALS)
+    assert not [material for material in used if len(material)]
+
+
+def bounds(geometry, placement):
+    """Axis-aligned box around a shape, in the frame that it is placed in, by yourdfpy's numbers."""
+    if geometry.box is not None:
+        half = 0.5 * np.abs(placement[:3, :3]) @ geometry.box.size
+    elif geometry.cylinder is not None:
+        axis = placement[:3, 2]
+        radius, length = geometry.cylinder.radius, geometry.cylinder.length
+        half = 0.5 * length * np.abs(axis) + radius * np.sqrt(np.clip(1.0 - axis**2, 0.0, None))
+    else:
+        half = np.full(3, geometry.sphere.radius)
+    return placement[:3, 3] - half, placement[:3, 3] + half
+
+
+def test_shapes_stay_within_half_a_width_of_their_link(finger):
+    robot = read_by_yourdfpy(to_urdf(finger))
+    for name, joint in finger.joints.items():
+        link = robot.link_map[f"{name}_link"]
+        length, width = joint.link.length, joint.link.width
+        for shape in (*link.visuals, *link.collisions):
+            low, high = bounds(shape.geometry, shape.origin)
+            assert np.all(low >= [-0.5 * width - 1e-12, -0.51 * width, -0.56 * width])
+            assert np.all(high <= [length + 1e-12, 0.51 * width, 0.56 * width])
+
+
+def test_a_phalanx_lies_along_x_between_its_joints_and_covers_most_of_the_link(finger):
+    robot = read_by_yourdfpy(to_urdf(finger))
+    for name, joint in finger.joints.items():
+        link = robot.link_map[f"{name}_link"]
+        (collision,) = link.collisions
+        low, high = bounds(collision.geometry, collision.origin)
+        assert (collision.geometry.box is not None) == (joint.link.section == "square")
+        assert 0.0 < low[0] < high[0] < joint.link.length
+        assert high[0] - low[0] >= 0.19 * joint.link.length
+        np.testing.assert_allclose(high[1:] - low[1:], joint.link.width, rtol=1e-12)
+
+
+def test_the_pad_ends_at_the_fingertip(finger):
+    link = read_by_yourdfpy(to_urdf(finger)).link_map["fingertip"]
+    for shape in (*link.visuals, *link.collisions):
+        _, high = bounds(shape.geometry, shape.origin)
+        assert shape.geometry.sphere is not None
+        assert high[0] == 0.0
+
+
+def test_the_palm_lies_behind_the_first_phalanx(finger):
+    link = read_by_yourdfpy(to_urdf(finger)).link_map["base"]
+    width = links_of(finger)[0].width
+    for shape in link.visuals:
+        low, high = bounds(shape.geometry, shape.origin)
+        assert low[0] < 0.0
+        assert high[0] < 0.5 * width
+
+
+def pulley_radius(urdf, joint):
+    """Largest radius of the cylinders drawn around a joint axis, m."""
+    visuals = read_by_yourdfpy(urdf).link_map[f"{joint}_link"].visuals
+    around_axis = [visual.geometry.cylinder for visual in visuals if visual.origin[0, 3] == 0.0]
+    return max(cylinder.radius for cylinder in around_axis)
+
+
+def test_a_pulley_has_the_largest_winding_radius_of_its_joint():
+    urdf = to_urdf(load_finger("ub"))
+    largest = [pulley_radius(urdf, name) for name in ("abduction", "proximal", "medial", "distal")]
+    assert largest == [0.008, 0.008, 0.0063, 0.0053]
+
+
+def test_a_pulley_never_sticks_out_of_the_finger_nor_vanishes_in_it():
+    for given, drawn in ((0.1, 0.5 * 0.014), (1e-5, 0.3 * 0.014)):
+        radii = {f"finger.tendons.{tendon}.crossings.distal.radius": given for tendon in ("T4", "T5")}
+        assert pulley_radius(to_urdf(load_finger("ub", radii)), "distal") == pytest.approx(drawn)
+
+
+def test_the_files_in_urdf_are_current():
+    files = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "urdf").glob("*.urdf")}
+    assert files == {name: to_urdf(load_finger(name)) for name in list_fingers()}
+
+
+def test_the_script_that_writes_the_files_agrees_that_they_are_current():
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "scripts/generate_urdf.py", "--check"]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_file_from_urdf_is_read_by_pinocchio_as_the_description_is():
+    for name in list_fingers():
+        model = pin.buildModelFromUrdf(str(ROOT / "urdf" / f"{name}.urdf"))
+        model.gravity.linear[:] = load_finger(name).gravity
+        assert model == build_rigid_body(load_finger(name)).model
+
+
+def test_a_joint_without_a_link_is_an_error_that_names_it():
+    finger = load_finger("planar")
+    joints = {**finger.joints, "distal": finger.joints["distal"].model_copy(update={"link": None})}
+    with pytest.raises(InputError) as caught:
+        to_urdf(finger.model_copy(update={"joints": joints}))
+    assert caught.value.entry == "finger.joints.distal.link"
+
+
+@pytest.mark.parametrize("name", ["fingertip", "fingertip_fixed", "universe"])
+def test_a_joint_with_a_name_that_the_urdf_needs_is_an_error_that_names_it(name):
+    finger = load_finger("planar")
+    joints = {"proximal": finger.joints["proximal"], name: finger.joints["distal"]}
+    with pytest.raises(InputError) as caught:
+        to_urdf(finger.model_copy(update={"joints": joints}))
+    assert caught.value.entry == f"finger.joints.{name}"

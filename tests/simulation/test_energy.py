@@ -1,0 +1,333 @@
+"""The energy account: it closes on correct runs, follows known works, and exposes planted errors."""
+
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import finger_pin as fp
+from finger_pin.control import proportional as controller_block
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.core.textbook import integrate
+from finger_pin.description.scenario import METHODS
+from finger_pin.mechanism import joint_friction as joint_block
+from finger_pin.mechanism import tendons as tendon_block
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.simulation import account as account_module
+from finger_pin.simulation.account import account
+from finger_pin.simulation.energy import Energies, Powers, energies, powers
+
+LOSSES = ("tendon_coulomb", "tendon_viscous", "joint_coulomb", "joint_viscous", "limiter")
+CONTACT = {
+    "reference.joints.abduction.amplitude": 0.6,
+    "reference.joints.abduction.frequency": 3.0,
+    "controller.gain": 2.0,
+    "simulation.duration": 0.12,
+}
+
+
+def turnover(result):
+    """The energy that went through the account, J: everything supplied and lost, by magnitude."""
+    works = [result[f"energy_exchanged_{field.name}"] for field in fields(Powers)]
+    return float(sum(abs(work).max() for work in works))
+
+
+def share_left_open(loop, duration=0.03):
+    """Integrate the Python right-hand side, keep its account, and return the residual over the turnover.
+
+    A wrong law can make the system unstable; then the account of the first steps must do.
+    """
+    steps = []
+    trajectory = integrate(
+        loop.rhs,
+        loop.initial_state(),
+        duration,
+        method="BDF",
+        rtol=1e-6,
+        atol=1e-6 * loop.finger.layout.scales(),
+        watch=lambda time, x: steps.append(time),
+        stop=lambda: len(steps) == 600,
+    )
+    times = np.linspace(0.0, trajectory.breakpoints[-1], 101)
+    x = trajectory.interpolate(times)
+    state = loop.finger.layout.unpack(x)
+    motion = loop.dynamics.motion(state.position, state.velocity)
+    kept = account(loop, trajectory, times, loop.evaluate(times, x), motion)
+    return np.abs(kept.residual).max() / sum(np.abs(work).max() for work in vars(kept.works).values())
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    """The finger pushed at its tip while it follows fig6."""
+    settings = {"environment.fingertip_force": [0.3, -0.2, 0.4], "simulation.duration": 0.1}
+    return fp.simulate(fp.load_scenario("fig6", settings))
+
+
+@pytest.fixture(scope="module")
+def contact():
+    """The abduction joint driven into its upper limit and back."""
+    return fp.simulate(fp.load_scenario("fig6", CONTACT))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_account_closes_at_default_tolerances(fig6_runs, method):
+    result = fig6_runs[method]
+    assert float(abs(result.energy_residual).max()) < 1e-5 * float(abs(result.energy_exchanged_actuators).max())
+
+
+def test_the_account_of_the_main_job_closes(fig6):
+    assert float(abs(fig6.energy_residual).max()) < 1e-5 * float(fig6.energy_exchanged_actuators.max())
+
+
+def test_the_account_of_the_hard_case_closes():
+    result = fp.simulate(fp.load_scenario("stick_slip"))
+    assert float(abs(result.energy_residual).max()) < 1e-5 * float(result.energy_exchanged_actuators.max())
+
+
+@pytest.mark.parametrize("method", ["Rodas5P", "Rodas4", "BDF"])
+def test_the_residual_shrinks_with_the_tolerance(method):
+    residuals = []
+    for rtol in (1e-4, 1e-6, 1e-8):
+        settings = {"duration": 0.05, "method": method, "rtol": rtol, "atol_scale": rtol}
+        result = fp.simulate(fp.load_scenario("fig6", {f"simulation.{key}": value for key, value in settings.items()}))
+        residuals.append(float(abs(result.energy_residual).max()))
+    assert residuals[0] > 5.0 * residuals[1] > 25.0 * residuals[2]
+
+
+def test_the_account_closes_with_a_force_at_the_fingertip(pushed):
+    assert float(abs(pushed.energy_residual).max()) < 1e-5 * turnover(pushed)
+
+
+def test_a_constant_force_does_the_work_of_its_displacement(pushed):
+    moved = pushed.fingertip_position - pushed.fingertip_position[0]
+    expected = moved.values @ np.array([0.3, -0.2, 0.4])
+    assert np.abs(expected).max() > 1e-4
+    np.testing.assert_allclose(pushed.energy_exchanged_fingertip, expected, atol=1e-5 * np.abs(expected).max())
+
+
+def test_the_account_closes_through_contact_with_a_stroke_limiter(contact):
+    assert float(contact.energy_limiter.max()) > 1e-5
+    assert float(contact.energy_exchanged_limiter[-1]) > 1e-6
+    assert float(abs(contact.energy_residual).max()) < 1e-5 * turnover(contact)
+    degrees = np.degrees(contact.joint_position.values)
+    outside = np.maximum(degrees - [10.0, 90.0, 90.0, 90.0], 0.0) + np.maximum([-10.0, 0.0, 0.0, 0.0] - degrees, 0.0)
+    expected = 25.0 * np.sum(np.radians(outside) ** 2, axis=1)
+    np.testing.assert_allclose(contact.energy_limiter, expected, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("run", ["fig6", "pushed", "contact"])
+def test_no_loss_is_ever_negative(run, request):
+    result = request.getfixturevalue(run)
+    for name in LOSSES:
+        assert float(result[f"power_{name}"].min()) >= -1e-15, name
+        assert float(result[f"energy_exchanged_{name}"].min()) >= -1e-12, name
+    for name in LOSSES[:4]:
+        assert float(result[f"energy_exchanged_{name}"][-1]) > 1e-7, name
+
+
+@pytest.mark.parametrize("run", ["fig6", "pushed", "contact"])
+def test_stored_energies_other_than_gravity_are_never_negative(run, request):
+    result = request.getfixturevalue(run)
+    for field in fields(Energies):
+        if field.name != "gravity":
+            assert float(result[f"energy_{field.name}"].min()) >= 0.0, field.name
+
+
+def test_losses_are_friction_force_times_velocity_less_what_bristles_store(contact):
+    """The work of f^f v, summed up over the samples, is the change of sum F^s^2 / 2 s0 and the losses."""
+    for kind, velocity, stiffness in (("tendon", "tendon_velocity", 5e4), ("joint", "joint_velocity", 5.0)):
+        power = (contact[f"{kind}_friction"] * contact[velocity]).sum(kind)
+        supplied = np.cumsum(0.5 * (power.values[1:] + power.values[:-1])) * 1e-3
+        stored = (contact[f"{kind}_stiction"] ** 2).sum(kind).values / (2.0 * stiffness)
+        lost = contact[f"energy_exchanged_{kind}_coulomb"] + contact[f"energy_exchanged_{kind}_viscous"]
+        # The trapezium of 1 ms samples is good to a few per cent of the total in a motion with 100 Hz in it.
+        np.testing.assert_allclose(supplied, (stored - stored[0] + lost.values)[1:], atol=0.05 * float(lost[-1]))
+
+
+def test_energies_at_a_state_are_those_written_out(finger):
+    """Springs and bristles of a random state by hand; kinetic energy with the tendon's own mass."""
+    draw = np.random.default_rng(15)
+    theta, velocity = np.array([0.2, 0.5, 0.9, 0.4]), draw.normal(0.0, 2.0, 4)
+    p5, p5_rate = 0.5 * (3.5e-3 * 0.9 + 5e-3 * 0.4) + 1e-5, 0.3
+    tendon, joint = draw.normal(0.0, 0.5, 5), draw.normal(0.0, 1e-3, 4)
+    x = np.concatenate([theta, velocity, [p5, p5_rate], tendon, joint])
+    signals = finger.evaluate(x, np.ones(4))
+    stored = energies(finger, signals, finger.rigid_body.kinematics(theta, velocity))
+    mass = finger.rigid_body.mass_matrix(theta)
+    assert stored.kinetic == pytest.approx(0.5 * velocity @ mass @ velocity + 0.5 * 8.8e-6 * 0.09, rel=1e-12)
+    halves = 5e4 * (max(0.0, 3.5e-3 * 0.9 - p5) ** 2 + max(0.0, p5 - 5e-3 * 0.4) ** 2)
+    assert stored.passive_tendon == pytest.approx(halves, rel=1e-12)
+    assert stored.limiter == pytest.approx(25.0 * (0.2 - math.pi / 18) ** 2, rel=1e-9)
+    assert stored.tendon_bristles == pytest.approx(sum(tendon**2) / 1e5, rel=1e-12)
+    assert stored.joint_bristles == pytest.approx(sum(joint**2) / 10.0, rel=1e-12)
+    parts = [getattr(stored, field.name) for field in fields(Energies)]
+    assert stored.total == pytest.approx(sum(parts), rel=1e-12)
+
+
+def test_slack_is_booked_only_where_a_tension_is_cut(finger):
+    """T1 is commanded 1 N and loses 3 N, so 2 N of friction have nowhere to go; T2 to T4 deliver."""
+    velocity = np.array([0.5, 0.2, -0.3, 0.4])
+    x = np.concatenate([[0.0, 0.4, 0.5, 0.3], velocity, [0.002, 0.0], [3.0, 0.1, -0.2, 0.3, 0.0], np.zeros(4)])
+    booked = powers(finger, finger.evaluate(x, np.ones(4)))
+    sliding = 8e-3 * 0.5 + 8e-3 * 0.2
+    assert booked.slack == pytest.approx((1.0 - 3.0 - sliding) * sliding, rel=1e-9)
+    x[10] = 0.3
+    assert powers(finger, finger.evaluate(x, np.ones(4))).slack == 0.0
+
+
+def test_net_power_is_supply_less_losses_and_the_rate_of_stored_energy(finger):
+    """By finite differences of the stored energy along the flow, at random states with slack and contact."""
+    draw = np.random.default_rng(16)
+    force = np.array([0.4, -0.3, 0.6])
+
+    def total(x):
+        signals = finger.evaluate(x, command, force)
+        return energies(finger, signals, finger.rigid_body.kinematics(x[:4], x[4:8])).total
+
+    for _ in range(30):
+        theta = np.append(draw.uniform(-0.25, 0.25), draw.uniform(-0.1, 1.7, 3))
+        p5 = 0.5 * (3.5e-3 * theta[2] + 5e-3 * theta[3]) + draw.normal(0.0, 1e-5)
+        stiction = draw.normal(0.0, 0.8, 5), draw.normal(0.0, 2e-3, 4)
+        x = np.concatenate([theta, draw.normal(0.0, 3.0, 4), [p5, draw.normal(0.0, 0.02)], *stiction])
+        command = draw.uniform(0.0, 3.0, 4)
+        signals = finger.evaluate(x, command, force)
+        exchanged = powers(finger, signals)
+        by_hand = exchanged.actuators + exchanged.fingertip - exchanged.slack
+        by_hand -= sum(getattr(exchanged, name) for name in LOSSES)
+        assert exchanged.net == pytest.approx(by_hand, rel=1e-12, abs=1e-15)
+        step = 1e-9
+        slope = (total(x + step * signals.rate) - total(x - step * signals.rate)) / (2.0 * step)
+        size = sum(abs(value) for value in vars(exchanged).values())
+        assert float(slope) == pytest.approx(float(by_hand), abs=1e-5 * float(size))
+
+
+OFF = {
+    "finger.gravity": [0.0, 9.81, 0.0],
+    "finger.tendon_friction.coulomb": 0.0,
+    "finger.tendon_friction.viscous": 0.0,
+    "finger.tendon_friction.stiffness": 1e-18,
+    "finger.joint_friction.coulomb": 0.0,
+    "finger.joint_friction.stiction": 0.0,
+    "finger.joint_friction.viscous": 0.0,
+    "finger.joint_friction.stiffness": 1e-18,
+    "finger.joints.proximal.range": [-10.0, 10.0],
+    "finger.joints.distal.range": [-10.0, 10.0],
+}
+
+
+def double_pendulum(_, y):
+    """The textbook double pendulum of two rods about their hinges, angles from x, gravity along +y."""
+    (l1, l2), (m1, m2), (d1, d2) = (0.045, 0.032), (0.0101, 0.0056), (0.017, 0.015)
+    i1, i2 = (m * (d**2 / 16.0 + length**2 / 12.0) for m, d, length in ((m1, d1, l1), (m2, d2, l2)))
+    a1, bend, w1, rate2 = y
+    a2, w2 = a1 + bend, w1 + rate2
+    m11 = i1 + m1 * l1**2 / 4.0 + m2 * l1**2
+    m12 = m2 * l1 * l2 / 2.0 * math.cos(a1 - a2)
+    m22 = i2 + m2 * l2**2 / 4.0
+    h = m2 * l1 * l2 / 2.0 * math.sin(a1 - a2)
+    f1 = -h * w2**2 + 9.81 * (m1 * l1 / 2.0 + m2 * l1) * math.cos(a1)
+    f2 = h * w1**2 + 9.81 * m2 * l2 / 2.0 * math.cos(a2)
+    e1, e2 = np.linalg.solve([[m11, m12], [m12, m22]], [f1, f2])
+    return [w1, rate2, e1, e2 - e1]
+
+
+def test_with_everything_off_the_planar_finger_is_a_double_pendulum_that_keeps_its_energy():
+    finger = fp.Finger(fp.load_finger("planar", OFF))
+    start = finger.rest_state(np.array([0.3, 0.5]))
+    times = np.linspace(0.0, 0.5, 50)
+    settings = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12, "t_eval": times}
+    x = solve_ivp(lambda t, x: finger.rhs(t, x, np.zeros(3)), (0.0, 0.5), start, **settings).y.T
+    expected = solve_ivp(double_pendulum, (0.0, 0.5), [0.3, 0.5, 0.0, 0.0], **settings).y.T
+    assert np.ptp(expected[:, 0]) > 1.0
+    np.testing.assert_allclose(x[:, :4], expected, atol=1e-7)
+    signals = finger.evaluate(x, np.zeros((50, 3)))
+    stored = energies(finger, signals, finger.rigid_body.kinematics(x[:, :2], x[:, 2:4]))
+    assert np.ptp(stored.kinetic) > 1e-3
+    np.testing.assert_allclose(stored.total, stored.total[0], atol=1e-8 * np.ptp(stored.kinetic))
+
+
+@pytest.fixture(scope="module")
+def loop():
+    """The finger of fig6, pushed at its tip and driven a little into its lower limits."""
+    settings = {
+        "environment.fingertip_force": [0.2, 0.3, -0.3],
+        "reference.joints.medial.offset": 0.42,
+        "reference.joints.proximal.offset": 0.42,
+    }
+    return ClosedLoop.from_scenario(fp.load_scenario("fig6", settings))
+
+
+def test_the_account_of_the_loop_to_be_tampered_with_closes(loop):
+    assert share_left_open(loop) < 1e-5
+
+
+def wrong_delivery(monkeypatch):
+    monkeypatch.setattr(tendon_block, "delivered_tension", lambda f, loss: np.maximum(0.0, f + loss))
+
+
+def wrong_passive_friction(monkeypatch):
+    monkeypatch.setattr(tendon_block, "passive_acceleration", lambda near, far, loss, mass: (near - far + loss) / mass)
+
+
+def wrong_passive_spring(monkeypatch):
+    monkeypatch.setattr(tendon_block, "passive_acceleration", lambda near, far, loss, mass: (far - near - loss) / mass)
+
+
+def wrong_joint_friction(monkeypatch):
+    original = joint_block.JointFriction.forces
+
+    def flipped(*arguments):
+        forces = original(*arguments)
+        return replace(forces, friction=-forces.friction)
+
+    monkeypatch.setattr(joint_block.JointFriction, "forces", flipped)
+
+
+def wrong_stiction_rate(monkeypatch):
+    def halved(stiction, velocity, level, stiffness):
+        return stiffness * (velocity - 0.5 * stiction * np.abs(velocity) / level)
+
+    monkeypatch.setattr(tendon_block.friction, "stiction_rate", halved)
+
+
+def wrong_gravity(monkeypatch):
+    def flipped(*arguments):
+        found = energies(*arguments)
+        return replace(found, gravity=-found.gravity)
+
+    monkeypatch.setattr(account_module, "energies", flipped)
+
+
+def wrong_external_torque(monkeypatch):
+    original = RigidBody.forward_dynamics
+    lever = np.array([1e-3, 0.0, 0.0, 0.0])
+    monkeypatch.setattr(RigidBody, "forward_dynamics", lambda self, q, v, torque: original(self, q, v, torque + lever))
+
+
+def wrong_command(monkeypatch):
+    monkeypatch.setattr(controller_block, "proportional_torque", lambda gain, reference, q: gain * (q - reference))
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [
+        wrong_delivery,
+        wrong_passive_friction,
+        wrong_passive_spring,
+        wrong_joint_friction,
+        wrong_stiction_rate,
+        wrong_gravity,
+        wrong_external_torque,
+    ],
+)
+def test_the_account_exposes_a_wrong_law(plant, loop, monkeypatch):
+    plant(monkeypatch)
+    assert share_left_open(loop) > 1e-3
+
+
+def test_the_account_does_not_judge_the_controller(loop, monkeypatch):
+    """Whatever the actuators are told, the books balance: the account is about the finger."""
+    wrong_command(monkeypatch)
+    assert share_left_open(loop) < 1e-5

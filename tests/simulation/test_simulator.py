@@ -1,0 +1,142 @@
+"""The step interface: held tensions, state in and out, determinism, errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+import finger_pin as fp
+from finger_pin.simulation.simulator import Simulator
+
+TENSION = np.array([1.2, 1.0, 4.4, 3.1])
+START = np.array([0.05, 0.4, 0.5, 0.35])
+
+
+@pytest.fixture(scope="module")
+def finger() -> fp.Finger:
+    return fp.Finger(fp.load_finger("ub"))
+
+
+def walk(simulator: Simulator, steps: int, seed: int = 0) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    return np.array([simulator.step(TENSION * random.uniform(0.5, 1.5, 4), 1e-3).position for _ in range(steps)])
+
+
+def test_a_step_follows_the_numpy_dynamics_integrated_by_another_method(finger: fp.Finger) -> None:
+    simulator = Simulator(finger, START, rtol=1e-8, atol_scale=1e-8)
+    for _ in range(3):
+        simulator.step(TENSION, 5e-3)
+    expected = scipy.integrate.solve_ivp(
+        finger.rhs, (0.0, 0.015), finger.rest_state(START), "Radau", rtol=1e-9, atol=1e-12, args=(TENSION,)
+    ).y[:, -1]
+    assert simulator.time == pytest.approx(0.015, abs=1e-15)
+    np.testing.assert_allclose(simulator.x / finger.layout.scales(), expected / finger.layout.scales(), atol=2e-7)
+
+
+def test_a_fingertip_force_acts_during_its_step_only(finger: fp.Finger) -> None:
+    force = np.array([0.2, -0.1, 0.3])
+    simulator = Simulator(finger, START, rtol=1e-8, atol_scale=1e-8)
+    simulator.step(TENSION, 4e-3, force)
+    simulator.step(TENSION, 4e-3)
+    x = finger.rest_state(START)
+    for pushed in (force, None):
+        x = scipy.integrate.solve_ivp(
+            finger.rhs, (0.0, 4e-3), x, "Radau", rtol=1e-9, atol=1e-12, args=(TENSION, pushed)
+        ).y[:, -1]
+    np.testing.assert_allclose(simulator.x / finger.layout.scales(), x / finger.layout.scales(), atol=2e-7)
+
+
+def test_the_same_steps_give_the_same_bits(finger: fp.Finger) -> None:
+    np.testing.assert_array_equal(walk(Simulator(finger, START), 30), walk(Simulator(finger, START), 30))
+
+
+def test_a_copy_goes_on_bit_by_bit_and_leaves_the_original_alone(finger: fp.Finger) -> None:
+    simulator = Simulator(finger, START)
+    walk(simulator, 10)
+    twin, before = simulator.copy(), simulator.x
+    ahead = walk(twin, 10, seed=1)
+    np.testing.assert_array_equal(simulator.x, before)
+    np.testing.assert_array_equal(walk(simulator, 10, seed=1), ahead)
+
+
+def test_a_state_put_back_is_where_the_motion_goes_on_from(finger: fp.Finger) -> None:
+    simulator = Simulator(finger, START, rtol=1e-7, atol_scale=1e-7)
+    walk(simulator, 10)
+    kept = simulator.x
+    ahead = walk(simulator, 10, seed=2)
+    simulator.x = kept
+    np.testing.assert_allclose(walk(simulator, 10, seed=2), ahead, atol=1e-7)
+
+
+def test_changing_what_is_returned_changes_nothing_inside(finger: fp.Finger) -> None:
+    simulator = Simulator(finger, START)
+    state = simulator.step(TENSION, 1e-3)
+    before = simulator.x
+    state.position[:] = 99.0
+    simulator.x[:] = 99.0
+    np.testing.assert_array_equal(simulator.x, before)
+
+
+def test_signals_are_those_of_the_finger_at_the_present_state(finger: fp.Finger) -> None:
+    simulator = Simulator(finger, START)
+    force = np.array([0.0, 0.1, 0.2])
+    simulator.step(TENSION, 2e-3, force)
+    expected = finger.evaluate(simulator.x, TENSION, force)
+    found = simulator.signals()
+    np.testing.assert_allclose(found.joints.reaction, expected.joints.reaction, rtol=1e-12)
+    np.testing.assert_allclose(found.tendons.strands, expected.tendons.strands, rtol=1e-12)
+    np.testing.assert_allclose(found.acceleration, expected.acceleration, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "entry"),
+    [
+        (([1.0, 1.0, 1.0], 1e-3), "tension"),
+        ((["a", 1.0, 1.0, 1.0], 1e-3), "tension"),
+        (([1.0, np.nan, 1.0, 1.0], 1e-3), "tension"),
+        (([1.0, np.inf, 1.0, -np.inf], 1e-3), "tension"),
+        ((TENSION, 0.0), "dt"),
+        ((TENSION, -1.0), "dt"),
+        ((TENSION, np.inf), "dt"),
+        ((TENSION, np.nan), "dt"),
+        ((TENSION, 1e-3, [1.0, 2.0]), "fingertip_force"),
+        ((TENSION, 1e-3, [1.0, 2.0, np.nan]), "fingertip_force"),
+    ],
+)
+def test_a_wrong_step_is_named_and_moves_nothing(finger: fp.Finger, arguments: tuple, entry: str) -> None:
+    simulator = Simulator(finger, START)
+    before = simulator.x
+    with pytest.raises(fp.InputError) as caught:
+        simulator.step(*arguments)
+    assert caught.value.entry == entry
+    np.testing.assert_array_equal(simulator.x, before)
+    assert simulator.time == 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "entry"),
+    [
+        ({"method": "Rodas5"}, "method"),
+        ({"rtol": 0.0}, "rtol"),
+        ({"atol_scale": 1.0}, "atol_scale"),
+        ({"position": [0.0]}, "position"),
+        ({"position": [0.0, np.nan, 0.0, 0.0]}, "position"),
+    ],
+)
+def test_a_wrong_option_is_named(finger: fp.Finger, options: dict, entry: str) -> None:
+    with pytest.raises(fp.InputError) as caught:
+        Simulator(finger, **options)
+    assert caught.value.entry == entry
+
+
+def test_where_the_integrator_cannot_go_on_it_names_time_and_state(finger: fp.Finger) -> None:
+    simulator = Simulator(finger, START)
+    simulator.step(TENSION, 1e-3)
+    broken = simulator.x
+    broken[5] = 1e200
+    simulator.x = broken
+    with pytest.raises(fp.IntegrationError) as caught:
+        simulator.step(TENSION, 1e-3)
+    assert caught.value.time == pytest.approx(1e-3)
+    assert any(name in caught.value.reason for name in finger.layout.names)

@@ -1,0 +1,75 @@
+"""Many runs in processes: the same results as one by one, stacked, with failures kept apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.exceptions import IntegrationError
+from finger_pin.studies import many
+
+SHORT = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
+
+
+def scenarios(*gains: float) -> list[fp.Scenario]:
+    return [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in gains]
+
+
+def test_runs_in_processes_are_bit_by_bit_the_runs_one_by_one() -> None:
+    runs = scenarios(0.8, 0.9, 1.0, 1.1)
+    seen: list[tuple[int, int]] = []
+    stacked = fp.simulate_many(runs, workers=2, progress=lambda done, total: seen.append((done, total)))
+    assert stacked.sizes["run"] == 4
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    for index, run in enumerate(runs):
+        alone = fp.simulate(run)
+        assert set(alone.data_vars) <= set(stacked.data_vars)
+        for name in alone.data_vars:
+            np.testing.assert_array_equal(stacked[name].values[index], alone[name].values, err_msg=str(name))
+        assert stacked.scenario.values[index] == fp.to_toml(run)
+    assert set(stacked.failure.values) == {""}
+
+
+def test_only_the_chosen_variables_are_kept() -> None:
+    stacked = fp.simulate_many(scenarios(1.0, 1.2), workers=1, variables=["tracking_error"])
+    assert "tracking_error" in stacked
+    assert "joint_position" not in stacked
+
+
+def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = scenarios(1.0, 2.0)
+    real = many.simulate
+
+    def failing(scenario: fp.Scenario) -> object:
+        result = real(scenario)
+        if scenario.controller.gain == 2.0:
+            raise IntegrationError(0.02, "planted", "nothing", result.isel(time=slice(0, 5)))
+        return result
+
+    monkeypatch.setattr(many, "simulate", failing)
+    stacked = fp.simulate_many(runs, workers=1)
+    assert "planted" in str(stacked.failure.values[1])
+    assert np.isfinite(stacked.joint_position.values[0]).all()
+    assert np.isfinite(stacked.joint_position.values[1, :5]).all()
+    assert np.isnan(stacked.joint_position.values[1, 5:]).all()
+
+
+@pytest.mark.parametrize(
+    ("runs", "options", "entry"),
+    [
+        ([], {}, "scenarios"),
+        (scenarios(1.0), {"workers": 0}, "workers"),
+        (scenarios(1.0), {"variables": ["joint_positon"], "workers": 1}, "variables"),
+        ([*scenarios(1.0), fp.load_scenario("fig6")], {}, "scenarios[1].simulation.duration"),
+        (
+            [*scenarios(1.0), fp.load_scenario("stick_slip", {**SHORT, "simulation.sample_rate": 100.0})],
+            {},
+            "scenarios[1].simulation.sample_rate",
+        ),
+    ],
+)
+def test_what_cannot_be_stacked_is_named(runs: list[fp.Scenario], options: dict, entry: str) -> None:
+    with pytest.raises(fp.InputError) as caught:
+        fp.simulate_many(runs, **options)
+    assert caught.value.entry == entry

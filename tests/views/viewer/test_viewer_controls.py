@@ -1,0 +1,98 @@
+"""Play, pause, scrub, speed, and a simulation watched while it runs."""
+
+import time
+
+import numpy as np
+import pytest
+from motion import DURATION, fingertip, joint_position, tensions
+from pages import console_errors, seek, until
+
+import finger_pin as fp
+from finger_pin.views.viewer import LiveView
+
+
+@pytest.mark.parametrize("speed", ["0.25", "1", "4"])
+def test_playing_advances_time_at_the_chosen_speed(page, speed):
+    seek(page, 0.2)
+    page.find_element("css selector", f"#speed option[value='{speed}']").click()
+    # A tenth of a second later, as the browser's clock would say.
+    script = "fingerPlayer.play(); fingerPlayer.shown = 1e9; fingerPlayer.due = 0; fingerPlayer.advance(1e9 + 100);"
+    shown = page.execute_script(script + "fingerPlayer.pause(); return fingerPlayer.time")
+    page.find_element("css selector", "#speed option[value='1']").click()
+    assert shown == pytest.approx(0.2 + 0.1 * float(speed), abs=1e-9)
+
+
+def test_pause_holds_the_time(page):
+    page.execute_script("fingerPlayer.seek(1.0)")
+    play = page.find_element("id", "play")
+    play.click()
+    until(lambda: play.get_attribute("aria-label") == "Pause")
+    until(lambda: page.execute_script("return fingerPlayer.time > 1.2"))
+    play.click()
+    until(lambda: play.get_attribute("aria-label") == "Play")
+    held = page.execute_script("return fingerPlayer.time")
+    time.sleep(0.2)
+    assert page.execute_script("return fingerPlayer.time") == held
+
+
+def test_scrubbing_moves_the_finger_to_that_time(page):
+    page.execute_script("""
+    const scrub = document.getElementById("scrub"); fingerPlayer.seek(0); fingerPlayer.play();
+    scrub.value = 2.75; scrub.dispatchEvent(new Event("input"));""")
+    assert page.execute_script("return [fingerPlayer.playing, fingerPlayer.time]") == [False, pytest.approx(2.75)]
+    angles = [cell.text for cell in page.find_elements("css selector", "#joints .value")]
+    assert angles == [f"{degrees:.1f}°" for degrees in np.degrees(joint_position(2.75))]
+
+
+def test_playing_stops_at_the_end_unless_it_loops(page):
+    page.execute_script("fingerPlayer.seek(3.9); fingerPlayer.play();")
+    until(lambda: not page.execute_script("return fingerPlayer.playing"))
+    assert page.execute_script("return fingerPlayer.time") == pytest.approx(DURATION)
+    page.execute_script("document.getElementById('loop').click(); fingerPlayer.seek(3.9); fingerPlayer.play();")
+    until(lambda: page.execute_script("return fingerPlayer.time < 3.5"))
+    assert page.execute_script("document.getElementById('loop').click(); return fingerPlayer.playing")
+
+
+def test_keys_play_step_and_choose_the_view(page):
+    body = page.find_element("tag name", "body")
+    seek(page, 1.0)
+    body.send_keys("\ue014")  # right arrow
+    until(lambda: page.execute_script("return fingerPlayer.time") == pytest.approx(1.05))
+    body.send_keys(" ")
+    until(lambda: page.execute_script("return fingerPlayer.playing"))
+    body.send_keys(" ")
+    until(lambda: not page.execute_script("return fingerPlayer.playing"))
+    page.execute_script("fingerPlayer.scene.frame('side')")
+    before = page.execute_script("return fingerPlayer.viewer.camera.position.toArray()")
+    body.send_keys("3")
+    until(lambda: page.execute_script("return fingerPlayer.viewer.camera.position.toArray()") != before)
+
+
+def test_a_running_simulation_is_shown_live_and_can_be_replayed_afterwards(browser):
+    with LiveView(fp.load_finger("ub"), open_browser=False, rate=200.0) as live:
+        browser.get("about:blank")
+        browser.get_log("browser")
+        browser.get(live.url)
+        for t in np.linspace(0.0, 1.0, 21):
+            live.update(t, joint_position(t), 3.0 * tensions(t))
+            time.sleep(0.03)
+        time.sleep(0.5)
+        state = browser.execute_script("return [fingerPlayer.following, fingerPlayer.time, fingerPlayer.scale]")
+        # The legend grows with the tensions: 27 N need a scale to 40 N.
+        assert state == [True, pytest.approx(1.0), 40]
+        browser.execute_script("fingerPlayer.pause(); fingerPlayer.seek(0.3)")
+        live.update(1.1, joint_position(1.1), tensions(1.1))
+        time.sleep(0.3)
+        assert browser.execute_script("return [fingerPlayer.following, fingerPlayer.time]") == [
+            False,
+            pytest.approx(0.3),
+        ]
+    time.sleep(0.3)
+    seek(browser, 1.1)
+    tip = browser.execute_script(
+        "fingerPlayer.viewer.scene.updateMatrixWorld(true);"
+        "return fingerPlayer.scene.links.at(-1).localToWorld(new MeshCat.THREE.Vector3(0.0218, 0, 0)).toArray()"
+    )
+    x, y, z = fingertip(joint_position(1.1))
+    assert tip == pytest.approx([x, z, -y], abs=1e-6)
+    assert console_errors(browser) == []

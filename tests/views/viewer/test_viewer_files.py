@@ -1,0 +1,53 @@
+"""What the viewer writes, and what it refuses."""
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.views.viewer import write_animation
+
+
+def test_eight_seconds_make_a_file_of_a_few_megabytes(result, tmp_path):
+    longer = result.isel(time=np.arange(8001) % len(result.time)).assign_coords(time=np.arange(8001) * 1e-3)
+    assert write_animation(longer, tmp_path / "animation.html").stat().st_size < 4e6
+
+
+def test_the_file_names_no_address_to_load_from(result, tmp_path):
+    text = write_animation(result, tmp_path / "animation.html").read_text(encoding="utf-8")
+    assert not re.search(r"""<(script|link|img|iframe)[^>]*(src|href)=["']?(?!["']?data:)""", text)
+    # The names of XML name spaces are addresses that nobody visits.
+    assert set(re.findall(r"https?://[\w.]+", text)) <= {"http://www.w3.org"}
+
+
+def test_a_result_without_joint_positions_is_refused_and_an_earlier_file_stays(result, tmp_path):
+    target = write_animation(result, tmp_path / "animation.html")
+    earlier = target.read_bytes()
+    with pytest.raises(fp.InputError, match="joint_position"):
+        write_animation(result.drop_vars("joint_position"), target)
+    assert target.read_bytes() == earlier
+    assert [path.name for path in tmp_path.iterdir()] == ["animation.html"]
+
+
+@pytest.mark.parametrize("scenario", [None, "no = [toml", "finger = 'ub'"])
+def test_a_result_without_its_finger_is_refused(result, tmp_path, scenario):
+    broken = result.copy()
+    broken.attrs = {} if scenario is None else {"scenario": scenario}
+    with pytest.raises(fp.InputError, match="scenario"):
+        write_animation(broken, tmp_path / "animation.html")
+
+
+def test_a_tension_that_is_not_a_number_is_refused(result, tmp_path):
+    broken = result.copy(deep=True)
+    broken["tendon_tension"][:, 2] = np.nan
+    with pytest.raises(fp.InputError, match="tendon_tension"):
+        write_animation(broken, tmp_path / "animation.html")
+
+
+def test_importing_the_viewer_loads_neither_meshcat_nor_ipython():
+    code = "import sys, finger_pin.views.viewer; print({'meshcat', 'IPython', 'zmq', 'tornado'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
