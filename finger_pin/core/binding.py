@@ -19,6 +19,8 @@ from finger_pin.description.routing import Array
 Vector = Annotated[Array, types.Array(types.float64, 1, "C")]
 Matrix = Annotated[Array, types.Array(types.float64, 2, "C")]
 Layers = Annotated[Array, types.Array(types.float64, 3, "C")]
+Block = Annotated[NDArray[np.uint8], types.Array(types.uint8, 1, "C")]
+IndexTable = Annotated[NDArray[np.int64], types.Array(types.int64, 2, "C")]
 Indices = Annotated[NDArray[np.int64], types.Array(types.int64, 1, "C")]
 
 # Typed as what it makes of a function: one that compiled code calls without the typing context.

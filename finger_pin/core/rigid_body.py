@@ -25,9 +25,9 @@ MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
 
 
 @compiled
-def _place(plant: Any, i: int, angle: float, work: Any) -> None:
+def _place(tables: Any, i: int, angle: float, work: Any) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
-    body, parent, rotation = plant.bodies[i], plant.parents[i], work.rotation[i]
+    body, parent, rotation = tables.bodies[i], tables.parents[i], work.rotation[i]
     frame = work.frame
     if parent < 0:
         for r in range(3):
@@ -49,7 +49,7 @@ def _place(plant: Any, i: int, angle: float, work: Any) -> None:
                 + above[r, 1] * body[TRANSLATION + 1]
                 + above[r, 2] * body[TRANSLATION + 2]
             )
-    prismatic = plant.kinds[i] == PRISMATIC
+    prismatic = tables.kinds[i] == PRISMATIC
     cosine, sine = (1.0, 0.0) if prismatic else (np.cos(angle), np.sin(angle))
     for r in range(3):
         rotation[r, 0] = cosine * frame[r, 0] + sine * frame[r, 1]
@@ -60,9 +60,9 @@ def _place(plant: Any, i: int, angle: float, work: Any) -> None:
 
 
 @compiled
-def _inertia_about_origin(plant: Any, i: int, work: Any) -> None:
+def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
     """Express the inertia of body i about O in base axes."""
-    body, rotation, out = plant.bodies[i], work.rotation[i], work.inertia[i]
+    body, rotation, out = tables.bodies[i], work.rotation[i], work.inertia[i]
     mass = body[MASS]
     ixx, ixy, ixz = body[INERTIA], body[INERTIA + 1], body[INERTIA + 2]
     iyy, iyz, izz = body[INERTIA + 3], body[INERTIA + 4], body[INERTIA + 5]
@@ -88,15 +88,15 @@ def _inertia_about_origin(plant: Any, i: int, work: Any) -> None:
 
 
 @compiled
-def move(plant: Any, position: Any, velocity: Any, work: Any) -> None:
+def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
     """Fill axes, velocities and composite inertias of all bodies."""
-    for i in range(plant.parents.size):
-        parent = plant.parents[i]
-        _place(plant, i, position[i], work)
-        _inertia_about_origin(plant, i, work)
+    for i in range(tables.parents.size):
+        parent = tables.parents[i]
+        _place(tables, i, position[i], work)
+        _inertia_about_origin(tables, i, work)
         axis, rotation, origin = work.spatial[AXIS, i], work.rotation[i], work.origin[i]
         x, y, z = rotation[0, 2], rotation[1, 2], rotation[2, 2]
-        if plant.kinds[i] == PRISMATIC:
+        if tables.kinds[i] == PRISMATIC:
             axis[0], axis[1], axis[2], axis[3], axis[4], axis[5] = 0.0, 0.0, 0.0, x, y, z
         else:
             axis[0], axis[1], axis[2] = x, y, z
@@ -113,37 +113,41 @@ def move(plant: Any, position: Any, velocity: Any, work: Any) -> None:
                 work.spatial[MOTION, i, k] = work.spatial[MOTION, parent, k] + axis[k] * velocity[i]
         for k in range(10):
             work.composite[i, k] = work.inertia[i, k]
-    for i in range(plant.parents.size - 1, -1, -1):
-        if plant.parents[i] >= 0:
+    for i in range(tables.parents.size - 1, -1, -1):
+        if tables.parents[i] >= 0:
             for k in range(10):
-                work.composite[plant.parents[i], k] += work.composite[i, k]
+                work.composite[tables.parents[i], k] += work.composite[i, k]
 
 
 @compiled
-def inverse_dynamics(plant: Any, velocity: Any, acceleration: Any, work: Any, torque: Any) -> None:
-    """Fill torque = M a + C v + G after `move`, and the accelerations and composite forces of the bodies."""
-    size = plant.parents.size
+def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, torque: Any, moving: bool) -> None:
+    """Fill torque = M a + C v + G after `move`, and the accelerations and composite forces of the bodies.
+
+    Without ``moving`` the acceleration is taken as zero: the bias forces.
+    """
+    size = tables.parents.size
     for i in range(size):
-        parent = plant.parents[i]
+        parent = tables.parents[i]
+        own = acceleration[i] if moving else 0.0
         for k in range(6):
             above = work.base_acceleration[k] if parent < 0 else work.spatial[SPATIAL_ACCELERATION, parent, k]
             work.spatial[SPATIAL_ACCELERATION, i, k] = (
-                above + work.spatial[AXIS, i, k] * acceleration[i] + work.spatial[AXIS_RATE, i, k] * velocity[i]
+                above + work.spatial[AXIS, i, k] * own + work.spatial[AXIS_RATE, i, k] * velocity[i]
             )
         apply_inertia(work.inertia[i], work.spatial[SPATIAL_ACCELERATION, i], work.spatial[FORCE, i])
         apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
         add_force_cross(work.spatial[MOTION, i], work.vectors[0], work.spatial[FORCE, i])
     for i in range(size - 1, -1, -1):
         torque[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
-        if plant.parents[i] >= 0:
+        if tables.parents[i] >= 0:
             for k in range(6):
-                work.spatial[FORCE, plant.parents[i], k] += work.spatial[FORCE, i, k]
+                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
 
 
 @compiled
-def mass_matrix(plant: Any, work: Any) -> None:
+def mass_matrix(tables: Any, work: Any) -> None:
     """Fill work.square[MASS_MATRIX] = M after `move`."""
-    size = plant.parents.size
+    size = tables.parents.size
     for i in range(size):
         momentum = work.spatial[MOMENTUM, i]
         apply_inertia(work.composite[i], work.spatial[AXIS, i], momentum)
@@ -155,7 +159,7 @@ def mass_matrix(plant: Any, work: Any) -> None:
             value = dot(work.spatial[AXIS, j], momentum)
             work.square[MASS_MATRIX, i, j] = value
             work.square[MASS_MATRIX, j, i] = value
-            j = plant.parents[j]
+            j = tables.parents[j]
 
 
 @compiled

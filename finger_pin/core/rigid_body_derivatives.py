@@ -59,12 +59,12 @@ def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
 
 
 @compiled
-def inverse_dynamics_derivatives(plant: Any, velocity: Any, work: Any) -> None:
+def inverse_dynamics_derivatives(tables: Any, velocity: Any, work: Any) -> None:
     """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`."""
-    size = plant.parents.size
+    size = tables.parents.size
     by_position, by_velocity = work.square[BY_POSITION], work.square[BY_VELOCITY]
     for i in range(size):
-        parent = plant.parents[i]
+        parent = tables.parents[i]
         _coriolis_block(work.inertia[i], work.spatial[MOTION, i], work.coriolis[i])
         # axis_curve = a_parent x S + v_parent x (v_parent x S)
         if parent < 0:
@@ -113,8 +113,8 @@ def inverse_dynamics_derivatives(plant: Any, velocity: Any, work: Any) -> None:
             if j != i:
                 by_position[j, i] = dot(above, by_q)
                 by_velocity[j, i] = dot(above, by_v)
-            j = plant.parents[j]
-        parent = plant.parents[i]
+            j = tables.parents[j]
+        parent = tables.parents[i]
         if parent >= 0:
             for k in range(12):
                 work.coriolis[parent, k] += block[k]

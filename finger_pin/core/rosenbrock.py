@@ -6,13 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Matrix, Vector, get, kind_of, put
-from finger_pin.core.compilation import compiled, compiled_apart, entry
-from finger_pin.core.dynamics import evaluate
-from finger_pin.core.elimination import factorise, solve
-from finger_pin.core.linearisation import Linear, linearise
-from finger_pin.core.plant import Control, Plant, Work
-from finger_pin.core.rigid_body import MASS_MATRIX
+from finger_pin.core.binding import Block, Matrix, Vector, get, kind_of, put
+from finger_pin.core.charts import rechart
+from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.condensation import solve
+from finger_pin.core.inputs import HELD
+from finger_pin.core.model import MODEL, condense, evaluate, linearise
 from finger_pin.core.tableaus import Tableau
 
 # Entries of the memory that outlives a call.
@@ -30,58 +29,46 @@ class Integration(NamedTuple):
     """All that an integration works on, from its start to its end.
 
     Attributes:
-        plant: The finger.
-        control: The controller.
+        model: Block of the bound `Model`.
         tableau: The method.
-        x: State, changed in place, shape (size,).
+        x: State, changed in place, shape (size,); the angles of free bodies are those since the last step.
+        attitude: Unit quaternions of the free bodies, changed in place, shape (f, 4).
         rtol: Relative tolerance.
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters; kept between calls.
-        work: Scratch of the dynamics.
-        linear: Scratch of the linearisation.
         k: Scratch for the stages, shape (s, size).
-        scratch: Scratch, shape (4 + n, size).
+        scratch: Scratch, shape (3, size).
+        r: Scratch, shape (size + 1,).
     """
 
-    plant: Plant
-    control: Control
+    model: Block
     tableau: Tableau
     x: Vector
+    attitude: Matrix
     rtol: float
     atol: Vector
     memory: Vector
-    work: Work
-    linear: Linear
     k: Matrix
     scratch: Matrix
+    r: Vector
 
 
 INTEGRATION = kind_of(Integration)
 
 
-@compiled_apart
+@compiled
 def _step(
-    plant: Any,
-    control: Any,
-    tableau: Any,
-    time: float,
-    h: float,
-    fresh: bool,
-    x: Any,
-    work: Any,
-    linear: Any,
-    k: Any,
-    scratch: Any,
+    block: Any, linear: Any, tableau: Any, time: float, h: float, fresh: bool, x: Any, k: Any, scratch: Any, r: Any
 ) -> int:
     """Try one step: fill the increments k and, in scratch[1], the state at its end.
 
-    What depends on the start alone, f(t, x) in scratch[0] and M in scratch[4:], is kept for a second try.
+    What depends on the start alone, f(t, x) in scratch[0] and the linearisation, is kept for a second try.
 
     Returns:
         0 if tried, 1 if g - J is singular, 2 if f(t, x) is not finite.
     """
-    size, joints = x.size, plant.parents.size
-    state, rate, r = scratch[1], scratch[2], scratch[3]
+    size = x.size
+    state, rate = scratch[1], scratch[2]
     g = 1.0 / (h * tableau.gamma)
     for i in range(tableau.nodes.size):
         for c in range(size):
@@ -93,31 +80,20 @@ def _step(
                 state[c] += of_stage * k[j, c]
                 r[c] += of_coupling * k[j, c]
         if i > 0 or fresh:
-            evaluate(plant, control, time + tableau.nodes[i] * h, state, work, rate)
+            evaluate(block, time + tableau.nodes[i] * h, state, rate)
         if i == 0:
             if fresh:
                 for c in range(size):
                     scratch[0, c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return 2
-                linearise(plant, control, time, x, work, linear)
-                for a in range(joints):
-                    for b in range(joints):
-                        scratch[4 + a, b] = work.square[MASS_MATRIX, a, b]
-            if not factorise(plant, g, scratch[4:], linear):
+                linearise(block, time, x)
+            if not condense(block, g):
                 return 1
         for c in range(size):
-            rate[c] += r[c]
-            r[c] = rate[c]
-        for a in range(joints):
-            value = 0.0
-            for b in range(joints):
-                value += scratch[4 + a, b] * rate[joints + b]
-            r[joints + a] = value
-        of_time = h * tableau.time[i]
-        for c in range(size):
-            r[c] += of_time * linear.time_derivative[c]
-        solve(plant, g, r, linear, k[i])
+            r[c] += rate[c]
+        r[size] = h * tableau.time[i]
+        solve(linear, r, k[i])
     for c in range(size):
         state[c] += k[tableau.nodes.size - 1, c]
     return 0
@@ -161,26 +137,28 @@ def bind(integration: Any, block: Any) -> None:
 
 
 @entry
-def advance(block: Any, end: float, times: Any, states: Any, dense: Any) -> Any:
+def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, dense: Any) -> Any:
     """Take steps until the end, or until the record is full; return a status and the number of steps recorded.
 
     Args:
         block: Filled by `bind`.
         end: Time to reach, s.
         times: Record of the times at which steps end, shape (m,); of length zero to record nothing.
-        states: Record of the states there, shape (m, size).
+        states: Record of the states there, with the angles of free bodies since the step's start, shape (m, size).
+        attitudes: Record of the free bodies' quaternions there, shape (m, f, 4).
         dense: Record of the interpolants of the steps, shape (m, rows of the tableau's dense, size).
     """
     integration = get(block, INTEGRATION)
-    plant, control, tableau = integration.plant, integration.control, integration.tableau
+    model = get(integration.model, MODEL)
+    tables, control, linear, tableau = model.tables, model.control, model.linear, integration.tableau
     x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
-    work, linear, k, scratch = integration.work, integration.linear, integration.k, integration.scratch
+    k, scratch, r = integration.k, integration.scratch, integration.r
     size, count = x.size, tableau.nodes.size
     recorded = 0
     exponent = 1.0 / tableau.order
     fresh = True
     # Right after a full record nothing has jumped.
-    jumped = control.held and memory[HELD_STEP] >= 0.0
+    jumped = control.kind == HELD and memory[HELD_STEP] >= 0.0
     memory[HELD_STEP] = abs(memory[HELD_STEP])
     if jumped and memory[HELD_STEP] > 0.0:
         # Held tensions have just jumped: what sufficed after the last jump is the best guess.
@@ -203,7 +181,7 @@ def advance(block: Any, end: float, times: Any, states: Any, dense: Any) -> Any:
         if last:
             h = end - time
         error = np.inf
-        outcome = _step(plant, control, tableau, time, h, fresh, x, work, linear, k, scratch)
+        outcome = _step(integration.model, linear, tableau, time, h, fresh, x, k, scratch, r)
         if outcome == 2:
             for c in range(size - 1, -1, -1):
                 if not np.isfinite(scratch[0, c]):
@@ -253,6 +231,11 @@ def advance(block: Any, end: float, times: Any, states: Any, dense: Any) -> Any:
                 times[recorded] = memory[TIME]
                 for c in range(size):
                     states[recorded, c] = x[c]
+            rechart(tables, x, integration.attitude)
+            if recorded < times.size:
+                for f in range(attitudes.shape[1]):
+                    for c in range(4):
+                        attitudes[recorded, f, c] = integration.attitude[f, c]
                 recorded += 1
             fresh = True
         else:

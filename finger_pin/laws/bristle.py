@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.laws.law import Law, Row
+
 
 def friction_coefficient(velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0) -> Any:
     """Return M(v) = M^d + (M^c - M^d) exp(-(|v| / omega)^p), equation (9b), where p = 1.
@@ -104,3 +106,57 @@ def micro_loss(rate: Any, velocity: Any, lag: Any) -> Any:
 def steady_force(velocity: Any, normal: Any, coefficient: Any, viscous: Any) -> Any:
     """Return the friction of steady sliding, F^n M(v) sign(v) + b v: (9) with F^s' = 0, the curves of Fig. 3."""
     return normal * coefficient * np.sign(velocity) + viscous * velocity
+
+
+def _value(row: Row, p: Any) -> Any:
+    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
+    coefficient = friction_coefficient(row.speed, kinetic, static, stribeck, exponent)
+    level = friction_level(row.load, coefficient, floor)
+    rate = stiction_rate(row.state, row.speed, level, stiffness)
+    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    return -loss, rate, loss, row.load, coefficient, level
+
+
+def _slopes(row: Row, p: Any, signals: Any) -> Any:
+    kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
+    _, _, coefficient, level = signals
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness)
+    by_level = by_level * (level > floor)
+    by_speed = by_speed + by_level * row.load * friction_coefficient_slope(
+        row.speed, kinetic, static, stribeck, exponent
+    )
+    return (0.0, -viscous, -1.0, -lag, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
+
+
+def bristle_account(speed: Any, stiction: Any, rate: Any, level: Any, stiffness: Any, viscous: Any, lag: Any) -> Any:
+    """Return what the bristles store, and what is lost by sliding, in viscous friction and in micro-damping."""
+    return (
+        bristle_energy(stiction, stiffness),
+        coulomb_loss(stiction, speed, level),
+        viscous_loss(speed, viscous),
+        micro_loss(rate, speed, lag),
+    )
+
+
+def _account(
+    row: Row,
+    p: Any,
+    force: Any,
+    rate: Any,
+    signals: Any,
+) -> Any:
+    _, _, stiffness, viscous, _, _, _, lag = p
+    return bristle_account(row.speed, row.state, rate, signals[3], stiffness, viscous, lag)
+
+
+#: Friction between two parts that a load presses together, such as the pin of a joint (17).
+PIN_FRICTION = Law(
+    name="pin friction (9)",
+    parameters=("kinetic", "static", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "lag"),
+    value=_value,
+    slopes=_slopes,
+    account=_account,
+    signals=("friction", "normal_force", "coefficient", "level"),
+    losses=("coulomb", "viscous", "micro_damping"),
+    scale=1e-2,
+)

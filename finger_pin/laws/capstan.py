@@ -1,10 +1,29 @@
-"""Friction of a tendon in its canal: (14), (16) and the delivered tension of (12)."""
+"""Friction of a tendon in its canal: (14), (16) and the delivered tension of (12).
+
+A driven tendon is pulled by its input f^a and delivers what friction leaves of it; the canal presses on it with both
+(14b). A passive one slides as a whole; its two halves press it (14c).
+
+Micro-damping depends on the normal force, which by (14) depends on the delivered tension, which depends on
+micro-damping. Near slack that loop has two solutions where bristles spring back, so it is not closed: the tension in
+(14) is max(0, f^a - F^s - b v), as it is without micro-damping.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+
+from finger_pin.laws.bristle import (
+    bristle_account,
+    friction_coefficient,
+    friction_coefficient_slope,
+    friction_force,
+    friction_level,
+    stiction_rate,
+    stiction_rate_slopes,
+)
+from finger_pin.laws.law import Law, Row
 
 
 def capstan_coefficient(surface: Any, curvature: Any) -> Any:
@@ -27,3 +46,105 @@ def capstan_slope(surface: Any, coefficient: Any) -> Any:
 def delivered_tension(command: Any, loss: Any) -> Any:
     """Return f = max(0, f^a - f^f), N: a tendon cannot push."""
     return np.maximum(0.0, command - loss)
+
+
+def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
+    """Return the derivatives of F^s' by v, F^s, F^n and phi."""
+    surface, ratio, stiffness, _, stribeck, floor, exponent, _ = p
+    own, by_speed, by_level = stiction_rate_slopes(stiction, speed, level, stiffness)
+    by_level = by_level * (level > floor)
+    slope = friction_coefficient_slope(speed, coefficient, ratio * coefficient, stribeck, exponent)
+    # M is proportional to mu^d, which depends on the posture through the curvature.
+    share = sliding / np.maximum(coefficient, 1e-300)
+    by_curvature = by_level * normal * share * capstan_slope(surface, coefficient)
+    return by_speed + by_level * normal * slope, own, by_level * sliding, by_curvature
+
+
+def _driven(row: Row, p: Any) -> Any:
+    surface, ratio, stiffness, viscous, stribeck, floor, exponent, lag = p
+    coefficient = capstan_coefficient(surface, row.curvature)
+    pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
+    normal = np.abs(pressing) + np.abs(row.command)
+    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
+    level = friction_level(normal, sliding, floor)
+    rate = stiction_rate(row.state, row.speed, level, stiffness)
+    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    return delivered_tension(row.command, loss), rate, loss, normal, coefficient, sliding, level, pressing
+
+
+def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
+    viscous, lag = p[3], p[7]
+    loss, normal, coefficient, sliding, level, pressing = signals
+    by_speed, own, by_normal, by_curvature = _rate_slopes(row.speed, row.state, normal, coefficient, sliding, level, p)
+    taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
+    pressed = by_normal * (pressing > 0.0)
+    by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
+    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, taut, 0.0)
+    return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
+
+
+def _driven_account(
+    row: Row,
+    p: Any,
+    force: Any,
+    rate: Any,
+    signals: Any,
+) -> Any:
+    stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
+    # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
+    slack = (row.command - signals[0]) * row.speed * (force <= 0.0)
+    return stored, row.command * row.speed, coulomb, viscous, micro, slack
+
+
+def _passive(row: Row, p: Any) -> Any:
+    surface, ratio, stiffness, viscous, stribeck, floor, exponent, lag = p
+    coefficient = capstan_coefficient(surface, row.curvature)
+    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
+    level = friction_level(row.load, sliding, floor)
+    rate = stiction_rate(row.state, row.speed, level, stiffness)
+    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    return -loss, rate, loss, row.load, coefficient, sliding, level
+
+
+def _passive_slopes(row: Row, p: Any, signals: Any) -> Any:
+    _, normal, coefficient, sliding, level = signals
+    by_speed, own, by_normal, by_curvature = _rate_slopes(row.speed, row.state, normal, coefficient, sliding, level, p)
+    return (0.0, -p[3], -1.0, -p[7], 0.0, 0.0, 0.0), (0.0, by_speed, own, by_normal, 0.0, by_curvature)
+
+
+def _passive_account(
+    row: Row,
+    p: Any,
+    force: Any,
+    rate: Any,
+    signals: Any,
+) -> Any:
+    return bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
+
+
+_PARAMETERS = ("surface", "ratio", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "lag")
+
+#: A tendon that its input pulls through a canal.
+DRIVEN_TENDON = Law(
+    name="driven tendon (12), (14), (16)",
+    parameters=_PARAMETERS,
+    value=_driven,
+    slopes=_driven_slopes,
+    account=_driven_account,
+    signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level", "pressing"),
+    supplies=("actuators",),
+    losses=("coulomb", "viscous", "micro_damping", "slack"),
+    scale=1.0,
+)
+
+#: The friction of a passive tendon, which its halves load.
+PASSIVE_FRICTION = Law(
+    name="passive tendon (14), (16)",
+    parameters=_PARAMETERS,
+    value=_passive,
+    slopes=_passive_slopes,
+    account=_passive_account,
+    signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level"),
+    losses=("coulomb", "viscous", "micro_damping"),
+    scale=1.0,
+)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.laws.law import Law, Row
+
 
 def penetration(position: Any, lower: Any, upper: Any) -> Any:
     """Return how far a joint is beyond its range, positive above the upper limit, negative below the lower one."""
@@ -42,3 +44,38 @@ def limiter_energy(depth: Any, stiffness: Any) -> Any:
 def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
     """Return the power that the contact does not store, (tau^r - k d) theta', W; never negative."""
     return (torque - stiffness * depth) * velocity
+
+
+def _value(row: Row, p: Any) -> Any:
+    lower, upper, stiffness, damping = p
+    depth = penetration(row.length, lower, upper)
+    return -limiter_torque(depth, row.speed, stiffness, damping), 0.0 * row.length, depth
+
+
+def _slopes(row: Row, p: Any, signals: Any) -> Any:
+    _, _, stiffness, damping = p
+    by_length, by_speed = limiter_slopes(signals[0], row.speed, stiffness, damping)
+    return (-by_length, -by_speed, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _account(
+    row: Row,
+    p: Any,
+    force: Any,
+    rate: Any,
+    signals: Any,
+) -> Any:
+    stiffness, depth = p[2], signals[0]
+    return limiter_energy(depth, stiffness), limiter_loss(-force, depth, row.speed, stiffness)
+
+
+#: The limiter of a joint's stroke.
+STROKE_LIMITER = Law(
+    name="stroke limiter (2)",
+    parameters=("lower", "upper", "stiffness", "damping"),
+    value=_value,
+    slopes=_slopes,
+    account=_account,
+    signals=("depth",),
+    losses=("limiter",),
+)

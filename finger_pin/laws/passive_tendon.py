@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.laws.law import Law, Row
+
 
 def half_tension(stretch: Any, stiffness: Any) -> Any:
     """Return max(0, K_h stretch), N: one half of a passive tendon, equations (5) and (12)."""
@@ -17,6 +19,29 @@ def half_energy(stretch: Any, stiffness: Any) -> Any:
     return 0.5 * stiffness * np.maximum(0.0, stretch) ** 2
 
 
-def passive_acceleration(proximal: Any, distal: Any, loss: Any, mass: Any) -> Any:
-    """Return p_5'' = (f5_3 - f5_4 - f5^f) / m_5, m/s2, equation (13)."""
-    return (proximal - distal - loss) / mass
+def _value(row: Row, p: Any) -> Any:
+    (stiffness,) = p
+    return half_tension(-row.length, stiffness), 0.0 * row.length
+
+
+def _slopes(row: Row, p: Any, signals: Any) -> Any:
+    (stiffness,) = p
+    by_length = -stiffness * (row.length < 0.0)
+    return (by_length, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _account(
+    row: Row,
+    p: Any,
+    force: Any,
+    rate: Any,
+    signals: Any,
+) -> Any:
+    (stiffness,) = p
+    return (half_energy(-row.length, stiffness),)
+
+
+#: One half of a passive tendon, a spring that only pulls; it is stretched where its length is negative.
+TENDON_HALF = Law(
+    name="half of a passive tendon (5), (12)", parameters=("stiffness",), value=_value, slopes=_slopes, account=_account
+)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,58 @@ import pinocchio as pin
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.joint_friction import JointForces, JointFriction
+from finger_pin.mechanism.joint_friction import JointFriction
+from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
+from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
-from finger_pin.mechanism.tendons import TendonForces, Tendons
+from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.urdf import build_rigid_body
+
+
+@dataclass(frozen=True, eq=False)
+class TendonForces:
+    """What the tendons do; shapes (..., t) unless said otherwise.
+
+    Attributes:
+        curvature: phi, rad, (15).
+        coefficient: mu^d, (16).
+        velocity: v, m/s; (H_c theta')_i, and p_5' for a passive tendon.
+        friction: f^f, N, (9c).
+        normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
+        level: max(F^n M, g_min), N.
+        stiction_rate: F^s', N/s, (9a).
+        strands: f of (12), shape (..., s), N.
+        passive_acceleration: p_5'', shape (..., p), m/s2, (13).
+    """
+
+    curvature: Array
+    coefficient: Array
+    velocity: Array
+    friction: Array
+    normal: Array
+    level: Array
+    stiction_rate: Array
+    strands: Array
+    passive_acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class JointForces:
+    """What the joints' friction does; shapes (..., n).
+
+    Attributes:
+        reaction: R, N, (17).
+        friction: tau^f, N m, (9c).
+        level: max(R M, g_min), N m.
+        stiction_rate: F^s', N m/s, (9a).
+    """
+
+    reaction: Array
+    friction: Array
+    level: Array
+    stiction_rate: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +81,7 @@ class FingerSignals:
         external_torque: J^T F, shape (..., n), N m, (6).
         acceleration: theta'', shape (..., n), rad/s2, (18).
         rate: Time derivative of the packed state, shape (..., size).
+        rows: What every row of the mechanism does, by table.
     """
 
     state: State
@@ -48,6 +95,7 @@ class FingerSignals:
     external_torque: Array
     acceleration: Array
     rate: Array
+    rows: dict[str, RowSignals]
 
 
 class Finger:
@@ -61,15 +109,19 @@ class Finger:
         joint_friction: The friction of the joints.
         stroke_limiter: The stroke limiters.
         layout: Order and sizes of the packed state.
+        mechanism: All of it as coordinates and rows.
     """
 
-    def __init__(self, description: FingerDescription, rigid_body: RigidBody | None = None) -> None:
+    def __init__(
+        self, description: FingerDescription, rigid_body: RigidBody | None = None, rows: Sequence[Rows] = ()
+    ) -> None:
         """Build a finger.
 
         Args:
             description: The finger.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
+            rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
 
         Raises:
             InputError: If the joints of the two differ.
@@ -82,7 +134,20 @@ class Finger:
         self.routing = self.tendons.routing
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
-        self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive)
+        self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows))
+        joints, passive = self.routing.joints, self.routing.passive
+        width = len(joints) + passive
+        self.mechanism = Mechanism(
+            self.rigid_body,
+            [
+                *self.tendons.rows(),
+                self.joint_friction.rows(joints, self.routing.actuated, width),
+                self.stroke_limiter.rows(joints, width),
+                *rows,
+            ],
+            self.routing.passive_names,
+            self.tendons.mass,
+        )
 
     @classmethod
     def from_model(
@@ -138,10 +203,11 @@ class Finger:
 
     def rest_state(self, position: Array) -> Array:
         """Return the packed state at rest at theta, shape (n,): stiction zero, passive tendons in the middle."""
-        position = np.asarray(position, dtype=float)
-        zeros = [np.zeros(size) for size in self.layout.sizes]
-        passive = self.tendons.rest_position(position)
-        return self.layout.pack(State(position, zeros[1], passive, zeros[3], zeros[4], zeros[5]))
+        x = np.zeros(self.layout.size)
+        state = self.layout.unpack(x)
+        state.position[:] = position
+        state.passive_position[:] = self.tendons.rest_position(state.position)
+        return x
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
         """Return all signals of (18) at a packed state.
@@ -151,51 +217,47 @@ class Finger:
             command: f^a, shape (a,) or (m, a), N.
             fingertip_force: F, shape (3,) or (m, 3), N, base frame; none by default.
         """
-        state, body = self.layout.unpack(x), self.rigid_body
-        force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        tendons = self.tendons.forces(
-            state.position,
-            state.velocity,
-            state.passive_position,
-            state.passive_velocity,
-            state.tendon_stiction,
-            command,
+        return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force))
+
+    def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
+        """Return an evaluation of the mechanism by the names of the paper."""
+        joints = len(self.routing.joints)
+        halves, driven, passive, pins, limiter = (
+            found.rows[name]
+            for name in ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter")
         )
-        if np.any(force):
-            kinematics = body.kinematics(state.position, state.velocity)
-            directions = kinematics.directions
-            external = np.einsum("...ij,...i->...j", kinematics.jacobian, force)
-        else:
-            directions = np.zeros((*state.position.shape, 3))
-            external = np.zeros_like(state.position)
-        joints = self.joint_friction.forces(state.velocity, state.joint_stiction, tendons.strands, directions, force)
-        depth = self.stroke_limiter.depth(state.position)
-        limiter = self.stroke_limiter.torque(depth, state.velocity)
-        torque = tendons.strands @ self.routing.strand_coupling
-        net = torque - joints.friction - limiter + external
-        acceleration = body.forward_dynamics(state.position, state.velocity, net)
-        rate = self.layout.pack(
-            State(
-                position=state.velocity,
-                velocity=acceleration,
-                passive_position=state.passive_velocity,
-                passive_velocity=tendons.passive_acceleration,
-                tendon_stiction=tendons.stiction_rate,
-                joint_stiction=joints.stiction_rate,
-            )
-        )
+
+        def both(of: Callable[[RowSignals], Array]) -> Array:
+            return np.concatenate([of(driven), of(passive)], axis=-1)
+
         return FingerSignals(
-            state=state,
+            state=self.layout.unpack(x),
             command=command,
-            fingertip_force=force,
-            tendons=tendons,
-            joints=joints,
-            limiter_depth=depth,
-            limiter_torque=limiter,
-            tendon_torque=torque,
-            external_torque=external,
-            acceleration=acceleration,
-            rate=rate,
+            fingertip_force=np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float),
+            tendons=TendonForces(
+                curvature=both(lambda tendons: tendons.row.curvature),
+                coefficient=both(lambda tendons: tendons["coefficient"]),
+                velocity=both(lambda tendons: tendons.row.speed),
+                friction=both(lambda tendons: tendons["friction"]),
+                normal=both(lambda tendons: tendons["normal_force"]),
+                level=both(lambda tendons: tendons["level"]),
+                stiction_rate=both(lambda tendons: tendons.rate),
+                strands=np.concatenate([driven.force, halves.force], axis=-1),
+                passive_acceleration=found.acceleration[..., joints:],
+            ),
+            joints=JointForces(
+                reaction=pins["normal_force"],
+                friction=pins["friction"],
+                level=pins["level"],
+                stiction_rate=pins.rate,
+            ),
+            limiter_depth=limiter["depth"],
+            limiter_torque=-limiter.force,
+            tendon_torque=(driven.force @ driven.rows.arm + halves.force @ halves.rows.arm)[..., :joints],
+            external_torque=found.external[..., :joints],
+            acceleration=found.acceleration[..., :joints],
+            rate=found.rate,
+            rows=found.rows,
         )
 
     def motion(self, position: Array, velocity: Array) -> Motion:
@@ -205,4 +267,4 @@ class Finger:
 
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
-        return self.evaluate(x, command, fingertip_force).rate
+        return self.mechanism.evaluate(x, command, fingertip_force).rate

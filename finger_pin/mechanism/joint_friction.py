@@ -9,25 +9,8 @@ import numpy as np
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
-from finger_pin.laws import bristle as friction
-from finger_pin.laws.reaction import joint_reaction
-
-
-@dataclass(frozen=True, eq=False)
-class JointForces:
-    """What the joints' friction does; shapes (..., n).
-
-    Attributes:
-        reaction: R, N, (17).
-        friction: tau^f, N m, (9c).
-        level: max(R M, g_min), N m.
-        stiction_rate: F^s', N m/s, (9a).
-    """
-
-    reaction: Array
-    friction: Array
-    level: Array
-    stiction_rate: Array
+from finger_pin.laws.bristle import PIN_FRICTION
+from finger_pin.mechanism.rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,30 +55,28 @@ class JointFriction:
             lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
         )
 
-    def forces(
-        self, velocity: Array, stiction: Array, strands: Array, directions: Array, fingertip_force: Array
-    ) -> JointForces:
-        """Return reaction and friction of every joint.
-
-        Args:
-            velocity: theta', shape (..., n), rad/s.
-            stiction: F^s, shape (..., n), N m.
-            strands: f of (12), shape (..., s), N.
-            directions: e_j in the base frame, shape (..., n, 3).
-            fingertip_force: F, shape (3,) or (..., 3), N, base frame.
-        """
-        along = (directions @ fingertip_force[..., None])[..., 0]
-        squared = np.sum(fingertip_force**2, axis=-1)[..., None]
-        across = np.sqrt(np.maximum(squared - along**2, 0.0))
-        reaction = joint_reaction(strands @ self.loads.T, along, across)
-        coefficient = friction.friction_coefficient(
-            velocity, self.kinetic, self.static, self.stribeck_velocity, self.stribeck_exponent
-        )
-        level = friction.friction_level(reaction, coefficient, self.floor)
-        rate = friction.stiction_rate(stiction, velocity, level, self.stiffness)
-        return JointForces(
-            reaction=reaction,
-            friction=friction.friction_force(stiction, velocity, self.viscous, rate, self.lag),
-            level=level,
-            stiction_rate=rate,
+    def rows(self, names: tuple[str, ...], actuated: int, width: int) -> Rows:
+        """Return the table of the joints' friction; strands beyond the actuated ones are halves of passive tendons."""
+        size = len(names)
+        return Rows(
+            group="joint_friction",
+            law=PIN_FRICTION,
+            names=names,
+            parameters=np.array(
+                [
+                    self.kinetic,
+                    self.static,
+                    self.stiffness,
+                    self.viscous,
+                    self.stribeck_velocity,
+                    self.floor,
+                    self.stribeck_exponent,
+                    self.lag,
+                ]
+            ),
+            arm=np.eye(size, width),
+            loads={"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]},
+            pins=np.arange(size),
+            stored="joint_bristles",
+            powers=("joint_coulomb", "joint_viscous", "joint_micro_damping"),
         )

@@ -11,6 +11,9 @@ import pinocchio as pin
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 
+# The two halves of a free body; a quaternion of the spherical one has four numbers.
+FREE_JOINTS = ("JointModelTranslation", "JointModelSpherical")
+
 
 @dataclass(frozen=True, eq=False)
 class Kinematics:
@@ -49,34 +52,48 @@ class Motion:
 
 
 class RigidBody:
-    """A Pinocchio model of revolute and prismatic joints, with a fingertip frame.
+    """A Pinocchio model with a fixed base and one or more tips.
 
     Attributes:
         model: The Pinocchio model.
-        tip_frame: Index of the fingertip frame.
+        tips: Indices of the frames of the tips.
+        tip_frame: Index of the first of them, the fingertip.
+        supports: Shape (t, joints), one where a joint carries a tip.
         joints: Names of the joints, in the order of the model.
         proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
         carriers: Index of the joint that carries that body, 0 for the base.
     """
 
-    def __init__(self, model: pin.Model, tip_frame: str = "fingertip", base_axis: Sequence[float] = (1, 0, 0)) -> None:
-        """Take a model whose joints have one degree of freedom each.
+    def __init__(
+        self, model: pin.Model, tip_frame: str | Sequence[str] = "fingertip", base_axis: Sequence[float] = (1, 0, 0)
+    ) -> None:
+        """Take a model.
+
+        A free body is a translation joint that carries a spherical one: its velocity is that of the origin in the
+        base frame, then the angular velocity in its own.
 
         Args:
             model: Pinocchio model with a fixed base.
-            tip_frame: Name of the frame at the fingertip.
+            tip_frame: Name of the frame at the fingertip, or names of several.
             base_axis: e_1, along which the tendons run at the joints next to the base; base frame.
 
         Raises:
-            InputError: If a joint has more than one coordinate, or there is no such frame.
+            InputError: If a joint neither turns, slides, translates nor is spherical, or there is no such frame.
         """
         for name, joint in zip(model.names[1:], model.joints[1:], strict=True):
-            if joint.nq != 1 or joint.nv != 1:
-                raise InputError(f"joint {name}", "only revolute and prismatic joints are supported", joint.shortname())
-        if not model.existFrame(tip_frame):
-            raise InputError("tip_frame", "no such frame in the model", tip_frame)
+            if (joint.nq, joint.nv) != (1, 1) and joint.shortname() not in FREE_JOINTS:
+                allowed = "only revolute, prismatic, translation and spherical joints are supported"
+                raise InputError(f"joint {name}", allowed, joint.shortname())
+        names = (tip_frame,) if isinstance(tip_frame, str) else tuple(tip_frame)
+        for name in names:
+            if not model.existFrame(name):
+                raise InputError("tip_frame", "no such frame in the model", name)
         self.model = model
-        self.tip_frame = int(model.getFrameId(tip_frame))
+        self.tips = tuple(int(model.getFrameId(name)) for name in names)
+        self.tip_frame = self.tips[0] if self.tips else -1
+        self.supports = np.zeros((len(self.tips), model.njoints - 1))
+        for row, tip in enumerate(self.tips):
+            self.supports[row, [each - 1 for each in model.supports[model.frames[tip].parentJoint] if each]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
         self._data = model.createData()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
@@ -88,6 +105,40 @@ class RigidBody:
             shared = parent == 0 or length == 0.0
             self.carriers.append(self.carriers[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
+
+    def position_rate(self, q: Array, v: Array) -> Array:
+        """Return q' = E(q) v, shape (..., nq)."""
+        if self.model.nq == self.model.nv:
+            return v
+        if q.ndim > 1:
+            return np.array([self.position_rate(*each) for each in zip(q, v, strict=True)])
+        rate = np.zeros(self.model.nq)
+        for joint in self.model.joints[1:]:
+            at, part = joint.idx_q, v[joint.idx_v : joint.idx_v + joint.nv]
+            if joint.nq == joint.nv:
+                rate[at : at + joint.nq] = part
+            else:
+                # Half the product of the quaternion with the angular velocity in the body's frame.
+                vector, scalar = q[at : at + 3], q[at + 3]
+                rate[at : at + 3] = 0.5 * (scalar * part + np.cross(vector, part))
+                rate[at + 3] = -0.5 * vector @ part
+        return rate
+
+    def external_torque(self, q: Array, forces: Array) -> Array:
+        """Return sum of J^T F over the tips, shape (..., nv), for forces of shape (..., t, 3), N, base frame."""
+        if q.ndim > 1:
+            return np.array([self.external_torque(*each) for each in zip(q, forces, strict=True)])
+        reference, total = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, np.zeros(self.model.nv)
+        for tip, force in zip(self.tips, forces, strict=True):
+            total += pin.computeFrameJacobian(self.model, self._data, q, tip, reference)[:3].T @ force
+        return total
+
+    def link_directions(self, q: Array) -> Array:
+        """Return e_j of (17), shape (..., joints, 3): along the link before the joint; base frame."""
+        if q.ndim > 1:
+            return np.array([self.link_directions(each) for each in q])
+        pin.forwardKinematics(self.model, self._data, q)
+        return self._directions()
 
     def tip_position(self, q: Array) -> Array:
         """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
@@ -120,11 +171,6 @@ class RigidBody:
         if q.ndim == 1:
             return np.array(pin.aba(self.model, self._data, q, v, torque))
         return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
-
-    def link_directions(self, q: Array) -> Array:
-        """Return e_j of (17), shape (n, 3): along the proximal link, from its joint to this one; base frame."""
-        pin.forwardKinematics(self.model, self._data, q)
-        return self._directions()
 
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""

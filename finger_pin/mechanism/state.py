@@ -1,7 +1,7 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta | theta' | p | p' | F^s of the tendons | F^s of the joints |
-    |   n   |   n    | p | p  |         t          |         n         |
+    | theta | p | theta' | p' | F^s of the tendons | F^s of the joints |
+    |   n   | p |   n    | p  |         t          |         n         |
 
 n joints, t tendons, p of them passive: 19 numbers for the paper's finger.
 """
@@ -23,19 +23,21 @@ class State:
 
     Attributes:
         position: theta, shape (..., n), rad.
-        velocity: theta', shape (..., n), rad/s.
         passive_position: p_5, shape (..., p), m.
+        velocity: theta', shape (..., n), rad/s.
         passive_velocity: p_5', shape (..., p), m/s.
         tendon_stiction: F^s of the tendons, shape (..., t), N.
         joint_stiction: F^s of the joints, shape (..., n), N m.
+        further: States of rows of one's own, shape (..., f); zero if left out.
     """
 
     position: Array
-    velocity: Array
     passive_position: Array
+    velocity: Array
     passive_velocity: Array
     tendon_stiction: Array
     joint_stiction: Array
+    further: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -46,17 +48,19 @@ class Layout:
         joints: Names of the joints.
         tendons: Names of the tendons, the passive ones last.
         passive: Number of passive tendons.
+        further: Name and scale of every state of further rows, which follow.
     """
 
     joints: tuple[str, ...]
     tendons: tuple[str, ...]
     passive: int
+    further: tuple[tuple[str, float], ...] = ()
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Sizes of the blocks, in order."""
         n, p, t = len(self.joints), self.passive, len(self.tendons)
-        return n, n, p, p, t, n
+        return n, p, n, p, t, n, len(self.further)
 
     @cached_property
     def size(self) -> int:
@@ -74,24 +78,27 @@ class Layout:
         passive = self.tendons[len(self.tendons) - self.passive :]
         groups = (
             ("joint_position", self.joints),
-            ("joint_velocity", self.joints),
             ("passive_position", passive),
+            ("joint_velocity", self.joints),
             ("passive_velocity", passive),
             ("tendon_stiction", self.tendons),
             ("joint_stiction", self.joints),
         )
-        return tuple(f"{kind}[{name}]" for kind, names in groups for name in names)
+        named = tuple(f"{kind}[{name}]" for kind, names in groups for name in names)
+        return named + tuple(name for name, _ in self.further)
 
     def pack(self, state: State) -> Array:
         """Return the packed vector, shape (..., size)."""
+        further = np.zeros((*state.position.shape[:-1], len(self.further))) if state.further is None else state.further
         return np.concatenate(
             [
                 state.position,
-                state.velocity,
                 state.passive_position,
+                state.velocity,
                 state.passive_velocity,
                 state.tendon_stiction,
                 state.joint_stiction,
+                further,
             ],
             axis=-1,
         )
@@ -112,4 +119,9 @@ class Layout:
         Angles 1 rad, velocities 10 rad/s, passive tendon 1 mm and 0.1 m/s, stiction 1 N and 1e-2 N m: the size of
         each in ordinary motion of a finger, so that one factor serves them all.
         """
-        return np.repeat([1.0, 10.0, 1e-3, 0.1, 1.0, 1e-2], self.sizes)
+        return np.concatenate(
+            [
+                np.repeat([1.0, 1e-3, 10.0, 0.1, 1.0, 1e-2], self.sizes[:-1]),
+                [scale for _, scale in self.further],
+            ]
+        )

@@ -9,7 +9,8 @@ import numpy as np
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
-from finger_pin.laws.limiter import limiter_torque, penetration
+from finger_pin.laws.limiter import STROKE_LIMITER
+from finger_pin.mechanism.rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +37,13 @@ class StrokeLimiter:
         size = len(ranges)
         return cls(ranges[:, 0], ranges[:, 1], expand(settings.stiffness, size), expand(settings.damping, size))
 
-    def depth(self, position: Array) -> Array:
-        """Return the signed penetration, shape (..., n), rad."""
-        depth: Array = penetration(position, self.lower, self.upper)
-        return depth
-
-    def torque(self, depth: Array, velocity: Array) -> Array:
-        """Return tau^r, shape (..., n), N m."""
-        torque: Array = limiter_torque(depth, velocity, self.stiffness, self.damping)
-        return torque
+    def rows(self, names: tuple[str, ...], width: int) -> Rows:
+        """Return the table of the limiters."""
+        return Rows(
+            group="limiter",
+            law=STROKE_LIMITER,
+            names=names,
+            parameters=np.array([self.lower, self.upper, self.stiffness, self.damping]),
+            arm=np.eye(len(names), width),
+            powers=("limiter",),
+        )

@@ -9,36 +9,9 @@ import numpy as np
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
-from finger_pin.laws import bristle as friction
-from finger_pin.laws.capstan import capstan_coefficient, delivered_tension
-from finger_pin.laws.passive_tendon import half_tension, passive_acceleration
-
-
-@dataclass(frozen=True, eq=False)
-class TendonForces:
-    """What the tendons do; shapes (..., t) unless said otherwise.
-
-    Attributes:
-        curvature: phi, rad, (15).
-        coefficient: mu^d, (16).
-        velocity: v, m/s; (H_c theta')_i, and p_5' for a passive tendon.
-        friction: f^f, N, (9c).
-        normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
-        level: max(F^n M, g_min), N.
-        stiction_rate: F^s', N/s, (9a).
-        strands: f of (12), shape (..., s), N.
-        passive_acceleration: p_5'', shape (..., p), m/s2, (13).
-    """
-
-    curvature: Array
-    coefficient: Array
-    velocity: Array
-    friction: Array
-    normal: Array
-    level: Array
-    stiction_rate: Array
-    strands: Array
-    passive_acceleration: Array
+from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
+from finger_pin.laws.passive_tendon import TENDON_HALF
+from finger_pin.mechanism.rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,59 +75,64 @@ class Tendons:
         proximal, distal = self.stretch(position, np.zeros((*position.shape[:-1], self.routing.passive)))
         return 0.5 * (proximal - distal)
 
-    def forces(
-        self,
-        position: Array,
-        velocity: Array,
-        passive_position: Array,
-        passive_velocity: Array,
-        stiction: Array,
-        command: Array,
-    ) -> TendonForces:
-        """Return all tendon forces.
-
-        Micro-damping depends on the normal force, which by (14) depends on the delivered tension, which depends on
-        micro-damping. Near slack that loop has two solutions where bristles spring back, so it is not closed: the
-        tension in (14) is max(0, f^a - F^s - b v), as it is without micro-damping.
-
-        Args:
-            position: theta, shape (..., n), rad.
-            velocity: theta', shape (..., n), rad/s.
-            passive_position: p_5, shape (..., p), m.
-            passive_velocity: p_5', shape (..., p), m/s.
-            stiction: F^s, shape (..., t), N.
-            command: f^a, shape (..., a), N.
-        """
-        routing, actuated = self.routing, self.routing.actuated
-        curvature = routing.curvature(position)
-        coefficient = capstan_coefficient(self.surface, curvature)
-        sliding = np.concatenate([velocity @ routing.actuated_coupling.T, passive_velocity], axis=-1)
-        settled = friction.friction_force(stiction, sliding, self.viscous)[..., :actuated]
-        pressing = delivered_tension(command, settled)
-        proximal, distal = (
-            half_tension(stretch, self.half_stiffness) for stretch in self.stretch(position, passive_position)
+    def rows(self) -> list[Rows]:
+        """Return the tables of halves (12) and of driven and passive tendons (14), (16), for coordinates (theta, p)."""
+        routing, joints = self.routing, len(self.routing.joints)
+        actuated, passive = routing.actuated, routing.passive
+        width = joints + passive
+        # p of the halves: what draws the mass back loosens the proximal half and stretches the distal one.
+        halves = np.zeros((2 * passive, width))
+        halves[:, :joints] = routing.strand_coupling[actuated:]
+        halves[np.arange(2 * passive), joints + np.arange(2 * passive) // 2] = np.tile([1.0, -1.0], passive)
+        driven, bends = np.zeros((2, len(routing.tendons), width))
+        driven[:, :joints] = routing.coupling
+        driven[actuated:] = np.eye(width)[joints:]
+        bends[:, :joints] = routing.curvature_matrix
+        friction = np.array(
+            [
+                self.surface,
+                self.stiction_ratio,
+                self.stiffness,
+                self.viscous,
+                self.stribeck_velocity,
+                self.floor,
+                self.stribeck_exponent,
+                self.lag,
+            ]
         )
-        normal = np.concatenate([np.abs(pressing) + np.abs(command), proximal + distal], axis=-1)
-        sliding_coefficient = friction.friction_coefficient(
-            sliding,
-            coefficient,
-            self.stiction_ratio * coefficient,
-            self.stribeck_velocity,
-            self.stribeck_exponent,
-        )
-        level = friction.friction_level(normal, sliding_coefficient, self.floor)
-        rate = friction.stiction_rate(stiction, sliding, level, self.stiffness)
-        loss = friction.friction_force(stiction, sliding, self.viscous, rate, self.lag)
-        delivered = delivered_tension(command, loss[..., :actuated])
-        halves = np.stack([proximal, distal], axis=-1).reshape(*proximal.shape[:-1], 2 * routing.passive)
-        return TendonForces(
-            curvature=curvature,
-            coefficient=coefficient,
-            velocity=sliding,
-            friction=loss,
-            normal=normal,
-            level=level,
-            stiction_rate=rate,
-            strands=np.concatenate([delivered, halves], axis=-1),
-            passive_acceleration=passive_acceleration(proximal, distal, loss[..., actuated:], self.mass),
-        )
+        losses = ("tendon_coulomb", "tendon_viscous", "tendon_micro_damping")
+        names = routing.passive_names
+        return [
+            Rows(
+                group="passive_halves",
+                law=TENDON_HALF,
+                names=tuple(f"{name}.{half}" for name in names for half in ("proximal", "distal")),
+                parameters=np.repeat(self.half_stiffness, 2)[None],
+                arm=halves,
+                stored="passive_tendon",
+            ),
+            Rows(
+                group="driven_tendons",
+                law=DRIVEN_TENDON,
+                names=routing.tendons[:actuated],
+                parameters=friction[:, :actuated],
+                arm=driven[:actuated],
+                channels=np.arange(actuated),
+                bends=bends[:actuated],
+                curvature_offset=routing.curvature_offset[:actuated],
+                stored="tendon_bristles",
+                powers=("actuators", *losses, "slack"),
+            ),
+            Rows(
+                group="passive_tendons",
+                law=PASSIVE_FRICTION,
+                names=names,
+                parameters=friction[:, actuated:],
+                arm=driven[actuated:],
+                loads={"passive_halves": np.repeat(np.eye(passive), 2, axis=1)},
+                bends=bends[actuated:],
+                curvature_offset=routing.curvature_offset[actuated:],
+                stored="tendon_bristles",
+                powers=losses,
+            ),
+        ]

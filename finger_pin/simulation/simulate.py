@@ -16,10 +16,11 @@ from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.proportional import Controller, ProportionalController
 from finger_pin.control.reference import HarmonicReference
 from finger_pin.control.sampling import SampledController
-from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.cvode import integrate_cvode
-from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
-from finger_pin.core.plant import Control, held_control
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.inputs import Control, held_control
+from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
@@ -88,7 +89,7 @@ def simulate(
     if sampling is None and method in TABLEAUS and _control(loop) is None:
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
-        loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
+        loop = replace(loop, dynamics=CompiledFinger(loop.finger))
     if sampling is not None:
         loop = replace(loop, controller=SampledController(loop, sampling))
 
@@ -148,7 +149,7 @@ def _control(loop: ClosedLoop) -> Control | None:
     """Return the loop's controller and reference as arrays, or None if they are Python."""
     controller, reference = loop.controller, loop.reference
     if isinstance(controller, ProportionalController) and isinstance(reference, HarmonicReference):
-        return build_control(controller, reference, loop.finger.routing.actuated)
+        return build_control(controller, reference, loop.finger.routing)
     return None
 
 
@@ -158,9 +159,11 @@ def _integrate(
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
-        plant = loop.dynamics.plant
+        mechanism = loop.finger.mechanism
+        control = _control(loop) or held_control(mechanism.channels, mechanism.coordinates)
+        tableau = TABLEAUS[method]()
         return integrate_compiled(
-            Stepper(plant, _control(loop) or held_control(plant), start, TABLEAUS[method](), settings.rtol, atol),
+            Stepper(mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force),
             settings.duration,
             loop.finger.layout.names,
             held=controller if isinstance(controller, SampledController) else None,

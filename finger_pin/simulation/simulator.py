@@ -8,9 +8,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.integrator import TABLEAUS, Stepper
-from finger_pin.core.plant import held_control
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.inputs import held_control
+from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError
@@ -65,14 +65,16 @@ class Simulator:
         self.finger = finger
         self._compiled = CompiledFinger(finger)
         self._tension = np.zeros(finger.routing.actuated)
+        mechanism = finger.mechanism
         self._stepper = Stepper(
-            self._compiled.plant,
-            held_control(self._compiled.plant),
+            mechanism,
+            held_control(mechanism.channels, mechanism.coordinates),
             finger.rest_state(_vector("position", start, len(finger.routing.joints))),
             TABLEAUS[method](),
             rtol,
             atol_scale * finger.layout.scales(),
         )
+        self._force = np.zeros(3)
 
     @property
     def time(self) -> float:
@@ -108,27 +110,25 @@ class Simulator:
         command = _vector("tension", tension, self._tension.size)
         if not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
+        force = np.zeros(3) if fingertip_force is None else _vector("fingertip_force", fingertip_force, 3)
         stepper = self._stepper
-        if fingertip_force is not None:
-            stepper.load(_vector("fingertip_force", fingertip_force, 3))
-        elif stepper.plant.loaded:
-            stepper.load(np.zeros(3))
-        self._tension[:] = command
-        stepper.control.tension[:] = command
-        status, _ = stepper.advance(stepper.time + dt)
+        if np.any(force != self._force):
+            stepper.load(force)
+        self._tension, self._force = command, force
+        stepper.hold(command)
+        status = stepper.advance(stepper.time + dt)
         if status:
             raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), _ADVICE)
-        return self.finger.layout.unpack(stepper.x.copy())
+        return self.state
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
-        return self._compiled.evaluate(self.x, self._tension, self._stepper.plant.fingertip_force.copy())
+        return self._compiled.evaluate(self.x, self._tension, self._force)
 
     def copy(self) -> Simulator:
         """Return an independent simulator in the same condition: both go on bit by bit alike."""
         twin = copy.copy(self)
         twin._compiled = CompiledFinger(self.finger)
-        twin._tension = self._tension.copy()
         twin._stepper = self._stepper.copy()
         return twin
 

@@ -1,0 +1,208 @@
+"""The linear systems that an implicit method solves, condensed to one equation per coordinate.
+
+A Rosenbrock stage solves (g - J) u = r. Every row turns its slopes into the change of its force d phi in terms of the
+changes dq and dv of positions and velocities, and of its own r:
+
+    d l = A dq,  d l' = A dv,  d N and d u from the rows before,
+    g dz - dz' = r_z   with  dz' = by l, l', N, u, curvature, and z itself: one division,
+
+and what is left is (g M + dh/dv - sum A^T G_v + (dh/dq - sum A^T G_q) / g) dv = M r_v - ... . All of it is linear in
+r, so the solution is kept as one matrix, and a stage costs one product with it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from finger_pin.core import law_code as at
+from finger_pin.core.compilation import compiled, compiled_loosely
+
+
+@compiled
+def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, out: Any) -> None:
+    """Fill the change of a weighted sum of earlier forces, times a slope."""
+    for c in range(out.size):
+        out[c] = 0.0
+    for e in range(begin, end):
+        weight, source = slope * tables.weights[e], gain[tables.terms[e]]
+        for c in range(out.size):
+            out[c] += weight * source[c]
+
+
+@compiled
+def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
+    """Fill the gains of all rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
+    count, width = tables.state.size, linear.mass.shape[0]
+    load, command, force, slopes = linear.load, linear.command, linear.force, work.slopes
+    wide = load.size
+    last = wide - 1
+    for j in range(width):
+        for c in range(wide):
+            force[j, c] = 0.0
+    for k in range(count):
+        row, state = linear.gain[k], tables.state[k]
+        of_length, of_speed, of_curvature = slopes[at.F_LENGTH, k], slopes[at.F_SPEED, k], slopes[at.F_CURVATURE, k]
+        of_load, of_command = slopes[at.F_LOAD, k], slopes[at.F_COMMAND, k]
+        by_load = by_command = 0.0
+        factor = total = 0.0
+        if state >= 0:
+            factor = 1.0 / (g - slopes[at.R_STATE, k])
+            by_load, by_command = factor * slopes[at.R_LOAD, k], factor * slopes[at.R_COMMAND, k]
+            # d phi by z and by z' = g dz - r_z.
+            total = slopes[at.F_STATE, k] + g * slopes[at.F_RATE, k]
+        own = linear.state_gain[max(state, 0)]
+        for c in range(wide):
+            row[c] = 0.0
+        if state >= 0:
+            for c in range(wide):
+                own[c] = 0.0
+        pressed = tables.load_start[k + 1] > tables.load_start[k]
+        if pressed and (of_load != 0.0 or by_load != 0.0):
+            _terms(tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, load)
+            if tables.loaded and tables.pins[k] >= 0:
+                for c in range(width):
+                    load[c] += linear.load_by_position[k, c]
+            for c in range(wide):
+                row[c] = of_load * load[c]
+            if by_load != 0.0:
+                for c in range(wide):
+                    own[c] = by_load * load[c]
+        fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
+        if fed and (of_command != 0.0 or by_command != 0.0):
+            _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, command)
+            channel = tables.channel[k]
+            if channel >= 0:
+                for c in range(width):
+                    command[c] += control.by_position[channel, c]
+                command[last] += control.by_time[channel]
+            for c in range(wide):
+                row[c] += of_command * command[c]
+            if by_command != 0.0:
+                for c in range(wide):
+                    own[c] += by_command * command[c]
+        begin, end = tables.arm_start[k], tables.arm_start[k + 1]
+        if state >= 0:
+            by_length, by_speed = factor * slopes[at.R_LENGTH, k], factor * slopes[at.R_SPEED, k]
+            by_curvature = factor * slopes[at.R_CURVATURE, k]
+            for e in range(begin, end):
+                own[tables.arm_at[e]] += by_length * linear.measure[e]
+                own[width + tables.arm_at[e]] += by_speed * linear.arm[e]
+            for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
+                own[tables.bend_at[e]] += by_curvature * linear.bend[e]
+            for c in range(wide):
+                row[c] += total * own[c]
+            # The column of r_z itself, without the difference g dz - r_z.
+            itself = 2 * width + state
+            own[itself] += factor
+            row[itself] += factor * (slopes[at.F_STATE, k] + slopes[at.F_RATE, k] * slopes[at.R_STATE, k])
+        elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed):
+            # An idle row, such as a limiter inside its range.
+            continue
+        for e in range(begin, end):
+            row[tables.arm_at[e]] += of_length * linear.measure[e]
+            row[width + tables.arm_at[e]] += of_speed * linear.arm[e]
+        for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
+            row[tables.bend_at[e]] += of_curvature * linear.bend[e]
+        for e in range(begin, end):
+            arm, target = linear.arm[e], force[tables.arm_at[e]]
+            for c in range(wide):
+                target[c] += arm * row[c]
+
+
+@compiled
+def _factorise(matrix: Any, pivots: Any) -> bool:
+    """Factorise a matrix in place with row exchanges; false if it is singular."""
+    size = matrix.shape[0]
+    for c in range(size):
+        best = c
+        for r in range(c + 1, size):
+            if abs(matrix[r, c]) > abs(matrix[best, c]):
+                best = r
+        pivots[c] = best
+        if not abs(matrix[best, c]) > 0.0:
+            return False
+        if best != c:
+            for k in range(size):
+                matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
+        for r in range(c + 1, size):
+            factor = matrix[r, c] / matrix[c, c]
+            matrix[r, c] = factor
+            for k in range(c + 1, size):
+                matrix[r, k] -= factor * matrix[c, k]
+    return True
+
+
+@compiled
+def _substitute(matrix: Any, pivots: Any, right: Any) -> None:
+    """Replace right-hand sides, one a column, by solutions."""
+    size, wide = right.shape
+    for r in range(size):
+        best = pivots[r]
+        if best != r:
+            for c in range(wide):
+                right[r, c], right[best, c] = right[best, c], right[r, c]
+    for r in range(size):
+        for k in range(r):
+            factor = matrix[r, k]
+            for c in range(wide):
+                right[r, c] -= factor * right[k, c]
+    for r in range(size - 1, -1, -1):
+        for k in range(r + 1, size):
+            factor = matrix[r, k]
+            for c in range(wide):
+                right[r, c] -= factor * right[k, c]
+        inverse = 1.0 / matrix[r, r]
+        for c in range(wide):
+            right[r, c] *= inverse
+
+
+@compiled
+def condense(tables: Any, control: Any, g: float, work: Any, linear: Any) -> bool:
+    """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
+    width = linear.mass.shape[0]
+    states = linear.state_gain.shape[0]
+    wide = linear.load.size
+    _gains(tables, control, g, work, linear)
+    force, velocity, reduced = linear.force, linear.velocity, linear.reduced
+    inverse = 1.0 / g
+    for i in range(width):
+        for j in range(width):
+            by_position = (linear.by_position[i, j] - force[i, j]) * inverse
+            reduced[i, j] = g * linear.mass[i, j] + linear.by_velocity[i, j] - force[i, width + j] + by_position
+            velocity[i, j] = -by_position
+            velocity[i, width + j] = linear.mass[i, j]
+        for c in range(2 * width, wide):
+            velocity[i, c] = force[i, c]
+    if not _factorise(reduced, linear.pivots):
+        return False
+    _substitute(reduced, linear.pivots, velocity)
+    solution = linear.solution
+    for i in range(width):
+        for c in range(wide):
+            solution[width + i, c] = velocity[i, c]
+            solution[i, c] = velocity[i, c] * inverse
+        solution[i, i] += inverse
+    # Gains multiply dq = (r_q + dv) / g and dv.
+    for s in range(states):
+        own, row = linear.state_gain[s], solution[2 * width + s]
+        for c in range(width):
+            row[c] = own[c] * inverse
+            row[width + c] = 0.0
+        for c in range(2 * width, wide):
+            row[c] = own[c]
+        for j in range(width):
+            factor = own[j] * inverse + own[width + j]
+            if factor != 0.0:
+                for c in range(wide):
+                    row[c] += factor * velocity[j, c]
+    return True
+
+
+@compiled_loosely
+def solve(linear: Any, r: Any, u: Any) -> None:
+    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i."""
+    for i in range(u.size):
+        row, value = linear.solution[i], 0.0
+        for c in range(r.size):
+            value += row[c] * r[c]
+        u[i] = value

@@ -1,0 +1,290 @@
+"""What comes from outside, compiled: the paper's controller (19)-(22), inputs over time, or inputs that are held."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.binding import Indices, Layers, Matrix, Vector
+from finger_pin.core.compilation import compiled
+from finger_pin.core.law_code import inlined
+from finger_pin.description.routing import Array
+from finger_pin.laws import controller as controller_laws
+from finger_pin.laws import harmonic as harmonic_laws
+
+HELD, PLANNED, SCHEDULED = range(3)
+
+_harmonic = inlined(harmonic_laws.harmonic)
+_harmonic_rate = inlined(harmonic_laws.harmonic_rate)
+_proportional_torque = inlined(controller_laws.proportional_torque)
+_internal_level = inlined(controller_laws.internal_level)
+
+
+class Signal(NamedTuple):
+    """k functions of time: a sinusoid about an offset each, plus a piecewise polynomial on shared knots.
+
+    Attributes:
+        harmonics: Offset, amplitude, frequency, phase, shape (k, 4).
+        knots: Shape (m,); m = 0 without polynomials. Outside, these keep their value.
+        coefficients: Of (t - knot)^(d - i), shape (d + 1, m - 1, k).
+    """
+
+    harmonics: Matrix
+    knots: Vector
+    coefficients: Layers
+
+
+class Control(NamedTuple):
+    """Inputs of N coordinates and u channels; T planned tensions, those of passive tendons among them.
+
+    Attributes:
+        kind: HELD, PLANNED or SCHEDULED.
+        tension: What is held, shape (u,).
+        gain: K_P, shape (N,).
+        minimum: f0, shape (T,).
+        inverse: Pseudo-inverse of H_c^T, shape (T, N).
+        internal: f^k, shape (T,).
+        loop: The controller that a planned tension belongs to, each with a lambda of its own, shape (T,).
+        channel: The channel of a planned tension, -1 for a passive tendon, shape (T,).
+        reference: Desired positions before the coupling (20), r functions.
+        coupling: Shape (N, r).
+        offset: Shape (N,).
+        schedule: Inputs over time, u functions.
+        desired, rate: Memory, theta^d and its rate, shape (N,).
+        planned: Memory, f_hat, shape (T,).
+        active: Memory, the tension that sets lambda, by controller.
+        level: Memory, lambda, by controller.
+        base: Memory, values of a signal.
+        by_position: Memory, du/dq, shape (u, N).
+        by_time: Memory, du/dt, shape (u,).
+    """
+
+    kind: int
+    tension: Vector
+    gain: Vector
+    minimum: Vector
+    inverse: Matrix
+    internal: Vector
+    loop: Indices
+    channel: Indices
+    reference: Signal
+    coupling: Matrix
+    offset: Vector
+    schedule: Signal
+    desired: Vector
+    rate: Vector
+    planned: Vector
+    active: Indices
+    level: Vector
+    base: Vector
+    by_position: Matrix
+    by_time: Vector
+
+
+def no_signal() -> Signal:
+    """Return a signal of no functions."""
+    return Signal(np.zeros((0, 4)), np.zeros(0), np.zeros((1, 0, 0)))
+
+
+def planned_control(
+    channels: int,
+    gain: Array,
+    minimum: Array,
+    inverse: Array,
+    internal: Array,
+    channel: NDArray[np.int64],
+    reference: Signal,
+    coupling: Array,
+    offset: Array,
+    loop: NDArray[np.int64] | None = None,
+) -> Control:
+    """Return the paper's controller, or several of them side by side."""
+    loops = np.zeros(len(minimum), dtype=np.int64) if loop is None else np.asarray(loop, dtype=np.int64)
+    return _control(
+        PLANNED, channels, gain, minimum, inverse, internal, loops, channel, reference, coupling, offset, no_signal()
+    )
+
+
+def held_control(channels: int, coordinates: int) -> Control:
+    """Return the control that keeps given tensions."""
+    return _without_plan(HELD, channels, coordinates, no_signal())
+
+
+def scheduled_control(schedule: Signal, coordinates: int) -> Control:
+    """Return the control that gives inputs over time."""
+    return _without_plan(SCHEDULED, len(schedule.harmonics), coordinates, schedule)
+
+
+def _without_plan(kind: int, channels: int, coordinates: int, schedule: Signal) -> Control:
+    nothing, none = np.zeros(0), np.zeros(0, dtype=np.int64)
+    return _control(
+        kind,
+        channels,
+        np.zeros(coordinates),
+        nothing,
+        np.zeros((0, coordinates)),
+        nothing,
+        none,
+        none,
+        no_signal(),
+        np.zeros((coordinates, 0)),
+        np.zeros(coordinates),
+        schedule,
+    )
+
+
+def _control(
+    kind: int,
+    channels: int,
+    gain: Array,
+    minimum: Array,
+    inverse: Array,
+    internal: Array,
+    loop: NDArray[np.int64],
+    channel: NDArray[np.int64],
+    reference: Signal,
+    coupling: Array,
+    offset: Array,
+    schedule: Signal,
+) -> Control:
+    coordinates, loops = len(gain), int(loop.max(initial=-1)) + 1
+    functions = max(len(reference.harmonics), len(schedule.harmonics))
+    return Control(
+        kind=kind,
+        tension=np.zeros(channels),
+        gain=np.array(gain, dtype=float),
+        minimum=np.array(minimum, dtype=float),
+        inverse=np.ascontiguousarray(inverse, dtype=float),
+        internal=np.array(internal, dtype=float),
+        loop=np.array(loop, dtype=np.int64),
+        channel=np.array(channel, dtype=np.int64),
+        reference=reference,
+        coupling=np.ascontiguousarray(coupling, dtype=float),
+        offset=np.array(offset, dtype=float),
+        schedule=schedule,
+        desired=np.zeros(coordinates),
+        rate=np.zeros(coordinates),
+        planned=np.zeros(len(minimum)),
+        active=np.zeros(loops, dtype=np.int64),
+        level=np.zeros(loops),
+        base=np.zeros(functions),
+        by_position=np.zeros((channels, coordinates)),
+        by_time=np.zeros(channels),
+    )
+
+
+@compiled
+def _piece(signal: Any, time: float) -> Any:
+    """Return the piece that a time is in, and the time since its knot, both clipped to the knots."""
+    knots = signal.knots
+    last = knots.size - 2
+    low, high = 0, last
+    while low < high:
+        middle = (low + high + 1) // 2
+        if knots[middle] <= time:
+            low = middle
+        else:
+            high = middle - 1
+    return low, min(max(time, knots[0]), knots[last + 1]) - knots[low]
+
+
+@compiled
+def signal_values(signal: Any, time: float, out: Any) -> None:
+    """Fill the values of the functions."""
+    table = signal.harmonics
+    for j in range(table.shape[0]):
+        out[j] = table[j, 0]
+        if table[j, 1] != 0.0:
+            out[j] = _harmonic(time, table[j, 0], table[j, 1], table[j, 2], table[j, 3])
+    if signal.knots.size > 0:
+        piece, since = _piece(signal, time)
+        for j in range(table.shape[0]):
+            value = 0.0
+            for i in range(signal.coefficients.shape[0]):
+                value = value * since + signal.coefficients[i, piece, j]
+            out[j] += value
+
+
+@compiled
+def signal_rates(signal: Any, time: float, out: Any) -> None:
+    """Fill the time derivatives of the functions."""
+    table, knots = signal.harmonics, signal.knots
+    for j in range(table.shape[0]):
+        out[j] = 0.0
+        if table[j, 1] != 0.0:
+            out[j] = _harmonic_rate(time, table[j, 1], table[j, 2], table[j, 3])
+    if knots.size > 0 and knots[0] <= time <= knots[knots.size - 1]:
+        piece, since = _piece(signal, time)
+        degree = signal.coefficients.shape[0] - 1
+        for j in range(table.shape[0]):
+            value = 0.0
+            for i in range(degree):
+                value = value * since + (degree - i) * signal.coefficients[i, piece, j]
+            out[j] += value
+
+
+@compiled
+def inputs(control: Any, time: float, position: Any, out: Any) -> None:
+    """Fill the inputs: f_hat of (19), (21), (22), or what is held or scheduled."""
+    if control.kind == HELD:
+        for i in range(out.size):
+            out[i] = control.tension[i]
+        return
+    if control.kind == SCHEDULED:
+        signal_values(control.schedule, time, out)
+        return
+    signal_values(control.reference, time, control.base)
+    desired, planned, base = control.desired, control.planned, control.base
+    count = position.size
+    for j in range(count):
+        wanted = control.offset[j]
+        for k in range(control.coupling.shape[1]):
+            wanted += control.coupling[j, k] * base[k]
+        desired[j] = _proportional_torque(control.gain[j], wanted, position[j])
+    for c in range(control.level.size):
+        control.level[c] = -np.inf
+    for i in range(planned.size):
+        value = 0.0
+        for j in range(count):
+            value += control.inverse[i, j] * desired[j]
+        planned[i] = value
+        candidate = _internal_level(control.minimum[i], value, control.internal[i])
+        c = control.loop[i]
+        if candidate > control.level[c]:
+            control.level[c] = candidate
+            control.active[c] = i
+    for i in range(planned.size):
+        planned[i] += control.level[control.loop[i]] * control.internal[i]
+        if control.channel[i] >= 0:
+            out[control.channel[i]] = planned[i]
+
+
+@compiled
+def input_slopes(control: Any, time: float) -> None:
+    """Fill du/dq and du/dt after `inputs`, for the active minimum of (22)."""
+    by_position, by_time = control.by_position, control.by_time
+    if control.kind == HELD:
+        return
+    if control.kind == SCHEDULED:
+        signal_rates(control.schedule, time, by_time)
+        return
+    signal_rates(control.reference, time, control.base)
+    count = control.gain.size
+    for j in range(count):
+        rate = 0.0
+        for k in range(control.coupling.shape[1]):
+            rate += control.coupling[j, k] * control.base[k]
+        control.rate[j] = rate
+    for i in range(control.planned.size):
+        row = control.channel[i]
+        if row < 0:
+            continue
+        active = control.active[control.loop[i]]
+        by_time[row] = 0.0
+        for j in range(count):
+            shared = control.inverse[active, j] / control.internal[active]
+            slope = -control.gain[j] * (control.inverse[i, j] - control.internal[i] * shared)
+            by_position[row, j] = slope
+            by_time[row] -= slope * control.rate[j]

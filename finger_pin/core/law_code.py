@@ -1,0 +1,169 @@
+"""Laws compiled: every function of a law becomes one over the rows of a table, called through its address.
+
+Compiled code that calls a law does not know it: a law that is written anywhere is compiled on its own, in a second or
+two, and the core stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from types import FunctionType
+from typing import Any, NamedTuple
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic as _numba_intrinsic
+
+from finger_pin.core.compilation import address_of, compiled
+from finger_pin.laws.law import Law, Row
+
+# Typed as what it makes of a function: one that compiled code calls without the typing context.
+_intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsic
+_constant: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsic(prefer_literal=True)
+
+# Columns of the table of rows; the signals of the law follow. Numba reads them as constants.
+LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, FORCE, RATE, SIGNALS = range(9)
+# Columns of the table of slopes: the force by l, l', z, z', N, u, phi, then z' by l, l', z, N, u, phi.
+F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE = range(7)
+R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, SLOPES = range(7, 14)
+
+# Filled in for every law.
+_law: Any = None
+_PARAMETERS = _COUNT = 0
+
+
+class Addresses(NamedTuple):
+    """Where the compiled functions of a law are."""
+
+    value: int
+    slopes: int
+    account: int
+
+
+@cache
+def addresses(law: Law) -> Addresses:
+    """Return where a law's functions are, compiled; they live as long as the process."""
+    return Addresses(
+        _address(law, _value, law.value), _address(law, _slopes, law.slopes), _address(law, _account, law.account)
+    )
+
+
+def widest(laws: Sequence[Law]) -> tuple[int, int]:
+    """Return how many columns the table of rows and that of energies and powers need."""
+    powers = max((len(law.supplies) + len(law.losses) for law in laws), default=0)
+    return SIGNALS + max((len(law.signals) for law in laws), default=0), 1 + powers
+
+
+@cache
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a plain function compiled, with all plain functions that it calls."""
+    assert isinstance(function, FunctionType)
+    code, known = function.__code__, function.__globals__
+    called = {name: known[name] for name in code.co_names if isinstance(known.get(name), FunctionType)}
+    world = {**known, **{name: inlined(each) for name, each in called.items()}}
+    return compiled(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
+
+
+def _address(law: Law, template: Callable[..., Any], function: Callable[..., Any]) -> int:
+    assert isinstance(template, FunctionType)
+    world = {
+        **template.__globals__,
+        "_law": inlined(function),
+        "_PARAMETERS": len(law.parameters),
+        "_COUNT": len(law.signals),
+    }
+    twin = FunctionType(template.__code__, world, template.__name__)
+    # Numba names what it keeps on disk after this.
+    twin.__qualname__ = f"{template.__name__}[{function.__module__}.{function.__qualname__}]"
+    pointer, index = types.CPointer(types.float64), types.int64  # type: ignore[no-untyped-call]
+    tables = 2 if template is _value else 3
+    kept = function.__module__.startswith("finger_pin.laws.")
+    return address_of(types.void(*[pointer] * tables, index, index, index), twin, kept=kept)
+
+
+@_constant
+def _numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> Any:
+    """Return a tuple of numbers of a table, ``stride`` apart; their count is a constant."""
+    size = count.literal_value
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values, place = [], arguments[1]
+        for _ in range(size):
+            values.append(builder.load(builder.gep(arguments[0], [place])))
+            place = builder.add(place, arguments[2])
+        return context.make_tuple(builder, signature.return_type, values)
+
+    tuple_of_numbers = types.UniTuple(types.float64, size)  # type: ignore[no-untyped-call]
+    return tuple_of_numbers(table, types.int64, types.int64, count), generate
+
+
+@_intrinsic
+def _put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
+    """Write a tuple of numbers into a table, ``stride`` apart."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = arguments[1]
+        for index, kind in enumerate(values):
+            value = context.cast(builder, builder.extract_value(arguments[3], index), kind, types.float64)
+            builder.store(value, builder.gep(arguments[0], [place]))
+            place = builder.add(place, arguments[2])
+        return context.get_dummy_value()
+
+    return types.void(table, types.int64, types.int64, values), generate
+
+
+@compiled
+def _seen(table: Any, stride: int, k: int) -> Any:
+    length, speed, state, load, command, curvature = _numbers(table, k, stride, 6)
+    return Row(length, speed, state, load, command, curvature)
+
+
+def _value(table: Any, numbers: Any, stride: int, begin: int, end: int) -> None:
+    for k in range(begin, end):
+        found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
+        _put(table, FORCE * stride + k, stride, found)
+
+
+def _slopes(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+    for k in range(begin, end):
+        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
+        of_force, of_rate = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals)
+        _put(filled, k, stride, of_force)
+        _put(filled, R_LENGTH * stride + k, stride, of_rate)
+
+
+def _account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+    for k in range(begin, end):
+        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
+        force, rate = _numbers(table, FORCE * stride + k, stride, 2)
+        found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), force, rate, signals)
+        _put(filled, k, stride, found)
+
+
+def _call(context: Any, builder: Any, signature: Any, arguments: Any, tables: int) -> Any:
+    """Generate the call of an address with the data of some tables, their stride, and a range of rows."""
+    number, pointer = ir.IntType(64), ir.DoubleType().as_pointer()
+    arrays = [
+        context.make_array(kind)(context, builder, value)
+        for kind, value in zip(signature.args[1 : 1 + tables], arguments[1 : 1 + tables], strict=True)
+    ]
+    stride = builder.extract_value(arrays[0].shape, 1)
+    called = ir.FunctionType(ir.VoidType(), [pointer] * tables + [number] * 3)
+    function = builder.inttoptr(arguments[0], called.as_pointer())
+    builder.call(function, [*(array.data for array in arrays), stride, *arguments[1 + tables :]])
+    return context.get_dummy_value()
+
+
+@_intrinsic
+def call_value(_typing: Any, address: Any, rows: Any, parameters: Any, begin: Any, end: Any) -> Any:
+    """Evaluate the law at an address for a range of rows."""
+    signature = types.void(types.int64, rows, parameters, types.int64, types.int64)
+    return signature, lambda context, builder, sig, args: _call(context, builder, sig, args, 2)
+
+
+@_intrinsic
+def call_filling(_typing: Any, address: Any, rows: Any, parameters: Any, filled: Any, begin: Any, end: Any) -> Any:
+    """Fill slopes, or energies and powers, by the law at an address for a range of rows."""
+    signature = types.void(types.int64, rows, parameters, filled, types.int64, types.int64)
+    return signature, lambda context, builder, sig, args: _call(context, builder, sig, args, 3)

@@ -1,0 +1,350 @@
+"""A mechanism as plain arrays, for the compiled core: bodies, rows, tips, and the memory to work in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
+from finger_pin.core.law_code import CURVATURE, SLOPES, addresses, widest
+from finger_pin.core.rigid_body import (
+    BODY_COLUMNS,
+    CENTRE,
+    INERTIA,
+    MASS,
+    PRISMATIC,
+    ROTATION,
+    SPATIAL_LAYERS,
+    SQUARE_LAYERS,
+    TRANSLATION,
+)
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.laws.law import Law
+from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rigid_body import FREE_JOINTS
+
+# Columns of the table of groups.
+FIRST, END, STATEFUL, BENT, FED, PRESSED = range(6)
+
+
+class Tables(NamedTuple):
+    """A mechanism with n bodies, N coordinates, K rows in G groups, and t tips.
+
+    A joint of several coordinates is a chain of bodies with one each, of which the last has the mass; the
+    three that turn a free body start from its attitude (`charts`).
+
+    Attributes:
+        parents: Of the bodies, -1 for the base, shape (n,).
+        kinds: 1 where a body slides, 0 where it turns, shape (n,).
+        bodies: Placement and inertia, columns of `rigid_body`, shape (n, BODY_COLUMNS).
+        charts: First of the three bodies that turn a free one, shape (f,).
+        chart_frames: Rotation of each one's spherical joint in the body before it, shape (f, 3, 3).
+        gravity: Shape (3,), m/s2.
+        lumps: Inertia of the other coordinates, shape (N - n,).
+        tip_body: Shape (t,).
+        tip_offset: In the frame of the body, shape (t, 3), m.
+        tip_force: Shape (t, 3), N, base frame; changed in place.
+        loaded: Whether forces at the tips count.
+        carriers: Body that has the link before each joint, -1 for the base, shape (n,).
+        directions: That link's unit vector in its frame, shape (n, 3).
+        groups: First and last + 1 row of each, and whether it has states, bends, inputs, loads, shape (G, 6).
+        laws: Addresses of value, slopes and account, shape (G, 3).
+        parameters: Shape (most parameters, K).
+        offset: Shape (K,).
+        arm_start: Where the row's arm begins among what follows, shape (K + 1,).
+        arm_at: Coordinates that a row acts on or measures, shape (arms,).
+        arm: Torque per force there, shape (arms,).
+        measure: dl/dq there, shape (arms,).
+        state: Index of each row's state in z, -1 without one, shape (K,).
+        channel: Index of its input from outside, -1 without one, shape (K,).
+        input_start: Where the terms of its input from earlier rows begin in ``terms``, shape (K + 1,).
+        load_start: Where those of its load begin, shape (K + 1,).
+        terms: Earlier rows, shape (terms,).
+        weights: Their weights, shape (terms,).
+        pins: The body whose pin the row is, -1 for none, shape (K,).
+        carried: One where a force at a tip passes the pin of a body, shape (t, n).
+        bend_start: Where the row's bends begin, shape (K + 1,).
+        bend_at: Coordinates that bend its path, shape (bends,).
+        bend: Curvature per |q| there, shape (bends,).
+        curvature_offset: Shape (K,).
+    """
+
+    parents: Indices
+    kinds: Indices
+    bodies: Matrix
+    charts: Indices
+    chart_frames: Layers
+    gravity: Vector
+    lumps: Vector
+    tip_body: Indices
+    tip_offset: Matrix
+    tip_force: Matrix
+    loaded: bool
+    carriers: Indices
+    directions: Matrix
+    groups: IndexTable
+    laws: IndexTable
+    parameters: Matrix
+    offset: Vector
+    arm_start: Indices
+    arm_at: Indices
+    arm: Vector
+    measure: Vector
+    state: Indices
+    channel: Indices
+    input_start: Indices
+    load_start: Indices
+    terms: Indices
+    weights: Vector
+    pins: Indices
+    carried: Matrix
+    bend_start: Indices
+    bend_at: Indices
+    bend: Vector
+    curvature_offset: Vector
+
+
+class Work(NamedTuple):
+    """Memory of one evaluation and its linearisation; never holds anything between calls.
+
+    Attributes:
+        rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
+        slopes: Derivatives of the laws, shape (SLOPES, K).
+        powers: Stored energy and powers of the rows, shape (1 + powers, K).
+        arm, measure: As in the tables, shape (arms,); those that depend on the posture are filled in.
+        pull: Total force on the pin of each row, shape (K, 3), N.
+        lever: The pin's link direction, shape (K, 3).
+        tip: Positions of the tips, shape (t, 3), m.
+        jacobian: Of the tips, shape (t, 3, N).
+        torque, external, bias, acceleration: Shape (N,).
+        command: Inputs, shape (u,).
+    """
+
+    rotation: Layers
+    origin: Matrix
+    frame: Matrix
+    centre: Vector
+    base_acceleration: Vector
+    spatial: Layers
+    inertia: Matrix
+    composite: Matrix
+    coriolis: Matrix
+    vectors: Matrix
+    square: Layers
+    rows: Matrix
+    slopes: Matrix
+    powers: Matrix
+    arm: Vector
+    measure: Vector
+    pull: Matrix
+    lever: Matrix
+    tip: Matrix
+    jacobian: Layers
+    torque: Vector
+    external: Vector
+    bias: Vector
+    acceleration: Vector
+    command: Vector
+
+
+class _Body(NamedTuple):
+    """One coordinate of a joint: whether it slides, and its axis in the frame of the joint."""
+
+    kind: int
+    axis: Array
+
+
+def build_tables(mechanism: Mechanism) -> Tables:
+    """Read a mechanism into arrays; Pinocchio's model is the source of the rigid body.
+
+    Raises:
+        InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
+    """
+    body, rows = mechanism.body, mechanism.rows
+    model, size = body.model, int(body.model.nv)
+    parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
+    bodies, charts, frames = np.zeros((size, BODY_COLUMNS)), [], []
+    # Of every joint of the model, the base first: its last body, and how that one's frame is turned.
+    last, turns = [-1], [np.eye(3)]
+    for joint in range(1, model.njoints):
+        parent, placement = int(model.parents[joint]), model.jointPlacements[joint]
+        above, rotation, translation = last[parent], turns[parent].T @ placement.rotation, placement.translation
+        translation, turn = turns[parent].T @ translation, np.eye(3)
+        chain = _coordinates(model, joint)
+        first = int(model.joints[joint].idx_v)
+        if len(chain) == 3 and chain[0].kind != PRISMATIC:
+            charts.append(first)
+            frames.append(rotation)
+        for i, part in enumerate(chain, start=first):
+            turned = _frame_along(part.axis)
+            parents[i], kinds[i] = above, part.kind
+            bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
+            bodies[i, TRANSLATION : TRANSLATION + 3] = translation
+            above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
+        inertia = model.inertias[joint]
+        bodies[above, MASS] = inertia.mass
+        bodies[above, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
+        moments = turn.T @ inertia.inertia @ turn
+        bodies[above, INERTIA : INERTIA + 6] = moments[np.triu_indices(3)]
+        last.append(above)
+        turns.append(turn)
+    joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
+    tips = [model.frames[tip] for tip in body.tips]
+    holders = [int(tip.parentJoint) for tip in tips]
+    carriers = [body.carriers[joint] for joint in joint_of]
+    count = sum(len(table.names) for table in rows)
+    ends = np.cumsum([0, *(len(table.names) for table in rows)])
+    first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
+    state = np.full(count, -1, dtype=np.int64)
+    parameters = np.zeros((max((len(table.law.parameters) for table in rows), default=0), count))
+    for table, own, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
+        parameters[: len(table.parameters), begin:end] = table.parameters
+        if table.law.scale is not None:
+            state[begin:end] = np.arange(own.start, own.stop)
+    terms: list[int] = []
+    weights: list[float] = []
+    starts: list[list[int]] = []
+    for wiring in ("inputs", "loads"):
+        starts.append([len(terms)])
+        for table in rows:
+            for k in range(len(table.names)):
+                for group, matrix in getattr(table, wiring).items():
+                    found = np.flatnonzero(matrix[k])
+                    terms.extend(first_row[group] + found)
+                    weights.extend(matrix[k, found])
+                starts[-1].append(len(terms))
+    none: list[Array] = [np.zeros((0, mechanism.coordinates))]
+
+    def stacked(name: str) -> Array:
+        return np.concatenate([*none, *(getattr(table, name) for table in rows)])
+
+    arm, measure, bends = stacked("arm"), stacked("measure"), stacked("bends")
+    arm_start, arm_rows, arm_at = _sparse((arm != 0.0) | (measure != 0.0))
+    bend_start, bend_rows, bend_at = _sparse(bends != 0.0)
+    return Tables(
+        parents=parents,
+        kinds=kinds,
+        bodies=bodies,
+        charts=np.array(charts, dtype=np.int64),
+        chart_frames=np.array(frames).reshape(-1, 3, 3),
+        gravity=np.array(model.gravity.linear),
+        lumps=mechanism.inertia,
+        tip_body=np.array([last[joint] for joint in holders], dtype=np.int64),
+        tip_offset=np.array(
+            [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
+        ).reshape(-1, 3),
+        tip_force=np.zeros((len(tips), 3)),
+        loaded=False,
+        carriers=np.array([last[joint] for joint in carriers], dtype=np.int64),
+        directions=np.array(
+            [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(carriers, joint_of, strict=True)]
+        ).reshape(-1, 3),
+        groups=np.array(
+            [
+                (
+                    begin,
+                    end,
+                    table.law.scale is not None,
+                    np.any(table.bends),
+                    bool(table.inputs) or np.any(table.channels >= 0),
+                    bool(table.loads),
+                )
+                for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
+            ],
+            dtype=np.int64,
+        ).reshape(-1, 6),
+        laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
+        parameters=parameters,
+        offset=np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
+        arm_start=arm_start,
+        arm_at=arm_at,
+        arm=arm[arm_rows, arm_at],
+        measure=measure[arm_rows, arm_at],
+        state=state,
+        channel=np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64),
+        input_start=np.array(starts[0], dtype=np.int64),
+        load_start=np.array(starts[1], dtype=np.int64),
+        terms=np.array(terms, dtype=np.int64),
+        weights=np.array(weights, dtype=float),
+        pins=np.concatenate([np.zeros(0), *(table.pins for table in rows)]).astype(np.int64),
+        carried=np.ascontiguousarray(body.supports[:, joint_of - 1]),
+        bend_start=bend_start,
+        bend_at=bend_at,
+        bend=bends[bend_rows, bend_at],
+        curvature_offset=np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
+    )
+
+
+def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
+    """Allocate the memory for tables whose rows follow some laws."""
+    size, count = len(tables.parents), len(tables.state)
+    width = size + len(tables.lumps)
+    tips = len(tables.tip_body)
+    columns, powers = widest(laws)
+    base = np.zeros(6)
+    base[3:] = -tables.gravity
+    rows = np.zeros((columns, count))
+    rows[CURVATURE] = tables.curvature_offset
+    return Work(
+        rotation=np.zeros((size, 3, 3)),
+        origin=np.zeros((size, 3)),
+        frame=np.zeros((3, 3)),
+        centre=np.zeros(3),
+        base_acceleration=base,
+        spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
+        inertia=np.zeros((size, 10)),
+        composite=np.zeros((size, 10)),
+        coriolis=np.zeros((size, 12)),
+        vectors=np.zeros((2, 6)),
+        square=np.zeros((SQUARE_LAYERS, size, size)),
+        rows=rows,
+        slopes=np.zeros((SLOPES, count)),
+        powers=np.zeros((powers, count)),
+        arm=tables.arm.copy(),
+        measure=tables.measure.copy(),
+        pull=np.zeros((count, 3)),
+        lever=np.zeros((count, 3)),
+        tip=np.zeros((tips, 3)),
+        jacobian=np.zeros((tips, 3, width)),
+        torque=np.zeros(width),
+        external=np.zeros(width),
+        bias=np.zeros(width),
+        acceleration=np.zeros(width),
+        command=np.zeros(channels),
+    )
+
+
+def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return where each row begins among the entries that are wanted, and the entries' rows and columns."""
+    rows, columns = np.nonzero(wanted)
+    return np.append(0, np.cumsum(wanted.sum(axis=1))), rows, np.ascontiguousarray(columns)
+
+
+def _coordinates(model: pin.Model, index: int) -> list[_Body]:
+    """Return the coordinates of a joint, each about or along an axis of its frame."""
+    joint = model.joints[index]
+    if joint.shortname() in FREE_JOINTS:
+        kind = PRISMATIC if joint.nq == joint.nv else 0
+        return [_Body(kind, axis) for axis in np.eye(3)]
+    data = joint.createData()
+    joint.calc(data, np.zeros(1) if joint.nq == 1 else pin.neutral(model), np.zeros(1))
+    subspace = np.asarray(data.S)[:, 0] if np.ndim(data.S) == 2 else np.asarray(data.S)
+    linear, angular = subspace[:3], subspace[3:]
+    if np.allclose(angular, 0.0):
+        return [_Body(PRISMATIC, linear)]
+    if np.allclose(linear, 0.0):
+        return [_Body(0, angular)]
+    raise InputError(f"joint {model.names[index]}", "must turn about or slide along a fixed axis", joint.shortname())
+
+
+def _frame_along(axis: Array) -> Array:
+    """Return a rotation whose third column is a unit axis."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(axis, first), axis])

@@ -1,0 +1,60 @@
+"""What a law is: how a row of the mechanism turns its motion, its state and its load into a force.
+
+The force acts along the row's arm: positive drives its length up. All functions of a law are pure functions of numbers
+or arrays; NumPy runs them as they are, and the compiler runs the same text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+
+class Row(NamedTuple):
+    """What a row sees: numbers, or arrays that broadcast.
+
+    Attributes:
+        length: l, along the path; excursion from a reference posture.
+        speed: l'.
+        state: z, the row's own state; 0 without one.
+        load: N, what earlier rows press it with.
+        command: u, its input, from the controller or an earlier row.
+        curvature: phi, the angle by which its path turns, rad.
+    """
+
+    length: Any
+    speed: Any
+    state: Any
+    load: Any
+    command: Any
+    curvature: Any
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law and what it shows.
+
+    Attributes:
+        name: For messages.
+        parameters: Names of the numbers that each row has; ``p`` holds them in this order.
+        value: (row, p) -> (force, z', *signals).
+        slopes: (row, p, signals) -> two tuples: derivatives of the force by l, l', z, z', N, u, phi, and of z' by l,
+            l', z, N, u, phi. That by z' is for a force that depends on the rate of the row's own state.
+        account: (row, p, force, z', signals) -> (stored energy, *supplied powers, *lost powers), J and W. Force times
+            speed is what is supplied less what is lost less the change of what is stored.
+        signals: Names of the further numbers that ``value`` returns.
+        supplies: Names of the powers that come in.
+        losses: Names of the powers that are lost.
+        scale: Typical magnitude of the state, for absolute tolerances; None for a law without a state, whose z' is 0.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    value: Callable[..., Any]
+    slopes: Callable[..., Any]
+    account: Callable[..., Any]
+    signals: tuple[str, ...] = ()
+    supplies: tuple[str, ...] = ()
+    losses: tuple[str, ...] = ()
+    scale: float | None = None

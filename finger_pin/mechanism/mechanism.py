@@ -1,0 +1,182 @@
+"""The model as coordinates and rows, and its evaluation: (18) for any mechanism.
+
+    M(q) v' + h(q, v) = sum_k A_k(q)^T phi_k + J^T F,       q' = E(q) v
+    (phi_k, z_k') = law_k(l_k, l_k', z_k, N_k, u_k, curvature_k)
+
+Coordinates are everything that has inertia: the joints of the tree, then lumps, which move along a line of their own
+(the mass of a passive tendon, a rotor). Rows are everything that exerts force. The packed state is
+
+    | q | v | z |
+
+with the states z of the rows in the order of their tables. q and v have the same size N, but for a spherical joint,
+whose four numbers in q are a unit quaternion (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.description.routing import Array
+from finger_pin.laws.law import Row
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rows import Rows, RowSignals
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Everything at one state or at many; leading dimensions are kept.
+
+    Attributes:
+        rows: What the rows do, by table.
+        torque: Sum of A^T phi, shape (..., N).
+        external: J^T F, shape (..., N).
+        acceleration: v', shape (..., N).
+        rate: Time derivative of the packed state, shape (..., size).
+    """
+
+    rows: dict[str, RowSignals]
+    torque: Array
+    external: Array
+    acceleration: Array
+    rate: Array
+
+
+class Mechanism:
+    """Coordinates and rows.
+
+    Attributes:
+        body: The tree of rigid bodies; its joints are the first coordinates.
+        lumps: Names of the further coordinates.
+        inertia: Of the lumps, shape (l,), kg or kg m2.
+        rows: The tables, in the order of evaluation.
+        states: For every table the range of its states in z.
+        channels: Number of inputs from outside.
+    """
+
+    def __init__(
+        self, body: RigidBody, rows: Sequence[Rows], lumps: Sequence[str] = (), inertia: Array | None = None
+    ) -> None:
+        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps."""
+        self.body = body
+        self.lumps = tuple(lumps)
+        self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
+        self.rows = tuple(rows)
+        self.channels = max((int(table.channels.max(initial=-1)) + 1 for table in self.rows), default=0)
+        self.states: list[slice] = []
+        end = 0
+        for table in self.rows:
+            begin, end = end, end + (0 if table.law.scale is None else len(table.names))
+            self.states.append(slice(begin, end))
+        self.state_count = end
+
+    @property
+    def coordinates(self) -> int:
+        """Number N of coordinates."""
+        return int(self.body.model.nv) + len(self.lumps)
+
+    @property
+    def positions(self) -> int:
+        """Length of q."""
+        return int(self.body.model.nq) + len(self.lumps)
+
+    @property
+    def size(self) -> int:
+        """Length of the packed state."""
+        return self.positions + self.coordinates + self.state_count
+
+    def split(self, x: Array) -> tuple[Array, Array, Array]:
+        """Return q, v and z of packed states, shape (..., size).
+
+        Raises:
+            ValueError: If the last dimension has the wrong size.
+        """
+        if x.shape[-1] != self.size:
+            raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
+        end = self.positions + self.coordinates
+        return x[..., : self.positions], x[..., self.positions : end], x[..., end:]
+
+    def linear_positions(self, q: Array) -> Array:
+        """Return q as numbers that arms multiply, shape (..., N): zero for joints with a quaternion."""
+        model = self.body.model
+        if model.nq == model.nv:
+            return q
+        linear = np.zeros((*q.shape[:-1], self.coordinates))
+        for joint in model.joints[1:]:
+            if joint.nq == joint.nv:
+                linear[..., joint.idx_v : joint.idx_v + joint.nv] = q[..., joint.idx_q : joint.idx_q + joint.nq]
+        linear[..., model.nv :] = q[..., model.nq :]
+        return linear
+
+    def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
+        """Return everything at packed states.
+
+        Args:
+            x: Shape (size,) or (m, size).
+            command: Inputs u, shape (channels,) or (m, channels).
+            force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
+        """
+        q, v, z = self.split(x)
+        joints, turning = int(self.body.model.nv), q[..., : self.body.model.nq]
+        linear, lead = self.linear_positions(q), x.shape[:-1]
+        tips = len(self.body.tips)
+        pressed = force is not None and bool(np.any(force))
+        forces = np.zeros((*lead, tips, 3))
+        if pressed:
+            given = np.asarray(force, dtype=float)
+            forces[...] = given[..., None, :] if tips == 1 else given
+        command = np.asarray(command, dtype=float)
+        found: dict[str, RowSignals] = {}
+        torque = np.zeros((*lead, self.coordinates))
+        for table, part in zip(self.rows, self.states, strict=True):
+            row = Row(
+                length=linear @ table.measure.T + table.offset,
+                speed=v @ table.arm.T,
+                state=z[..., part] if table.law.scale is not None else np.zeros((*lead, len(table.names))),
+                load=self._load(table, found, turning, forces if pressed else None),
+                command=self._input(table, found, command, lead),
+                curvature=np.abs(linear) @ table.bends.T + table.curvature_offset,
+            )
+            exerted, rate, *signals = table.law.value(row, table.parameters)
+            found[table.group] = RowSignals(table, row, exerted, rate, tuple(signals))
+            torque = torque + exerted @ table.arm
+        external = np.zeros_like(torque)
+        if pressed:
+            external[..., :joints] = self.body.external_torque(turning, forces)
+        net = torque + external
+        acceleration = np.concatenate(
+            [self.body.forward_dynamics(turning, v[..., :joints], net[..., :joints]), net[..., joints:] / self.inertia],
+            axis=-1,
+        )
+        moving = self.body.position_rate(turning, v[..., :joints])
+        rates = [found[t.group].rate for t in self.rows if t.law.scale is not None]
+        return Evaluation(
+            rows=found,
+            torque=torque,
+            external=external,
+            acceleration=acceleration,
+            rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
+        )
+
+    def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
+        total = np.zeros((*lead, len(table.names)))
+        wired = table.channels >= 0
+        if wired.any():
+            total[..., wired] = command[..., table.channels[wired]]
+        for group, weights in table.inputs.items():
+            total = total + found[group].force @ weights.T
+        return total
+
+    def _load(self, table: Rows, found: dict[str, RowSignals], q: Array, forces: Array | None) -> Array:
+        """Return N: the magnitude of what earlier rows add up to, or of -e S + F for the pins of joints (17)."""
+        load = np.zeros((*q.shape[:-1], len(table.names)))
+        for group, weights in table.loads.items():
+            load = load + found[group].force @ weights.T
+        if forces is None or not (table.pins >= 0).any():
+            return np.abs(load)
+        directions = self.body.link_directions(q)[..., table.pins, :]
+        beyond = self.body.supports[:, table.pins].T @ forces
+        total: Array = beyond - load[..., None] * directions
+        return np.asarray(np.sqrt(np.sum(total * total, axis=-1)))

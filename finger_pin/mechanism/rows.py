@@ -1,0 +1,124 @@
+"""Rows: everything that exerts force, as tables. The wiring of (18) is what they hold.
+
+A row acts along its arm, tau = arm^T phi. What it sees is linear in earlier rows: its input and its load are sums of
+their forces. Rows that share a law stand together in one table, and tables stand in the order in which they are
+evaluated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.laws.law import Law, Row
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A table of rows that share a law; k rows, N coordinates.
+
+    Attributes:
+        group: Name of the table, by which later ones refer to it.
+        law: The law.
+        names: Names of the rows.
+        parameters: The law's numbers, shape (len(law.parameters), k).
+        arm: Shape (k, N), torque per force.
+        measure: dl/dq, shape (k, N), for rows whose length is not measured along their arm; by default the arm.
+        offset: Length at q = 0, shape (k,).
+        channels: For rows with an input from outside, its indices, shape (k,); -1 for none.
+        inputs: By group of earlier rows, weights of shape (k, rows there) with which their forces are the input.
+        loads: By group of earlier rows, weights of shape (k, rows there) with which their forces are the load.
+        pins: For rows that are loaded as the pin of a joint (17), the joint's index, shape (k,): the load pulls along
+            the link before the joint, and forces at the tips beyond it add.
+        bends: Shape (k, N), how much |q| adds to the curvature (15).
+        curvature_offset: Shape (k,), rad.
+        stored: Name of the energy that the rows store; by default the group's.
+        powers: Names of the law's powers, supplies first; by default the group's name and the law's.
+    """
+
+    group: str
+    law: Law
+    names: tuple[str, ...]
+    parameters: Array
+    arm: Array
+    # What is left out is filled in below.
+    measure: Array = None  # type: ignore[assignment]
+    offset: Array = None  # type: ignore[assignment]
+    channels: NDArray[np.int64] = None  # type: ignore[assignment]
+    inputs: Mapping[str, Array] = field(default_factory=dict)
+    loads: Mapping[str, Array] = field(default_factory=dict)
+    pins: NDArray[np.int64] = None  # type: ignore[assignment]
+    bends: Array = None  # type: ignore[assignment]
+    curvature_offset: Array = None  # type: ignore[assignment]
+    stored: str = ""
+    powers: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Fill in what was left out, and check the sizes."""
+        count, width = len(self.names), np.shape(self.arm)[-1]
+        powers = (*self.law.supplies, *self.law.losses)
+        shapes: dict[str, tuple[Any, tuple[int, ...], Any]] = {
+            "parameters": (self.parameters, (len(self.law.parameters), count), None),
+            "arm": (self.arm, (count, width), None),
+            "measure": (self.measure, (count, width), self.arm),
+            "offset": (self.offset, (count,), np.zeros(count)),
+            "channels": (self.channels, (count,), np.full(count, -1)),
+            "pins": (self.pins, (count,), np.full(count, -1)),
+            "bends": (self.bends, (count, width), np.zeros((count, width))),
+            "curvature_offset": (self.curvature_offset, (count,), np.zeros(count)),
+        }
+        for name, (value, shape, default) in shapes.items():
+            array = np.asarray(default if value is None else value)
+            if array.shape != shape:
+                raise InputError(f"rows.{self.group}.{name}", f"must have shape {shape}, not {array.shape}")
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "stored", self.stored or self.group)
+        object.__setattr__(self, "powers", self.powers or tuple(f"{self.group}_{name}" for name in powers))
+        if len(self.powers) != len(powers):
+            raise InputError(f"rows.{self.group}.powers", f"must name {', '.join(powers)}", list(self.powers))
+
+    def signal(self, name: str) -> int:
+        """Return the index of a signal of the law by its name."""
+        return self.law.signals.index(name)
+
+
+@dataclass(frozen=True, eq=False)
+class RowSignals:
+    """What the rows of one table do; every array has shape (..., k).
+
+    Attributes:
+        rows: The table.
+        row: What they see.
+        force: phi.
+        rate: z'.
+        signals: What the law shows, in its order.
+    """
+
+    rows: Rows
+    row: Row
+    force: Array
+    rate: Array
+    signals: tuple[Array, ...]
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a signal of the law by its name."""
+        return self.signals[self.rows.signal(name)]
+
+    def account(self) -> tuple[Array, dict[str, Array]]:
+        """Return the stored energy of all rows together, J, and their powers by the names of the table, W."""
+        rows = self.rows
+        stored, *powers = rows.law.account(self.row, rows.parameters, self.force, self.rate, self.signals)
+        return np.sum(stored, axis=-1), {
+            name: np.sum(power, axis=-1) for name, power in zip(rows.powers, powers, strict=True)
+        }
+
+
+def further_states(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
+    """Return name and scale of every state of tables of rows."""
+    return tuple((f"{t.group}[{n}]", t.law.scale) for t in rows if t.law.scale is not None for n in t.names)
