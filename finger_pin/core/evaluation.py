@@ -29,11 +29,15 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self._charts = Charts.of(mechanism)
         tables = build_tables(mechanism)
-        work = build_work(tables, [table.law for table in mechanism.rows], mechanism.channels)
+        laws = [table.law for table in mechanism.rows]
         control = held_control(mechanism.channels, mechanism.coordinates)
         linear = build_linear(tables)
         # Blocks hold addresses: what they were made of lives as long as they do.
-        self._models = [Model(tables._replace(loaded=loaded), control, work, linear) for loaded in (False, True)]
+        # Each has work of its own: without loads, nothing writes where loads have left their torques.
+        self._models = [
+            Model(tables._replace(loaded=loaded), control, build_work(tables, laws, mechanism.channels), linear)
+            for loaded in (False, True)
+        ]
         self._blocks = [block_for(MODEL) for _ in self._models]
         for model, block in zip(self._models, self._blocks, strict=True):
             bind(model, block)
