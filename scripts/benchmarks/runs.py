@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from finger_pin.core.plant import build_work
 
 import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import build_control
 from finger_pin.core.compilation import entry
-from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.dynamics import evaluate
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
-from finger_pin.core.plant import build_work
 from finger_pin.core.textbook import integrate
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger

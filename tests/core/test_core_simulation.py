@@ -7,7 +7,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.proportional import ControlSignals, ProportionalController
-from finger_pin.core.integrator import TABLEAUS
+from finger_pin.core.stepper import TABLEAUS
 from finger_pin.exceptions import IntegrationError, Interrupted
 from finger_pin.simulation.energy import Powers
 
@@ -213,9 +213,9 @@ def test_the_same_simulation_twice_gives_the_same_bits(scenarios, period):
 def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_computed(scenarios, monkeypatch):
     """Whatever the reason: here the integrator is told that its steps have become too short."""
     from finger_pin.core import rosenbrock
-    from finger_pin.core.integrator import Stepper
+    from finger_pin.core.stepper import Part
 
-    advance = Stepper.advance
+    advance = Part.advance
 
     def failing(self, end, record=None):
         status, steps = advance(self, end, record)
@@ -224,7 +224,7 @@ def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_c
             return rosenbrock.UNDERFLOW, steps
         return status, steps
 
-    monkeypatch.setattr(Stepper, "advance", failing)
+    monkeypatch.setattr(Part, "advance", failing)
     with pytest.raises(IntegrationError) as caught:
         run(scenarios["fig6"], duration=1.0)
     monkeypatch.undo()
