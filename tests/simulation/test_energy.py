@@ -13,6 +13,7 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import integrate
 from finger_pin.description.scenario import METHODS
 from finger_pin.laws import capstan
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.simulation.account import account
 from finger_pin.simulation.energy import Energies, Powers, energies, powers
@@ -302,13 +303,13 @@ def wrong_stiction_rate(loop, monkeypatch):
 
 
 def wrong_gravity(loop, monkeypatch):
-    original = RigidBody.kinematics
+    original = Finger.motion
 
     def flipped(*arguments):
         found = original(*arguments)
         return replace(found, potential_energy=-found.potential_energy)
 
-    monkeypatch.setattr(RigidBody, "kinematics", flipped)
+    monkeypatch.setattr(Finger, "motion", flipped)
 
 
 def wrong_external_torque(loop, monkeypatch):
