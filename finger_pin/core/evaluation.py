@@ -64,16 +64,18 @@ class CompiledMechanism:
         for part in parts:
             if len(tables.charts):
                 place_all(tables, attitudes[part][0])
+            filled = np.ascontiguousarray(rows[:, part])
             evaluate_many(
                 block,
                 states[part],
                 commands[part],
                 forces[part],
                 rates[part],
-                rows[:, part] if len(parts) == 1 else rows[:, part].copy(),
+                filled,
                 torques[part],
                 externals[part],
             )
+            rows[:, part] = filled
         return self._evaluation(np.ndim(x) == 1, packed, rates, rows, torques, externals)
 
     def _evaluation(
@@ -84,6 +86,10 @@ class CompiledMechanism:
         rate = rates
         if mechanism.positions != width:
             q, v, _ = mechanism.split(packed)
+            for i in self._charts.angles:
+                # From the second derivatives of the angles to the angular acceleration.
+                x, y, z = v[:, i], v[:, i + 1], v[:, i + 2]
+                acceleration[:, i : i + 3] += np.stack([y * z, -x * z, x * y], axis=1)
             moving = mechanism.body.position_rate(q[:, : mechanism.body.model.nq], v[:, :joints])
             rate = np.concatenate([moving, v[:, joints:], rates[:, width:]], axis=1)
         at = 0 if single else slice(None)
