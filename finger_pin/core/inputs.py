@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 from finger_pin.core.binding import Indices, Layers, Matrix, Vector
 from finger_pin.core.compilation import compiled
 from finger_pin.core.law_code import inlined
+from finger_pin.core.trigonometry import sine_cosine
 from finger_pin.description.routing import Array
 from finger_pin.laws import controller as controller_laws
-from finger_pin.laws import harmonic as harmonic_laws
 
 HELD, PLANNED, SCHEDULED = range(3)
 
-_harmonic = inlined(harmonic_laws.harmonic)
-_harmonic_rate = inlined(harmonic_laws.harmonic_rate)
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
 
@@ -197,7 +195,7 @@ def signal_values(signal: Any, time: float, out: Any) -> None:
     for j in range(table.shape[0]):
         out[j] = table[j, 0]
         if table[j, 1] != 0.0:
-            out[j] = _harmonic(time, table[j, 0], table[j, 1], table[j, 2], table[j, 3])
+            out[j] += table[j, 1] * sine_cosine(2.0 * np.pi * table[j, 2] * time + table[j, 3])[0]
     if signal.knots.size > 0:
         piece, since = _piece(signal, time)
         for j in range(table.shape[0]):
@@ -214,7 +212,8 @@ def signal_rates(signal: Any, time: float, out: Any) -> None:
     for j in range(table.shape[0]):
         out[j] = 0.0
         if table[j, 1] != 0.0:
-            out[j] = _harmonic_rate(time, table[j, 1], table[j, 2], table[j, 3])
+            circular = 2.0 * np.pi * table[j, 2]
+            out[j] = table[j, 1] * circular * sine_cosine(circular * time + table[j, 3])[1]
     if knots.size > 0 and knots[0] <= time <= knots[knots.size - 1]:
         piece, since = _piece(signal, time)
         degree = signal.coefficients.shape[0] - 1
