@@ -44,16 +44,24 @@ def plot_critical_friction(finger: FingerDescription) -> Figure:
 
 @styled
 def plot_self_locking_map(found: SelfLockingMap) -> Figure:
-    """Draw a map over two joints: the tension that slow motion needs, and the critical coefficient.
+    """Draw a map over one or two joints: the tension that slow motion needs, and the critical coefficient.
+
+    What is the same at every posture is said in a line instead.
 
     Args:
         found: What `self_locking_map` returned.
     """
-    figure = new_figure(11.0, 4.6, "constrained")
-    left, right = figure.subplots(1, 2)
-    _map(figure, left, found, found.tension, "largest tension (N)", "(a) tension that slow motion needs, N")
-    title = f"(b) critical coefficient, mm; the finger has {_MILLI * found.actual:.3g} mm"
-    _map(figure, right, found, _MILLI * found.coefficient, "critical coefficient (mm)", title)
+    coefficient = _MILLI * found.coefficient
+    panels = [(found.tension, "largest tension (N)", "tension that slow motion needs")]
+    note = f"critical coefficient {coefficient.flat[0]:.3g} mm at every posture"
+    if np.ptp(found.coefficient) > 1e-6 * np.max(found.coefficient):
+        panels.append((coefficient, "critical coefficient (mm)", "joint friction at which it locks"))
+        note = f"critical coefficient from {coefficient.min():.3g} to {coefficient.max():.3g} mm"
+    figure = new_figure(5.8 * len(panels), 4.8, "constrained")
+    figure.suptitle(f"{note}; the finger has {_MILLI * found.actual:.3g} mm", x=0.02, ha="left", fontsize=10.5)
+    for axes, (values, label, title) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        axes.set_title(title)
+        _map(figure, axes, found, values, label)
     return figure
 
 
@@ -81,20 +89,22 @@ def plot_runaway(results: dict[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _map(figure: Figure, axes: Axes, found: SelfLockingMap, values: Array, label: str, title: str) -> None:
-    first, second = np.rad2deg(found.first), np.rad2deg(found.second)
-    axes.set_title(title)
+def _map(figure: Figure, axes: Axes, found: SelfLockingMap, values: Array, label: str) -> None:
+    angles = [np.rad2deg(each) for each in found.angles]
+    shown = np.ma.masked_invalid(values)
     axes.set_xlabel(f"{found.joints[0]} (deg)")
-    axes.set_ylabel(f"{found.joints[1]} (deg)")
-    axes.grid(visible=False)
-    finite = values[np.isfinite(values)]
-    if not finite.size:
+    if not shown.count():
+        axes.set(xlim=angles[0][[0, -1]], yticks=[])
         axes.text(0.5, 0.5, "locked everywhere", transform=axes.transAxes, ha="center", color=GREY)
-    elif np.ptp(finite) <= 1e-6 * np.max(np.abs(finite)) and finite.size == values.size:
-        axes.set_xlim(first[0], first[-1])
-        axes.set_ylim(second[0], second[-1])
-        text = f"{finite.flat[0]:.3f} at every posture:\nno joint bends the canal of a passive tendon"
-        axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
+    elif len(angles) == 1:
+        axes.plot(angles[0], shown, color=BLUE)
+        axes.set_ylabel(label)
+        axes.margins(x=0.0)
     else:
-        drawn = axes.contourf(first, second, np.ma.masked_invalid(values).T, levels=12, cmap="cividis")
+        axes.grid(visible=False)
+        axes.set_ylabel(f"{found.joints[1]} (deg)")
+        drawn = axes.contourf(*angles, shown.T, levels=12, cmap="cividis")
         figure.colorbar(drawn, ax=axes, label=label)
+        if shown.count() < values.size:
+            axes.set_facecolor("#DDDDDD")
+            axes.text(0.02, 0.02, "grey: locked", transform=axes.transAxes)
