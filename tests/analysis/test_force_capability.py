@@ -178,7 +178,7 @@ def test_a_push_at_a_joint_s_axis_is_no_stronger_than_those_that_pass_it_on_eith
     for side in (1.0, -1.0):
         towards = side * np.array([-lever[2], 0.0, lever[0]]) / np.linalg.norm(lever)
         at, *beside = (
-            largest_force(finger, theta, towards + 0.02 * shift * lever / np.linalg.norm(lever), 20.0,
+            largest_force(finger, theta, towards + 0.01 * shift * lever / np.linalg.norm(lever), 20.0,
                           friction=Friction.HINDERING)
             for shift in (0.0, 1.0, -1.0)
         )  # fmt: skip

@@ -127,7 +127,7 @@ class LiveView(Viewing):
     def __init__(
         self, description: FingerDescription, *, title: str = "", open_browser: bool = True, rate: float = 30.0
     ) -> None:
-        """Serve the page; frames come with `update`.
+        """Serve the page and print its address; frames come with `update`.
 
         Args:
             description: The finger.
@@ -138,7 +138,7 @@ class LiveView(Viewing):
         self._scene = Scene(description)
         self._interval = 1.0 / rate
         self._due = -np.inf
-        self._started = np.inf
+        self._started = -np.inf
         self._pending: tuple[float, Array, Array, Array | None] | None = None
         limits = np.array([joint.range for joint in description.joints.values()]).clip(-np.pi, np.pi)
         # The camera must see all of the range: poses with the joints bent alike, and every combination of the first
@@ -149,6 +149,7 @@ class LiveView(Viewing):
         reach = np.concatenate([alike, combined])
         header = self._scene.header(title or description.title or description.name, reach, LIVE_TENSION, live=True)
         super().__init__(PageServer(render(header), live=True))
+        print(f"The finger moves at {self.url}", flush=True)
         if open_browser:
             webbrowser.open(self.url, new=2)
 
@@ -183,8 +184,9 @@ class LiveView(Viewing):
             signals: All signals then.
         """
         now = time.monotonic()
-        self._started = min(self._started, now - t)
-        time.sleep(max(0.0, self._started + t - now))
+        # A simulation that has fallen behind does not catch up: it goes on from there in real time.
+        self._started = max(self._started, now - t)
+        time.sleep(self._started + t - now)
         strands = signals.finger.tendons.strands
         actuated = signals.finger.command.size
         tension = np.concatenate([strands[:actuated], strands[actuated + 1 :: 2]])

@@ -8,6 +8,7 @@ import socket
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -100,6 +101,35 @@ def test_a_live_view_is_throttled_and_shows_the_last_state():
     assert "event: end" in streamed[0]
     last = np.frombuffer(base64.b64decode(json.loads(frames[-1])["joint"]), "<f4")
     assert last == pytest.approx(joint_position(1.0), abs=1e-6)
+
+
+class Clock:
+    """Time that passes when somebody sleeps or computes."""
+
+    def __init__(self):
+        self.now = 1000.0
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, duration):
+        assert duration >= 0.0
+        self.now += duration
+
+
+def test_a_simulation_that_is_watched_is_never_ahead_of_real_time(monkeypatch, capsys, finger):
+    clock = Clock()
+    monkeypatch.setattr("finger_pin.views.viewer.serving.time", clock)
+    signals = finger.evaluate(finger.rest_state(joint_position(0.0)), np.ones(4))
+    seen = []
+    with LiveView(finger.description, open_browser=False) as live:
+        assert live.url in capsys.readouterr().out
+        # The step from 0.5 s on takes 2 s to compute; the others take a hundredth of what they simulate.
+        for t, work in ((0.0, 0.0), (0.25, 0.0025), (0.5, 0.0025), (0.75, 2.0), (1.0, 0.0025), (1.5, 0.005)):
+            clock.now += work
+            live.observe(t, SimpleNamespace(finger=signals))
+            seen.append(clock.now - 1000.0)
+    np.testing.assert_allclose(seen, [0.0, 0.25, 0.5, 2.5, 2.75, 3.25])
 
 
 def test_a_live_view_refuses_tensions_of_another_finger():
