@@ -106,8 +106,7 @@ def test_a_live_view_is_throttled_and_shows_the_last_state():
 class Clock:
     """Time that passes when somebody sleeps or computes."""
 
-    def __init__(self):
-        self.now = 1000.0
+    now = 1000.0
 
     def monotonic(self):
         return self.now
