@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -51,22 +52,10 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces:
 
 def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None) -> str:
     """Return the page that plays a result, with a set of fingertip forces if given."""
-    scenario = _scenario(result)
-    scene = Scene(FingerDescription.model_validate(scenario["finger"]))
-    time = _variable(result, "time")
-    if len(time) == 0:
-        raise InputError("result.time", "must have at least one sample")
-    frames = _frame_indices(time)
-    time = time[frames]
-    position = _variable(result, "joint_position")[frames]
-    tension = strand_tensions(scene, result, frames)
-    for name, values in (("joint_position", position), ("tendon_tension", tension)):
-        if not np.isfinite(values).all():
-            raise InputError(f"result.{name}", "must be finite")
-    in_view = position[:: max(1, len(position) // _POSITIONS_IN_VIEW)]
-    title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
-    header = scene.header(title, in_view, float(tension.max()), live=False, forces=forces)
-    return render({**header, "chunks": [scene.chunk(time, position, tension)]})
+    motion = Motion.of(result)
+    in_view = motion.position[:: max(1, len(motion.time) // _POSITIONS_IN_VIEW)]
+    header = motion.scene.header(motion.title, in_view, motion.largest, live=False, forces=forces)
+    return render({**header, "chunks": [motion.scene.chunk(motion.time, motion.position, motion.tension)]})
 
 
 def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
@@ -85,11 +74,57 @@ def posture_page(description: FingerDescription, forces: ForcePolytope, strands:
     return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
 
 
-def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
-    """Return the tension of every strand at some samples of a result, shape (m, s), N.
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What of a result is shown: the frames of a film.
 
-    The proximal half of a passive tendon has the result's ``passive_tension_proximal``.
+    Attributes:
+        scene: The finger, prepared for drawing.
+        title: Of the scenario or the finger.
+        time: Shape (m,), s: samples of the result.
+        position: theta, shape (m, n), rad.
+        tension: Of every strand, shape (m, s), N.
     """
+
+    scene: Scene
+    title: str
+    time: Array
+    position: Array
+    tension: Array
+
+    @property
+    def largest(self) -> float:
+        """Largest tension of all, N."""
+        return float(self.tension.max())
+
+    @classmethod
+    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE) -> Motion:
+        """Choose the frames of a result.
+
+        Args:
+            result: What `simulate` returned or saved.
+            rate: Frames per second of motion, two at least; fewer where the motion is long or the result has fewer samples.
+
+        Raises:
+            InputError: If the result lacks something that is shown.
+        """
+        scenario = _scenario(result)
+        scene = Scene(FingerDescription.model_validate(scenario["finger"]))
+        time = _variable(result, "time")
+        if len(time) == 0:
+            raise InputError("result.time", "must have at least one sample")
+        frames = _frame_indices(time, rate)
+        position = _variable(result, "joint_position")[frames]
+        tension = _strand_tensions(scene, result, frames)
+        for name, values in (("joint_position", position), ("tendon_tension", tension)):
+            if not np.isfinite(values).all():
+                raise InputError(f"result.{name}", "must be finite")
+        title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
+        return cls(scene, title, time[frames], position, tension)
+
+
+def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
+    # The proximal half of a passive tendon has the result's `passive_tension_proximal`.
     description = scene.geometry.description
     tension = _variable(result, "tendon_tension")[frames]
     actuated, passive = len(description.actuated_names), len(description.passive_names)
@@ -101,9 +136,9 @@ def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
     return np.concatenate([tension[:, :actuated], halves], axis=1)
 
 
-def _frame_indices(time: Array) -> Indices:
+def _frame_indices(time: Array, rate: float) -> Indices:
     # Samples as they are, none between them: a frame shows what was computed.
-    wanted = int(np.clip(round((time[-1] - time[0]) * FRAME_RATE) + 1, 1, MOST_FRAMES))
+    wanted = int(np.clip(round((time[-1] - time[0]) * rate) + 1, 2, MOST_FRAMES))
     return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
 
 

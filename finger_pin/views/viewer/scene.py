@@ -35,12 +35,15 @@ class Scene:
     Attributes:
         geometry: Its tendons in space.
         strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
+        urdf: The finger's URDF, as text.
+        tube_radius: Of the tubes that are drawn for tendons, m.
+        tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots.
     """
 
     def __init__(self, description: FingerDescription) -> None:
         """Prepare solids and tendons."""
         self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
-        self._urdf = to_urdf(description)
+        self.urdf = to_urdf(description)
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self.strands = (*description.actuated_names, *halves)
         links = [joint.link for joint in description.joints.values() if joint.link is not None]
@@ -48,6 +51,10 @@ class Scene:
         size = self._size = BASE_LEAD * links[0].width + sum(link.length for link in links)
         # Points travel as 16-bit integers; this is their unit, a few micrometres.
         self._quantum = 1.5 * size / _LARGEST
+        self.tube_radius = min(_TUBE_IN_LANE * self.geometry.lanes.spacing, _TUBE_IN_LINK * min(self._widths))
+        self.tendons = [
+            self._tendon(path.name, path.distal.tolist()) for path in self.geometry.paths(np.zeros(len(links)))
+        ]
         self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
     def header(
@@ -68,8 +75,7 @@ class Scene:
             live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
         """
-        geometry, widths = self.geometry, self._widths
-        tube = min(_TUBE_IN_LANE * geometry.lanes.spacing, _TUBE_IN_LINK * min(widths))
+        geometry, tube = self.geometry, self.tube_radius
         poses = geometry.poses(joint_positions)
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self._view()
@@ -82,18 +88,18 @@ class Scene:
         return {
             "title": title,
             "live": live,
-            "commands": [root_command(turn), *solid_commands(geometry, self._urdf, tube), *drawn],
+            "commands": [root_command(turn), *solid_commands(geometry, self.urdf, tube), *drawn],
             "forces": shown.note if shown is not None else "",
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
             "strands": list(self.strands),
-            "tendons": [self._tendon(path.name, path.distal.tolist()) for path in paths],
+            "tendons": self.tendons,
             "tubeRadius": tube,
             "quantum": self._quantum,
             "grid": self._grid,
             "inView": np.round(_outermost(corners), 5).tolist(),
-            "margin": 0.55 * max(widths),
-            "tensionScale": _scale_above(largest_tension),
+            "margin": 0.55 * max(self._widths),
+            "tensionScale": scale_above(largest_tension),
             "slackTension": SLACK_TENSION,
             "chunks": [],
         }
@@ -108,8 +114,7 @@ class Scene:
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q)
-        loose = np.clip(1.0 - self._per_tendon(f) / SLACK_TENSION, 0.0, 1.0)
-        paths = np.concatenate([path.points for path in self.geometry.paths(q, loose, poses)], axis=-2)
+        paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
         quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
         return {
             "time": _encode(time, "<f8"),
@@ -129,12 +134,14 @@ class Scene:
         offset = np.array(self._tip_placement.translation)
         return np.asarray(poses.rotation[..., -1, :, :] @ offset + poses.translation[..., -1, :])
 
-    def _per_tendon(self, strand_tension: Array) -> Array:
+    def looseness(self, strand_tension: Array) -> Array:
+        """Return how loose tendons are drawn, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""
         # A passive tendon is drawn loose when both its halves are.
         actuated = len(self.geometry.description.actuated_names)
         passive = strand_tension[..., actuated:]
         halves = passive.reshape(*passive.shape[:-1], -1, 2)
-        return np.concatenate([strand_tension[..., :actuated], halves.max(axis=-1)], axis=-1)
+        tension = np.concatenate([strand_tension[..., :actuated], halves.max(axis=-1)], axis=-1)
+        return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
 
     def _tendon(self, name: str, distal: Sequence[bool]) -> dict[str, Any]:
         description, last = self.geometry.description, len(distal) - 1
@@ -167,8 +174,9 @@ def _outermost(points: Array) -> Array:
     return np.asarray(points[np.unique(np.argmax(points @ fan, axis=0))])
 
 
-def _scale_above(tension: float) -> float:
-    # The upper end of the legend: its quarters are short numbers. The page goes on in the same steps.
+def scale_above(tension: float) -> float:
+    """Return the upper end of a legend of tensions, N: its quarters are short numbers."""
+    # The page goes on in the same steps.
     if not tension > 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(tension))

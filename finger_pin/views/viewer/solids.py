@@ -56,7 +56,7 @@ def solid_commands(geometry: TendonGeometry, urdf: str, tube_radius: float) -> I
 
 def root_command(rotation: Array) -> Command:
     """Return meshcat's ``set_transform`` command that turns the base frame into the frame of the scene."""
-    return {"type": "set_transform", "path": ROOT, "matrix": _matrix(rotation, np.zeros(3))}
+    return {"type": "set_transform", "path": ROOT, "matrix": placed(rotation, np.zeros(3))}
 
 
 def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
@@ -99,7 +99,7 @@ def _mesh(
         "type": "Mesh",
         "geometry": f"{path}:geometry",
         "material": material["uuid"],
-        "matrix": _matrix(rotation, translation),
+        "matrix": placed(rotation, translation),
     }
     return {
         "type": "set_object",
@@ -113,7 +113,8 @@ def _mesh(
     }
 
 
-def _matrix(rotation: Array, translation: Array) -> list[float]:
+def placed(rotation: Array, translation: Array) -> list[float]:
+    """Return a pose as meshcat has it: 16 numbers, column by column."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
     return [float(entry) for entry in matrix.T.ravel()]
