@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.directions import directions_of_motion
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
@@ -16,8 +17,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 
-@dataclass(frozen=True, eq=False)
-class SelfLockingMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class SelfLockingMap(Finding):
     """Critical coefficients over the angles of two joints, or of one where no other is free.
 
     Attributes:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.spatial
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -21,7 +22,7 @@ _NEW = 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ForcePolytope:
+class ForcePolytope(Finding):
     """The forces that a fingertip can exert, in the directions that its joints can move it.
 
     Attributes:
@@ -45,12 +46,6 @@ class ForcePolytope:
     faces: Any
     normals: Array
     offsets: Array
-
-    def __repr__(self) -> str:
-        """Return size and shape in a line."""
-        kind = ("a point", "a line", "a polygon", "a body")[self.basis.shape[1]]
-        largest = np.max(np.linalg.norm(self.vertices, axis=1))
-        return f"<ForcePolytope: {kind} of {len(self.vertices)} vertices, forces to {largest:.3g} N>"
 
     def contains(self, force: Sequence[float] | Array, tolerance: float = 1e-6) -> bool:
         """Return whether a force, shape (3,), N, lies in the set; what the structure carries of it does not count."""

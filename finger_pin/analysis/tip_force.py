@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.tip_statics import (
     INFEASIBLE,
     UNBOUNDED,
@@ -22,8 +23,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 
-@dataclass(frozen=True, eq=False)
-class RequiredTension:
+@dataclass(frozen=True, eq=False, repr=False)
+class RequiredTension(Finding):
     """The tensions that a fingertip force needs, those with the least maximum.
 
     Attributes:

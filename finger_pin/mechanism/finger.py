@@ -84,6 +84,12 @@ class Finger:
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive)
 
+    def __repr__(self) -> str:
+        """Return name, joints and tendons."""
+        described = self.description
+        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
+        return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
+
     @classmethod
     def from_model(
         cls,

@@ -147,3 +147,10 @@ def test_statics_of_any_finger_are_finite_and_of_the_documented_shapes(descripti
     assert reactions.full.shape == (3, count) and np.isfinite(reactions.full).all()
     assert np.isfinite(transmission_efficiency(finger, np.full(count, 0.4)).pulling).all()
     assert transmission_in_motion(finger, result).ratio.shape == (3, count + 1)
+
+
+def test_findings_print_large_arrays_by_shape_and_range(finger):
+    text = repr(self_locking_map(finger, samples=3))
+    assert "joints: ('proximal', 'medial')" in text and "tip: shape (3, 3, 3), " in text
+    assert len(text.splitlines()) == 7 and max(map(len, text.splitlines())) < 120
+    assert "abduction, proximal, medial, distal" in repr(finger)

@@ -405,3 +405,7 @@ print("matplotlib.pyplot" in sys.modules, "tkinter" in sys.modules, settings() =
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False", "False", "True"]
+
+
+def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():
+    assert plots.plot_friction_law()._repr_png_().startswith(b"\x89PNG")

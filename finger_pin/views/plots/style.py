@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any, Literal
 
 import matplotlib
@@ -58,11 +59,20 @@ STYLE: Any = {
 styled = matplotlib.rc_context(STYLE)
 
 
+class Picture(Figure):
+    """A figure that belongs to no window, and that a notebook shows nevertheless."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = None) -> Figure:
     """Return an empty figure that belongs to no window, in inches.
 
     Figures of results place their panels by `panels.stack`, which takes a fraction of the time of a layout engine.
     """
-    figure = Figure(figsize=(width, height), layout=layout)
+    figure = Picture(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure

@@ -18,7 +18,7 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.viewer.page import render
-from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.scene import Ghost, Scene
 
 Indices = NDArray[np.intp]
 
@@ -28,7 +28,13 @@ FRAME_RATE, MOST_FRAMES = 60.0, 3000
 _POSITIONS_IN_VIEW = 40
 
 
-def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces: ForcePolytope | None = None) -> Path:
+def write_animation(
+    result: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    forces: ForcePolytope | None = None,
+    ghost: xr.Dataset | None = None,
+) -> Path:
     """Write a result as one HTML file that plays it, without a network.
 
     The file appears whole or not at all; an earlier one is replaced.
@@ -37,6 +43,7 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces:
         result: What `simulate` returned or saved.
         path: Of the file.
         forces: Drawn at the fingertip of its posture, if given.
+        ghost: Another result, whose finger moves faintly beside this one at the same times, if given.
 
     Returns:
         The path of the file.
@@ -44,18 +51,22 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces:
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    target, text = Path(path), animation_page(result, forces)
+    target, text = Path(path), animation_page(result, forces, ghost)
     with replacing(target) as temporary:
         Path(temporary).write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None) -> str:
-    """Return the page that plays a result, with a set of fingertip forces if given."""
+def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghost: xr.Dataset | None = None) -> str:
+    """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
     motion = Motion.of(result)
     in_view = motion.position[:: max(1, len(motion.time) // _POSITIONS_IN_VIEW)]
-    header = motion.scene.header(motion.title, in_view, motion.largest, live=False, forces=forces)
-    return render({**header, "chunks": [motion.scene.chunk(motion.time, motion.position, motion.tension)]})
+    beside = Motion.of(ghost).ghost(motion.time) if ghost is not None else None
+    header = motion.scene.header(motion.title, in_view, motion.largest, live=False, forces=forces, ghost=beside)
+    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension)
+    if beside is not None:
+        chunk["ghost"] = beside.chunk()
+    return render({**header, "chunks": [chunk]})
 
 
 def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
@@ -97,13 +108,18 @@ class Motion:
         """Largest tension of all, N."""
         return float(self.tension.max())
 
+    def ghost(self, time: Array) -> Ghost:
+        """Return it as seen beside another motion, with frames at other times, shape (m,), s; it ends where it ends."""
+        position = np.stack([np.interp(time, self.time, column) for column in self.position.T], axis=-1)
+        return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
+
     @classmethod
     def of(cls, result: xr.Dataset, rate: float = FRAME_RATE) -> Motion:
         """Choose the frames of a result.
 
         Args:
             result: What `simulate` returned or saved.
-            rate: Frames per second of motion, two at least; fewer where the motion is long or the result has fewer samples.
+            rate: Frames per second of motion; fewer where the motion is long or the result has fewer samples.
 
         Raises:
             InputError: If the result lacks something that is shown.

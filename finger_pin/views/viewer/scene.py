@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from finger_pin.description.routing import Array
 from finger_pin.mechanism.geometry import BASE_LEAD, LinkPoses, TendonGeometry
 from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.solids import link_names, root_command, solid_commands
+from finger_pin.views.viewer.solids import ROOT, link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
 SLACK_TENSION = 0.05
@@ -27,6 +28,37 @@ _TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
 #: Points per span and per radian of the tendons drawn, so that sags and arcs look smooth.
 _RESOLUTION = 11
 _LARGEST = 32767
+_GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """Another motion that is seen faintly beside the one that is played.
+
+    Attributes:
+        scene: Its finger.
+        title: What it is.
+        poses: Of its links in every frame of the motion that is played.
+    """
+
+    scene: Scene
+    title: str
+    poses: LinkPoses
+
+    def header(self) -> dict[str, Any]:
+        """Return what the page needs to know of it."""
+        scene = self.scene
+        solids = solid_commands(scene.geometry, scene.urdf, scene.tube_radius, _GHOST, _GHOST_COLOUR)
+        moving = [each for each in solids if not each["path"].startswith(f"{_GHOST}/base/")]
+        return {"title": self.title, "links": link_names(scene.geometry)[1:], "commands": moving}
+
+    def chunk(self) -> str:
+        """Return the frames for the page."""
+        return _encode_poses(LinkPoses(self.poses.rotation[:, 1:], self.poses.translation[:, 1:]))
+
+    def seen(self) -> Array:
+        """Return points that the camera must have in view, shape (m, 3), m."""
+        return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
 class Scene:
@@ -65,6 +97,7 @@ class Scene:
         *,
         live: bool,
         forces: ForcePolytope | None = None,
+        ghost: Ghost | None = None,
     ) -> dict[str, Any]:
         """Return what the page needs to know before the first frame.
 
@@ -74,21 +107,25 @@ class Scene:
             largest_tension: That the legend must reach, N.
             live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
+            ghost: Another finger, drawn faintly beside this one, if given.
         """
         geometry, tube = self.geometry, self.tube_radius
         poses = geometry.poses(joint_positions)
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self._view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation, self._tips(poses)[:, None, :], *(path.points for path in paths)]
+        seen = [poses.translation, self.tips(poses)[:, None, :], *(path.points for path in paths)]
         if shown is not None:
             seen.append(shown.corners)
+        if ghost is not None:
+            seen.append(ghost.seen())
         corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
             "live": live,
             "commands": [root_command(turn), *solid_commands(geometry, self.urdf, tube), *drawn],
+            "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
@@ -115,13 +152,12 @@ class Scene:
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q)
         paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
-        quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
         return {
             "time": _encode(time, "<f8"),
-            "pose": _encode(np.concatenate([poses.translation, quaternions.reshape(*q.shape[:-1], -1, 4)], -1), "<f4"),
+            "pose": _encode_poses(poses),
             "path": _encode(np.clip(np.rint(paths / self._quantum), -_LARGEST, _LARGEST), "<i2"),
             "tension": _encode(f, "<f4"),
-            "tip": _encode(self._tips(poses), "<f4"),
+            "tip": _encode(self.tips(poses), "<f4"),
             "joint": _encode(q, "<f4"),
         }
 
@@ -130,7 +166,8 @@ class Scene:
         model = self.geometry.model
         return model.frames[model.getFrameId(TIP_FRAME)].placement
 
-    def _tips(self, poses: LinkPoses) -> Array:
+    def tips(self, poses: LinkPoses) -> Array:
+        """Return the fingertips, shape (..., 3), m, of poses of the links."""
         offset = np.array(self._tip_placement.translation)
         return np.asarray(poses.rotation[..., -1, :, :] @ offset + poses.translation[..., -1, :])
 
@@ -181,6 +218,12 @@ def scale_above(tension: float) -> float:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(tension))
     return float(next(step * decade for step in (1, 2, 4, 6, 8, 10) if step * decade >= tension * (1.0 - 1e-9)))
+
+
+def _encode_poses(poses: LinkPoses) -> str:
+    quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
+    turned = quaternions.reshape(*poses.translation.shape[:-1], 4)
+    return _encode(np.concatenate([poses.translation, turned], axis=-1), "<f4")
 
 
 def _encode(values: ArrayLike, kind: str) -> str:

@@ -26,6 +26,8 @@ from finger_pin.views.viewer.server import PageServer
 
 #: Upper end of the legend before a live tension exceeds it, N.
 LIVE_TENSION = 10.0
+#: Height of the page in a notebook, pixels.
+_CELL = 620
 
 
 class Viewing:
@@ -51,6 +53,14 @@ class Viewing:
         """Stop serving; open pages keep what they have."""
         self._server.close()
 
+    def __repr__(self) -> str:
+        """Return the address."""
+        return f"<{type(self).__name__} at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        # Notebooks show the page itself.
+        return f'<iframe src="{self.url}" width="100%" height="{_CELL}" style="border: none"></iframe>'
+
     def __enter__(self) -> Self:
         """Return itself."""
         return self
@@ -66,7 +76,8 @@ def view(
     result: xr.Dataset,
     *,
     forces: ForcePolytope | None = None,
-    open_browser: bool = True,
+    ghost: xr.Dataset | None = None,
+    open_browser: bool | None = None,
     block: bool | None = None,
 ) -> Viewing:
     """Show a result in meshcat: the finger moves, its tendons run along their paths in the colour of their tension.
@@ -74,7 +85,8 @@ def view(
     Args:
         result: What `simulate` returned or saved.
         forces: What `force_polytope` returned, drawn translucent at the fingertip of its posture.
-        open_browser: Whether to open the page in the user's browser.
+        ghost: Another result, whose finger moves faintly beside this one at the same times.
+        open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
     Returns:
@@ -83,7 +95,7 @@ def view(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    return _served(animation_page(result, forces), open_browser, block)
+    return _served(animation_page(result, forces, ghost), open_browser, block)
 
 
 def view_forces(
@@ -91,7 +103,7 @@ def view_forces(
     forces: ForcePolytope,
     *,
     tension: ArrayLike | None = None,
-    open_browser: bool = True,
+    open_browser: bool | None = None,
     block: bool | None = None,
 ) -> Viewing:
     """Show the forces that a fingertip can exert: a translucent body at the tip of the finger at rest.
@@ -100,7 +112,7 @@ def view_forces(
         finger: The finger.
         forces: What `force_polytope` returned.
         tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
-        open_browser: Whether to open the page in the user's browser.
+        open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
     Returns:
@@ -109,10 +121,9 @@ def view_forces(
     return _served(posture_page(finger, forces, tension), open_browser, block)
 
 
-def _served(page: str, open_browser: bool, block: bool | None) -> Viewing:
+def _served(page: str, open_browser: bool | None, block: bool | None) -> Viewing:
     viewing = Viewing(PageServer(page))
-    if open_browser:
-        webbrowser.open(viewing.url, new=2)
+    _open(viewing.url, open_browser)
     if block is None:
         block = not (sys.flags.interactive or "ps1" in vars(sys))
     if block:
@@ -121,18 +132,23 @@ def _served(page: str, open_browser: bool, block: bool | None) -> Viewing:
     return viewing
 
 
+def _open(url: str, wanted: bool | None) -> None:
+    if "ipykernel" not in sys.modules if wanted is None else wanted:
+        webbrowser.open(url, new=2)
+
+
 class LiveView(Viewing):
     """A page that shows a simulation while it runs."""
 
     def __init__(
-        self, description: FingerDescription, *, title: str = "", open_browser: bool = True, rate: float = 30.0
+        self, description: FingerDescription, *, title: str = "", open_browser: bool | None = None, rate: float = 30.0
     ) -> None:
         """Serve the page and print its address; frames come with `update`.
 
         Args:
             description: The finger.
             title: Shown above the legend; the finger's title when left out.
-            open_browser: Whether to open the page in the user's browser.
+            open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
             rate: Most frames per second of real time.
         """
         self._scene = Scene(description)
@@ -150,8 +166,7 @@ class LiveView(Viewing):
         header = self._scene.header(title or description.title or description.name, reach, LIVE_TENSION, live=True)
         super().__init__(PageServer(render(header), live=True))
         print(f"The finger moves at {self.url}", flush=True)
-        if open_browser:
-            webbrowser.open(self.url, new=2)
+        _open(self.url, open_browser)
 
     def update(
         self,

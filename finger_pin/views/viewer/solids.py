@@ -28,13 +28,17 @@ def link_names(geometry: TendonGeometry) -> list[str]:
     return ["base", *(f"{name}_link" for name in geometry.description.joints)]
 
 
-def solid_commands(geometry: TendonGeometry, urdf: str, tube_radius: float) -> Iterator[Command]:
+def solid_commands(
+    geometry: TendonGeometry, urdf: str, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
+) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
     Args:
         geometry: The finger and its tendons.
         urdf: Its URDF, as text.
         tube_radius: Radius with which tendons are drawn, m; grooves are smaller by as much.
+        root: Path below which the links hang.
+        colour: Of all solids, red, green and blue; by default each has its own.
 
     Raises:
         InputError: If a visual is no box, cylinder or sphere.
@@ -44,14 +48,16 @@ def solid_commands(geometry: TendonGeometry, urdf: str, tube_radius: float) -> I
     for visual in visuals.geometryObjects:
         placement = visual.placement
         shape, turn = _primitive(visual.name, visual.geometry)
-        colour, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * _SOLID_OPACITY
-        path = f"{ROOT}/{links[visual.parentJoint]}/{visual.name}"
-        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour, opacity)
+        own, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * _SOLID_OPACITY
+        path = f"{root}/{links[visual.parentJoint]}/{visual.name}"
+        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
-        path = f"{ROOT}/{links[pulley.joint]}/groove_{pulley.tendon}"
+        path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
         shape = _cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), _GROOVE_COLOUR, _GROOVE_OPACITY)
+        yield _mesh(
+            path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or _GROOVE_COLOUR, _GROOVE_OPACITY
+        )
 
 
 def root_command(rotation: Array) -> Command:

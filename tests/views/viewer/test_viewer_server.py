@@ -134,3 +134,13 @@ def test_a_simulation_that_is_watched_is_never_ahead_of_real_time(monkeypatch, c
 def test_a_live_view_refuses_tensions_of_another_finger():
     with LiveView(fp.load_finger("planar"), open_browser=False) as live, pytest.raises(fp.InputError, match="3"):
         live.update(0.0, np.zeros(2), np.ones(5))
+
+
+def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda url, new: opened.append(url))
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    with view(result, block=False) as viewing:
+        assert re.search(r'<iframe [^>]*src="([^"]*)"', viewing._repr_html_())[1] == viewing.url
+        assert viewing.url in repr(viewing)
+    assert opened == []
