@@ -6,9 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from finger_pin.views.viewer import LiveView, draw, view, view_forces, write_animation
+    from finger_pin.views.viewer import LiveView, draw, view, view_forces, write_animation, write_video
 
-__all__ = ["LiveView", "draw", "view", "view_forces", "write_animation"]
+__all__ = ["LiveView", "draw", "view", "view_forces", "write_animation", "write_video"]
 
 
 def __getattr__(name: str) -> Any:

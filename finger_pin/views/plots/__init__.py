@@ -12,6 +12,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.files import replacing
+from finger_pin.views.plots.comparing import compare
 from finger_pin.views.plots.convergence import plot_convergence
 from finger_pin.views.plots.energy import plot_energy
 from finger_pin.views.plots.fig6 import plot_fig6
@@ -27,6 +28,7 @@ from finger_pin.views.plots.transmission import plot_transmission
 from finger_pin.views.plots.workspace import plot_workspace
 
 __all__ = [
+    "compare",
     "draw_all",
     "plot_convergence",
     "plot_critical_friction",

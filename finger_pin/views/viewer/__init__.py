@@ -6,8 +6,23 @@ listens on every network interface, while this one is bound to the loopback addr
 finger there (`draw`).
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from finger_pin.views.viewer.animation import write_animation
 from finger_pin.views.viewer.drawing import draw
 from finger_pin.views.viewer.serving import LiveView, Viewing, view, view_forces
 
-__all__ = ["LiveView", "Viewing", "draw", "view", "view_forces", "write_animation"]
+if TYPE_CHECKING:
+    from finger_pin.views.viewer.video import write_video
+
+__all__ = ["LiveView", "Viewing", "draw", "view", "view_forces", "write_animation", "write_video"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what needs matplotlib on first use."""
+    if name == "write_video":
+        return import_module("finger_pin.views.viewer.video").write_video
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -112,7 +112,7 @@ class Scene:
         geometry, tube = self.geometry, self.tube_radius
         poses = geometry.poses(joint_positions)
         paths = geometry.paths(joint_positions, poses=poses)
-        turn = self._view()
+        turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
         seen = [poses.translation, self.tips(poses)[:, None, :], *(path.points for path in paths)]
         if shown is not None:
@@ -188,8 +188,9 @@ class Scene:
         knots = sorted({0, last, *([distal.index(True)] if True in distal else [])})
         return {"name": name, "strand": [first + int(flag) for flag in distal], "knots": knots}
 
-    def _view(self) -> Array:
-        # From the base frame to the scene's: z is up, the camera stands on the side of -y, where the axes of most
+    def view(self) -> Array:
+        """Return the rotation from the base frame to the frame in which the finger is looked at, shape (3, 3)."""
+        # There z is up, the camera stands on the side of -y, where the axes of most
         # joints point, so that flexion is seen from the side and runs counter-clockwise.
         model, data = self.geometry.model, self.geometry.model.createData()
         pin.forwardKinematics(model, data, np.zeros(model.nq))

@@ -15,9 +15,9 @@ from finger_pin.mechanism.geometry import TendonGeometry
 ROOT = "/finger_pin"
 Command = dict[str, Any]
 
-#: Opacity of the solids, so that the tendons show inside, and of the grooves.
-_SOLID_OPACITY, _GROOVE_OPACITY = 0.28, 0.28
-_GROOVE_COLOUR = (0.55, 0.62, 0.72)
+#: Opacity of solids and grooves, so that the tendons show inside.
+SOLID_OPACITY = 0.28
+GROOVE_COLOUR = (0.55, 0.62, 0.72)
 
 # Three.js runs its cylinders along y, URDF along z.
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -48,16 +48,14 @@ def solid_commands(
     for visual in visuals.geometryObjects:
         placement = visual.placement
         shape, turn = _primitive(visual.name, visual.geometry)
-        own, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * _SOLID_OPACITY
+        own, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * SOLID_OPACITY
         path = f"{root}/{links[visual.parentJoint]}/{visual.name}"
         yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
         path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
         shape = _cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        yield _mesh(
-            path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or _GROOVE_COLOUR, _GROOVE_OPACITY
-        )
+        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
