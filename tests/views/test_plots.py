@@ -256,7 +256,12 @@ def test_draw_all_writes_whole_pictures_of_a_size_for_the_screen(tmp_path):
         picture = imread(path)
         assert 1200 < picture.shape[1] < 1800
         # Nothing is cut off: the margin is blank.
-        assert np.all(picture[:2] == 1.0) and np.all(picture[-2:] == 1.0) and np.all(picture[:, :2] == 1.0)
+        assert (
+            np.all(picture[:2] == 1.0)
+            and np.all(picture[-2:] == 1.0)
+            and np.all(picture[:, :2] == 1.0)
+            and np.all(picture[:, -2:] == 1.0)
+        )
 
 
 def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):

@@ -70,5 +70,6 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     with replacing(target) as temporary:
-        figure.savefig(temporary, format="png")
+        # Little compression: it takes a fifth of the time, and a line drawing is small anyway.
+        figure.savefig(temporary, format="png", pil_kwargs={"compress_level": 2})
     return target

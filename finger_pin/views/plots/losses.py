@@ -57,10 +57,10 @@ def _joints(figure: Figure, result: xr.Dataset) -> None:
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
     title(panels[0], "(b) joint torque before and after joint friction")
-    legend(panels[-1], panels[0].get_lines(), columns=3)
+    legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=4)
 
 
 def _gap(axes: Axes, time: Array, before: Array, after: Array, first: str, second: str) -> None:
-    shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="taken by friction")
+    shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="friction")
     trace(axes, time, before, label=first, color=BLUE, linewidth=1.1)
     trace(axes, time, after, label=second, color=VERMILLION, linewidth=1.1)
