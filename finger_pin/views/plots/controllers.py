@@ -45,7 +45,7 @@ def plot_controllers(results: dict[str, xr.Dataset], rows: Sequence[Comparison])
         [row.passive_error for row in rows],
         color=ORANGE,
         height=0.66,
-        label="passive stretch",
+        label="of which passive stretch",
     )
     left.legend(loc="lower right")
     _bars(right, rows, [row.peak_tension for row in rows], BLUE, "peak command (N)", ".2f")
@@ -56,7 +56,7 @@ def plot_controllers(results: dict[str, xr.Dataset], rows: Sequence[Comparison])
 
 
 def _bars(axes: Axes, rows: Sequence[Comparison], values: Sequence[float], colour: str, label: str, form: str) -> None:
-    axes.barh(range(len(rows)), values, color=colour, height=0.66)
+    axes.barh(range(len(rows)), values, color=colour, height=0.66, label="all of it")
     axes.set_xlabel(label)
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0)
