@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from finger_pin.analysis import SelfLockingMap, critical_friction
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 
@@ -17,13 +18,14 @@ _MILLI = 1e3
 
 
 @styled
-def plot_critical_friction(finger: FingerDescription) -> Figure:
+def plot_critical_friction(finger: Finger | FingerDescription) -> Figure:
     """Draw the critical coefficients of a finger: of every joint alone, and of all joints together.
 
     Args:
-        finger: A finger with force closure.
+        finger: A finger with force closure, or the description of one.
     """
-    entries = {name: critical_friction(finger, joints=[name]) for name in finger.joints}
+    description = finger.description if isinstance(finger, Finger) else finger
+    entries = {name: critical_friction(finger, joints=[name]) for name in description.joints}
     entries["all joints"] = critical_friction(finger)
     figure = new_figure(7.5, 0.9 + 0.42 * len(entries), "constrained")
     axes = figure.subplots()
@@ -31,7 +33,7 @@ def plot_critical_friction(finger: FingerDescription) -> Figure:
         value = _MILLI * found.coefficient
         axes.barh(row, value, height=0.6, color=VERMILLION if name == "all joints" else BLUE)
         axes.text(value, row, f" {value:.2f}", va="center", fontsize=9.5)
-    actual = _MILLI * float(np.max(finger.joint_friction.stiction))
+    actual = _MILLI * float(np.max(description.joint_friction.stiction))
     axes.axvline(actual, color=BLACK, linewidth=1.0, label=rf"$M^c$ of the finger, {actual:.2g} mm")
     axes.set_yticks(range(len(entries)), list(entries))
     axes.invert_yaxis()

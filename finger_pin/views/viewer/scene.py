@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike
 from finger_pin.analysis import ForcePolytope
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import BASE_LEAD, LinkPoses, TendonGeometry
 from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
 from finger_pin.views.viewer.force_set import ForceSet
@@ -61,6 +63,20 @@ class Ghost:
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
+def shown(finger: Finger | FingerDescription) -> FingerDescription:
+    """Return the description of what can be shown, a finger or the description of one.
+
+    Raises:
+        InputError: If it is a finger on a model of the user's own (`Finger.from_model`), whose looks are not known.
+    """
+    if isinstance(finger, FingerDescription):
+        return finger
+    if finger.rigid_body.joints != tuple(finger.description.joints):
+        allowed = "stands on another model (Finger.from_model); the viewer shows fingers that are made of links"
+        raise InputError(f"finger {finger.description.name}", allowed)
+    return finger.description
+
+
 class Scene:
     """A finger prepared for the page.
 
@@ -73,7 +89,15 @@ class Scene:
     """
 
     def __init__(self, description: FingerDescription) -> None:
-        """Prepare solids and tendons."""
+        """Prepare solids and tendons.
+
+        Raises:
+            InputError: If a joint carries no link.
+        """
+        for name, joint in description.joints.items():
+            if joint.link is None:
+                allowed = "is missing; the viewer shows fingers whose joints all have links, not those on another model"
+                raise InputError(f"finger.joints.{name}.link", allowed)
         self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
         self.urdf = to_urdf(description)
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]

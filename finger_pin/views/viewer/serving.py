@@ -19,9 +19,10 @@ from finger_pin.control.closed_loop import LoopSignals
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
-from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.scene import Scene, shown
 from finger_pin.views.viewer.server import PageServer
 
 #: Upper end of the legend before a live tension exceeds it, N.
@@ -99,7 +100,7 @@ def view(
 
 
 def view_forces(
-    finger: FingerDescription,
+    finger: Finger | FingerDescription,
     forces: ForcePolytope,
     *,
     tension: ArrayLike | None = None,
@@ -109,7 +110,7 @@ def view_forces(
     """Show the forces that a fingertip can exert: a translucent body at the tip of the finger at rest.
 
     Args:
-        finger: The finger.
+        finger: The finger, or its description.
         forces: What `force_polytope` returned.
         tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
@@ -117,8 +118,11 @@ def view_forces(
 
     Returns:
         The page in service, with its address; already closed if the call has blocked.
+
+    Raises:
+        InputError: If the finger is not made of links.
     """
-    return _served(posture_page(finger, forces, tension), open_browser, block)
+    return _served(posture_page(shown(finger), forces, tension), open_browser, block)
 
 
 def _served(page: str, open_browser: bool | None, block: bool | None) -> Viewing:
@@ -141,16 +145,22 @@ class LiveView(Viewing):
     """A page that shows a simulation while it runs."""
 
     def __init__(
-        self, description: FingerDescription, *, title: str = "", open_browser: bool | None = None, rate: float = 30.0
+        self,
+        finger: Finger | FingerDescription,
+        *,
+        title: str = "",
+        open_browser: bool | None = None,
+        rate: float = 30.0,
     ) -> None:
         """Serve the page and print its address; frames come with `update`.
 
         Args:
-            description: The finger.
+            finger: The finger, or its description.
             title: Shown above the legend; the finger's title when left out.
             open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
             rate: Most frames per second of real time.
         """
+        description = shown(finger)
         self._scene = Scene(description)
         self._interval = 1.0 / rate
         self._due = -np.inf
