@@ -143,6 +143,13 @@ def test_statics_of_any_finger_are_finite_and_of_the_documented_shapes(descripti
         margin = self_locking_margin(bending(description), samples=20)
         assert margin.position.shape == (count,) and margin.margin > 0.0
         assert critical_friction(finger).coefficient >= critical_friction(finger, np.full(count, 0.4)).coefficient > 0.0
+    load, position = np.array([0.1, -0.2, 0.3]), np.full(count, 0.4)
+    pushed = finger.evaluate(finger.rest_state(position), np.ones(count + 1), load)
+    # J^T F, (6), by differences of the fingertip's place.
+    tip = finger.rigid_body.tip_position
+    turned = [load @ (tip(position + each) - tip(position - each)) / 2e-6 for each in 1e-6 * np.eye(count)]
+    np.testing.assert_allclose(pushed.external_torque, turned, atol=1e-9)
+    assert pushed.rate.shape == (finger.layout.size,)
     reactions = joint_reactions(result)
     assert reactions.full.shape == (3, count) and np.isfinite(reactions.full).all()
     assert np.isfinite(transmission_efficiency(finger, np.full(count, 0.4)).pulling).all()

@@ -7,9 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.exceptions import InputError
-from finger_pin.views.plots.lines import trace
+from finger_pin.views.plots.lines import names, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, new_figure, styled
 
 

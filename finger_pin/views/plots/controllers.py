@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.studies.comparison import Comparison
-from finger_pin.views.plots.lines import trace
+from finger_pin.views.plots.lines import names, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, styled
 
 _COLOURS = (GREY, VERMILLION, BLUE, BLACK)

@@ -7,9 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
-from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.lines import names, series
 from finger_pin.views.plots.panels import legend, logarithmic, stack, title
-from finger_pin.views.plots.signals import names
 from finger_pin.views.plots.style import GREY, new_figure, styled
 
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.

@@ -9,9 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.views.plots.lines import series, trace
+from finger_pin.views.plots.lines import names, passive_proximal, series, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names, passive_proximal
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, new_figure, styled
 
 

@@ -7,9 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
-from finger_pin.views.plots.lines import shade, trace
+from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names, passive_proximal
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
 
 
