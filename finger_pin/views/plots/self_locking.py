@@ -12,6 +12,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.panels import plain
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 
 _MILLI = 1e3
@@ -82,6 +83,7 @@ def plot_runaway(results: dict[str, xr.Dataset]) -> Figure:
         error = np.rad2deg(np.max(np.abs(result["tracking_error"].transpose("time", "joint").values), axis=1))
         bottom.plot(time, error, label=label, **series(index))
     top.set_yscale("log")
+    plain(top.yaxis)
     top.set_ylabel("largest command (N)")
     top.set_title("tension: settles below the critical coefficient, grows above it")
     bottom.set_ylabel("largest error (deg)")
