@@ -39,6 +39,11 @@ class SelfLockingMap(Finding):
     tip: Array
     actual: float
 
+    @property
+    def uniform(self) -> bool:
+        """Whether the critical coefficient is the same at every posture."""
+        return bool(np.max(self.coefficient) <= (1.0 + 1e-6) * np.min(self.coefficient))
+
 
 def self_locking_map(
     finger: Finger,

@@ -61,7 +61,7 @@ def summarize_locking(scenario: Scenario) -> str:
     least = np.unravel_index(int(np.argmin(found.coefficient)), found.coefficient.shape)
     angles = zip(found.joints, (axis[index] for axis, index in zip(found.angles, least, strict=True)), strict=True)
     where = ", ".join(f"{name} {np.rad2deg(angle):.3g} deg" for name, angle in angles)
-    if np.ptp(found.coefficient) <= 1e-6 * np.max(found.coefficient):
+    if found.uniform:
         where = f"every posture of {' and '.join(found.joints)}"
     blocks.append(
         [

@@ -1,5 +1,7 @@
 """Figures of the analyses show the numbers that the analyses return."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,11 @@ def test_map_says_in_a_line_what_is_the_same_at_every_posture_and_where_it_is_lo
     # The tension has its map and its colour bar, or a word instead of both; there is no panel without content.
     assert len(figure.axes) == panels
     assert (panels == 1) == any("locked everywhere" in text.get_text() for text in figure.axes[0].texts)
+
+
+def test_a_map_of_a_finger_that_nothing_locks_says_so(finger):
+    found = replace(self_locking_map(finger, samples=3), coefficient=np.full((3, 3), np.inf))
+    assert plot_self_locking_map(found).get_suptitle().startswith("no joint friction locks it; the finger has 0.35 mm")
 
 
 def test_runs_are_drawn_with_their_largest_tension():

@@ -57,7 +57,9 @@ def plot_self_locking_map(found: SelfLockingMap) -> Figure:
     coefficient = _MILLI * found.coefficient
     panels = [(found.tension, "largest tension (N)", "tension that slow motion needs")]
     note = f"critical coefficient {coefficient.flat[0]:.3g} mm at every posture"
-    if np.ptp(found.coefficient) > 1e-6 * np.max(found.coefficient):
+    if not np.isfinite(coefficient).any():
+        note = "no joint friction locks it"
+    elif not found.uniform:
         panels.append((coefficient, "critical coefficient (mm)", "joint friction at which it locks"))
         note = f"critical coefficient from {coefficient.min():.3g} to {coefficient.max():.3g} mm"
     figure = new_figure(5.8 * len(panels), 4.8, "constrained")
