@@ -129,15 +129,19 @@ def _served(page: str, open_browser: bool | None, block: bool | None) -> Viewing
     viewing = Viewing(PageServer(page))
     _open(viewing.url, open_browser)
     if block is None:
-        block = not (sys.flags.interactive or "ps1" in vars(sys))
+        block = not (sys.flags.interactive or "ps1" in vars(sys) or _in_notebook())
     if block:
         print(f"The finger moves at {viewing.url} (Ctrl-C ends this)", flush=True)
         viewing.wait()
     return viewing
 
 
+def _in_notebook() -> bool:
+    return "ipykernel" in sys.modules
+
+
 def _open(url: str, wanted: bool | None) -> None:
-    if "ipykernel" not in sys.modules if wanted is None else wanted:
+    if not _in_notebook() if wanted is None else wanted:
         webbrowser.open(url, new=2)
 
 

@@ -39,13 +39,15 @@ def test_nothing_overflows_the_window_and_the_finger_is_clear_of_panel_and_bar(b
           return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight];
         });
         return { panel: inside("#panel").map(box)[0], bar: inside("#bar").map(box)[0],
-                 parts: inside("#bar *, #panel h1, #panel table").filter((r) => r.width).map(box), seen,
+                 ticks: inside("#ticks span").map(box), parts: inside("#bar *, #panel h1, #panel table").filter((r) => r.width).map(box), seen,
                  window: [innerWidth, document.documentElement.scrollWidth] };""")
     finally:
         both.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     assert places["window"] == [width, width]
     parts = np.array([*places["parts"], places["panel"], places["bar"]])
     assert parts[:, 0].min() >= 0.0 and parts[:, 2].max() <= width
+    ticks = np.array(places["ticks"])
+    assert np.all(ticks[:-1, 2] + 4.0 < ticks[1:, 0])
     x, y = np.array(places["seen"]).T
     assert np.all((x > 0.0) & (x < width) & (y > 0.0) & (y < places["bar"][1]))
     _, _, right, bottom = places["panel"]

@@ -140,7 +140,7 @@ def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, monke
     opened = []
     monkeypatch.setattr("webbrowser.open", lambda url, new: opened.append(url))
     monkeypatch.setitem(sys.modules, "ipykernel", sys)
-    with view(result, block=False) as viewing:
+    with view(result) as viewing:
         assert re.search(r'<iframe [^>]*src="([^"]*)"', viewing._repr_html_())[1] == viewing.url
         assert viewing.url in repr(viewing)
     assert opened == []
