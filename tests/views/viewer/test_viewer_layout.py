@@ -39,7 +39,8 @@ def test_nothing_overflows_the_window_and_the_finger_is_clear_of_panel_and_bar(b
           return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight];
         });
         return { panel: inside("#panel").map(box)[0], bar: inside("#bar").map(box)[0],
-                 ticks: inside("#ticks span").map(box), parts: inside("#bar *, #panel h1, #panel table").filter((r) => r.width).map(box), seen,
+                 ticks: inside("#ticks span").map(box),
+                 parts: inside("#bar *, #panel h1, #panel table").filter((r) => r.width).map(box), seen,
                  window: [innerWidth, document.documentElement.scrollWidth] };""")
     finally:
         both.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from motion import joint_position, tensions
+from pages import Clock
 
 import finger_pin as fp
 from finger_pin.views.viewer import LiveView, view, write_animation
@@ -101,19 +102,6 @@ def test_a_live_view_is_throttled_and_shows_the_last_state():
     assert "event: end" in streamed[0]
     last = np.frombuffer(base64.b64decode(json.loads(frames[-1])["joint"]), "<f4")
     assert last == pytest.approx(joint_position(1.0), abs=1e-6)
-
-
-class Clock:
-    """Time that passes when somebody sleeps or computes."""
-
-    now = 1000.0
-
-    def monotonic(self):
-        return self.now
-
-    def sleep(self, duration):
-        assert duration >= 0.0
-        self.now += duration
 
 
 def test_a_simulation_that_is_watched_is_never_ahead_of_real_time(monkeypatch, capsys, finger):
