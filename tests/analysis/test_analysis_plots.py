@@ -64,3 +64,13 @@ def test_sensitivity_bars_are_the_derivatives_per_millimetre(finger):
     bars = [bar.get_width() for bar in plot_radius_sensitivity(finger, POSTURE, force).axes[0].patches]
     assert bars[0] == pytest.approx(1e-3 * tension_for_force(finger, POSTURE, force).by_radius[0, 0])
     assert "(0.3, 0.2, 0.8) N" in plot_radius_sensitivity(finger, POSTURE, force).axes[0].get_title("left")
+
+
+def test_a_map_over_one_joint_is_a_curve_and_a_row_of_the_map_over_two(finger):
+    both = self_locking_map(finger, ("proximal", "medial"), samples=3)
+    alone = self_locking_map(finger, ("medial",), samples=3)
+    np.testing.assert_allclose(alone.tension, both.tension[0])
+    axes = plot_self_locking_map(alone).axes[0]
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), alone.tension)
+    with pytest.raises(fp.InputError, match="two different"):
+        self_locking_map(finger, ("medial", "medial"))
