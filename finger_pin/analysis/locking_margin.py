@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.control.reference import HarmonicReference
 from finger_pin.description.routing import Array
@@ -22,8 +23,8 @@ CLOSE_TO_LOCKING = 1.2
 _CASES = 48
 
 
-@dataclass(frozen=True, eq=False)
-class SelfLockingMargin:
+@dataclass(frozen=True, eq=False, repr=False)
+class SelfLockingMargin(Finding):
     """How far a scenario stays from self-locking.
 
     Attributes:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -25,8 +26,8 @@ from finger_pin.mechanism.geometry import Groove
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 
 
-@dataclass(frozen=True, eq=False)
-class JointReactions:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointReactions(Finding):
     """Reactions of n joints at m instants, shapes (m, n), N unless said otherwise.
 
     Attributes:

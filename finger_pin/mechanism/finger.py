@@ -149,6 +149,12 @@ class Finger:
             self.tendons.mass,
         )
 
+    def __repr__(self) -> str:
+        """Return name, joints and tendons."""
+        described = self.description
+        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
+        return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
+
     @classmethod
     def from_model(
         cls,

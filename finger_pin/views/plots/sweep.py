@@ -12,10 +12,10 @@ from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
+from finger_pin.views.plots.panels import plain
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
 
 _MAP = "cividis"
@@ -211,9 +211,7 @@ def _logarithmic(values: Array) -> bool:
 def _scale(set_scale: Any, axis: Axis, values: Array) -> None:
     if _logarithmic(values):
         set_scale("log")
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_locator(NullLocator())
+        plain(axis)
 
 
 def _edges(values: Array) -> Array:
