@@ -10,6 +10,7 @@ from finger_pin.analysis import critical_friction
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Distribution, PseudoInverse
 from finger_pin.control.joint_compensation import JointCompensation
+from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import Controller, ProportionalController
 from finger_pin.control.tendon_feedforward import TendonFeedforward
@@ -24,7 +25,8 @@ from finger_pin.mechanism.finger import Finger
 def build_controller(scenario: Scenario, finger: Finger | None = None) -> Controller:
     """Return the controller that a scenario describes.
 
-    The paper's, unless an entry asks for more; then a `CompensatedController`, inside a `PassiveTensionLoop` if asked.
+    Tensions in open loop, or the paper's, unless an entry asks for more; then a `CompensatedController`, inside a
+    `PassiveTensionLoop` if asked.
 
     Args:
         scenario: The scenario.
@@ -35,6 +37,8 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
     """
     finger = finger or Finger(scenario.finger)
     settings = scenario.controller
+    if settings.kind == "tensions":
+        return OpenLoopTensions.from_scenario(scenario, finger.routing)
     if settings.is_paper:
         return ProportionalController.from_scenario(scenario, finger.routing)
     joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)

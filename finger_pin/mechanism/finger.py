@@ -136,12 +136,18 @@ class Finger:
         """H_c2, shape (s, n), m, (10)."""
         return self.routing.strand_coupling
 
-    def rest_state(self, position: Array) -> Array:
-        """Return the packed state at rest at theta, shape (n,): stiction zero, passive tendons in the middle."""
+    def rest_state(self, position: Array, velocity: Array | None = None) -> Array:
+        """Return a packed state with relaxed bristles and the masses of passive tendons in the middle, taut.
+
+        Args:
+            position: theta, shape (n,), rad.
+            velocity: theta', shape (n,), rad/s, with which the masses go; at rest by default.
+        """
         position = np.asarray(position, dtype=float)
-        zeros = [np.zeros(size) for size in self.layout.sizes]
-        passive = self.tendons.rest_position(position)
-        return self.layout.pack(State(position, zeros[1], passive, zeros[3], zeros[4], zeros[5]))
+        moving = np.zeros_like(position) if velocity is None else np.asarray(velocity, dtype=float)
+        middle = self.tendons.rest_position
+        stiction = [np.zeros(size) for size in self.layout.sizes[4:]]
+        return self.layout.pack(State(position, moving, middle(position), middle(moving), *stiction))
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
         """Return all signals of (18) at a packed state.

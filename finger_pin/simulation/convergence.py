@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from finger_pin.control.closed_loop import Reference
+from finger_pin.control.closed_loop import Samples
 from finger_pin.control.proportional import Controller
+from finger_pin.control.reference import Reference
 from finger_pin.core.textbook import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
@@ -115,8 +116,8 @@ def check_convergence(
     *,
     factor: float = FACTOR,
     limit: float = LIMIT,
-    controller: Controller | None = None,
-    reference: Reference | None = None,
+    controller: Controller | Samples | None = None,
+    reference: Reference | Samples | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,

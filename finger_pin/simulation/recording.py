@@ -97,6 +97,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     halves = tendons.strands[..., actuated:]
     tension = loop.finger.routing.tendon_tension(tendons.strands)
     error = signals.reference.position - state.position
+    force = np.broadcast_to(finger.fingertip_force, motion.tip.shape)
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
         "joint_velocity": _entry(_JOINT, state.velocity, "rad/s", "joint velocity"),
@@ -118,6 +119,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "joint_stiction": _entry(_JOINT, state.joint_stiction, "N m", "joint stiction torque", "9a"),
         "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
+        "fingertip_force": _entry(("time", "axis"), force, "N", "force on the fingertip", "6"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
     if signals.control.shortfall is not None:

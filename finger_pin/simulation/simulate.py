@@ -8,14 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Reference
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
 from finger_pin.control.compiled import build_control
 from finger_pin.control.measurement import MeasuringController
+from finger_pin.control.own import OwnController
 from finger_pin.control.proportional import Controller, ProportionalController
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import Reference, SignalReference
 from finger_pin.control.sampling import SampledController
+from finger_pin.control.signal import Signal
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
@@ -23,9 +26,10 @@ from finger_pin.core.plant import Control, held_control
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
+from finger_pin.description.scenario import AXES, METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.simulation.recording import record
+from finger_pin.simulation.starting import packed_state
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -39,14 +43,16 @@ _CHUNK, _CHUNK_OBSERVED = 256, 4
 def simulate(
     scenario: Scenario,
     *,
-    controller: Controller | None = None,
-    reference: Reference | None = None,
+    controller: Controller | Samples | None = None,
+    reference: Reference | Samples | None = None,
+    fingertip_force: Samples | None = None,
+    initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
 ) -> xr.Dataset:
-    """Simulate a scenario from rest on its reference.
+    """Simulate a scenario, from rest on its reference unless something else is asked for.
 
     The compiled methods run without Python inside as long as controller and reference are the paper's. A controller or
     reference of one's own is Python, and so is what a scenario adds to the paper's controller: with a
@@ -56,8 +62,15 @@ def simulate(
 
     Args:
         scenario: What to simulate, from `load_scenario`.
-        controller: Replaces the scenario's controller.
-        reference: Replaces the scenario's reference.
+        controller: Replaces the scenario's controller: an object with ``command``, asked for one time at a time, or
+            tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N.
+        reference: Replaces the scenario's reference: an object with ``at``, asked for one time at a time, or times,
+            shape (m,), s, and angles, shape (m, k), rad, of the k joints that no passive tendon drives; the others
+            follow (20). Between samples the motion is a monotone cubic.
+        fingertip_force: Replaces what acts on the fingertip: times, shape (m,), s, and forces, shape (m, 3), N, base
+            frame.
+        initial: The packed state to start from, shape (size,), or a result to continue from its last saved state. Time
+            begins at zero again; ``simulation.start_time`` says what the clock of references shows then.
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
             without either it is continuous. Compiled methods only.
         progress: Called with the simulated time, s, now and then.
@@ -68,7 +81,8 @@ def simulate(
         Every signal of the model at the scenario's sample rate, and the energy account.
 
     Raises:
-        InputError: If the control period is not positive, the method cannot sample, or the controller must be sampled.
+        InputError: If the control period is not positive, the method cannot sample, the controller must be sampled, or
+            what is given as controller, reference, force or initial state has a wrong size or is not finite.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
 
@@ -79,9 +93,16 @@ def simulate(
     """
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
+    if fingertip_force is not None:
+        force = Signal.from_samples("fingertip_force", fingertip_force, AXES).later(scenario.simulation.start_time)
+        loop = replace(loop, fingertip_force=np.zeros(3), varying_force=force)
+    if initial is not None:
+        loop = replace(loop, start=packed_state(initial, loop.finger))
+    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
+    own = [name for name, each in given.items() if each is not None]
     # The margin is that of the paper's controller on the scenario's reference.
-    own = controller is None and reference is None
-    margin = warn_of_self_locking(scenario) if own else None
+    judged = controller is None and reference is None and scenario.controller.kind == "proportional"
+    margin = warn_of_self_locking(scenario) if judged else None
     sampling = _sampling(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
@@ -89,8 +110,14 @@ def simulate(
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
         loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
+    answers = loop.controller
     if sampling is not None:
+        if loop.varying_force is not None:
+            raise InputError("controller.sampling", "a sampled controller needs a constant fingertip force")
         loop = replace(loop, controller=SampledController(loop, sampling))
+    elif own:
+        # What is wrong with an answer of one's own is told before anything is computed.
+        loop.evaluate(0.0, loop.initial_state())
 
     def watch(time: float, x: Array) -> None:
         if progress is not None:
@@ -106,8 +133,12 @@ def simulate(
         result = record(scenario, loop, trajectory, method)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
+    if own:
+        result.attrs["own"] = ", ".join(own)
     result, excess = _finite_part(result)
     if trajectory.failure:
+        if isinstance(answers, OwnController) and answers.problem_time >= reached:
+            raise IntegrationError(reached, answers.problem, "another controller", result)
         tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT
         raise IntegrationError(reached, trajectory.failure, _ADVICE_TIGHT if tight else _ADVICE, result)
     if excess:
@@ -145,9 +176,14 @@ def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | No
 
 
 def _control(loop: ClosedLoop) -> Control | None:
-    """Return the loop's controller and reference as arrays, or None if they are Python."""
+    """Return the loop's controller and reference as arrays, or None if they are Python.
+
+    Arrays there are for the paper's controller, references that are sinusoids and a constant fingertip force.
+    """
     controller, reference = loop.controller, loop.reference
-    if isinstance(controller, ProportionalController) and isinstance(reference, HarmonicReference):
+    if loop.varying_force is not None or not isinstance(controller, ProportionalController):
+        return None
+    if isinstance(reference, SignalReference) and reference.signal.is_harmonic:
         return build_control(controller, reference, loop.finger.routing.actuated)
     return None
 
@@ -170,7 +206,14 @@ def _integrate(
         )
     if method == "CVODE":
         return integrate_cvode(
-            loop.rhs, start, settings.duration, rtol=settings.rtol, atol=atol, watch=watch, stop=stop
+            loop.rhs,
+            start,
+            settings.duration,
+            rtol=settings.rtol,
+            atol=atol,
+            longest=loop.longest_step(),
+            watch=watch,
+            stop=stop,
         )
     return integrate(
         loop.rhs,
@@ -179,6 +222,7 @@ def _integrate(
         method=method,
         rtol=settings.rtol,
         atol=atol,
+        longest=loop.longest_step(),
         watch=watch,
         stop=stop,
     )

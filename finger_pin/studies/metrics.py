@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
@@ -142,7 +142,7 @@ def fingertip_force(run: Run) -> float:
     """
     finger = Finger(run.scenario.finger)
     times = run.scenario.simulation.duration * (np.arange(500) + 0.5) / 500
-    posture = np.mean(HarmonicReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
+    posture = np.mean(SignalReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
     offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
     return float(np.min(offsets)) if offsets.size else 0.0
 
