@@ -28,7 +28,6 @@ _SIGNAL_FILES = (
     ("controller", "file", "tensions"),
     ("environment", "fingertip_force_file", "fingertip_force_signal"),
 )
-_FILE_KEYS = tuple(f"{section}.{key}" for section, key, _ in _SIGNAL_FILES)
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
 _LARGEST = 10_000_000
@@ -254,8 +253,6 @@ def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
             raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
         if key in ("finger", "finger.base"):
             value = _absolute(value)
-        if key in _FILE_KEYS and isinstance(value, str):
-            value = str(_expand(value).absolute())
         if key == "finger" and isinstance(value, dict) and "base" in value:
             value = {**value, "base": _absolute(value["base"])}
         checked[key] = value

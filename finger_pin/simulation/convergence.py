@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import Samples
 from finger_pin.control.proportional import Controller
@@ -118,6 +119,8 @@ def check_convergence(
     limit: float = LIMIT,
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
+    fingertip_force: Samples | None = None,
+    initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,
@@ -131,12 +134,15 @@ def check_convergence(
         limit: Joints that differ by more than this have parted, rad.
         controller: As for `simulate`.
         reference: As for `simulate`.
+        fingertip_force: As for `simulate`.
+        initial: As for `simulate`.
         control_period: As for `simulate`.
         progress: Called with the simulated time of each run, s.
         stop: Asked now and then; true ends the simulation that is running.
 
     Raises:
-        InputError: If the tolerances cannot be tightened, or the result is of another scenario.
+        InputError: If the tolerances cannot be tightened, or the result is of another scenario, or had a controller,
+            reference, force or initial state of its own that is not given here.
         IntegrationError: If an integrator cannot go on.
         Interrupted: If ``stop`` returned true.
     """
@@ -145,12 +151,18 @@ def check_convergence(
         raise InputError("limit", "must be above 0 and finite", limit)
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
+    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
+    own = ", ".join(name for name, each in given.items() if each is not None)
+    if result is not None and result.attrs.get("own", "") != own:
+        raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")
 
     def run(each: Scenario) -> xr.Dataset:
         return simulate(
             each,
             controller=controller,
             reference=reference,
+            fingertip_force=fingertip_force,
+            initial=initial,
             control_period=control_period,
             progress=progress,
             stop=stop,

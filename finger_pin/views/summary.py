@@ -22,7 +22,7 @@ def summarize(result: xr.Dataset) -> str:
     Args:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
-    head = [*_head(result), *_locking(result)]
+    head = [*_head(result), *_own(result), *_locking(result)]
     blocks = [head, _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
 
@@ -32,6 +32,11 @@ def _head(result: xr.Dataset) -> list[str]:
     title = " ".join(str(attributes["title"]).split())
     tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
     return [title, f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"]
+
+
+def _own(result: xr.Dataset) -> list[str]:
+    own = result.attrs.get("own")
+    return [f"Not what the scenario alone gives: {own} of one's own"] if own else []
 
 
 def _locking(result: xr.Dataset) -> list[str]:

@@ -7,6 +7,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.reference import SignalReference
+from finger_pin.control.signal import Signal
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
@@ -19,7 +20,8 @@ def fig6(routing):
 
 def sinusoids(coupling, size, seed=12):
     draw = np.random.default_rng(seed)
-    return SignalReference(*draw.uniform(0.1, 1.0, (4, size)), coupling)
+    signal = Signal(draw.uniform(0.1, 1.0, (4, size)).T, np.array([0.0, 1.0]), np.zeros((6, 1, size)))
+    return SignalReference(signal, coupling)
 
 
 @pytest.mark.parametrize("time", [0.0, 0.25, 0.5, 1.0, 2.0, 2.75, 7.9])
@@ -82,9 +84,8 @@ def test_followers_may_follow_followers_whichever_is_written_first(network, orde
     assert sorted(coupling.followers) == [1, 2]
     reference = sinusoids(coupling, 3)
     a, b, c = reference.at(0.7).position
-    own = reference.offset[0] + reference.amplitude[0] * math.sin(
-        2.0 * math.pi * reference.frequency[0] * 0.7 + reference.phase[0]
-    )
+    offset, amplitude, frequency, phase = reference.signal.harmonics[0]
+    own = offset + amplitude * math.sin(2.0 * math.pi * frequency * 0.7 + phase)
     assert a == pytest.approx(own, rel=1e-14)
     assert b == pytest.approx((3e-3 * a - 2.0 / 1e4) / 4e-3, rel=1e-12)
     assert c == pytest.approx((2e-3 * b - 3.0 / 4e4) / 3e-3, rel=1e-12)
