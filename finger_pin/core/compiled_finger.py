@@ -81,6 +81,7 @@ class CompiledFinger:
             ),
             limiter_depth=of_joints[at.DEPTH],
             limiter_torque=of_joints[at.LIMITER],
+            spring_torque=np.zeros_like(state.position),
             tendon_torque=strands @ plant.strand_coupling,
             external_torque=of_joints[at.EXTERNAL],
             acceleration=rate.velocity,

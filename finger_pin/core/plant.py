@@ -92,8 +92,10 @@ def build_plant(finger: Finger, fingertip_force: Array) -> Plant:
     """Read a finger into arrays; Pinocchio's model is the source of the rigid body.
 
     Raises:
-        InputError: If a joint neither turns nor slides about a fixed axis.
+        InputError: If a joint neither turns nor slides about a fixed axis, or has a spring.
     """
+    if finger.springs.present:
+        raise InputError("finger.joints", "springs are for the methods Radau, BDF and LSODA")
     model, routing = finger.rigid_body.model, finger.routing
     size = model.njoints - 1
     parents = np.array([model.parents[i + 1] - 1 for i in range(size)], dtype=np.int64)

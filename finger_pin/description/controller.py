@@ -122,6 +122,9 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    spring_compensation: bool = Field(
+        False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
+    )
     tendon_friction_feedforward: TendonFeedforwardSettings | None = Field(None, description="By (9) and (16).")
     joint_friction_compensation: JointCompensationSettings | None = Field(None, description="By (9) and (17).")
     passive_tension_loop: PassiveTensionSettings | None = Field(None, description="Closed loop on f5; sampled.")
@@ -144,7 +147,7 @@ class ControllerSettings(Description):
             self.distribution,
         )
         damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
-        plain = self.kind == "proportional" and not self.gravity_compensation
+        plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
         return plain and not any(damping) and all(each is None for each in added)
 
 
@@ -191,6 +194,7 @@ _CLOSED_LOOP = (
     "gain",
     "damping",
     "gravity_compensation",
+    "spring_compensation",
     "tendon_friction_feedforward",
     "joint_friction_compensation",
     "passive_tension_loop",

@@ -14,6 +14,7 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.signals import ForceSignal, JointReference
+from finger_pin.description.tautness import Tautness
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -132,12 +133,12 @@ class Scenario(Description):
         routing = Routing.from_description(finger)
         # Tensions in open loop are what they are; (22) needs some that can be raised without turning a joint.
         closure = routing.force_closure()
-        if self.controller.kind == "proportional" and not closure.holds:
-            raise problem("finger.tendons", f"{closure}; the controller needs force closure")
         try:
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
+        if self.controller.kind == "proportional" and not closure.holds:
+            self._check_taut(routing, str(closure))
         initial = self.simulation.initial or InitialSettings()
         tables: dict[str, Iterable[str]] = {
             "reference.joints": self.reference.joints,
@@ -154,6 +155,15 @@ class Scenario(Description):
             if routing.joints.index(name) in followers:
                 raise problem(f"reference.joints.{name}", "follows from the passive tendon (20); leave it out")
         return self
+
+    def _check_taut(self, routing: Routing, missing: str) -> None:
+        """Raise unless springs keep the tendons taut that (22) cannot, for want of force closure."""
+        if not any(joint.spring for joint in self.finger.joints.values()):
+            raise problem("finger.tendons", f"{missing}; the controller needs force closure")
+        minimum = expand(self.controller.minimum_tension, len(routing.tendons))
+        tautness = Tautness.of(self.finger, routing, self.coupling(routing), minimum)
+        if not tautness.holds:
+            raise problem("finger.tendons", f"{missing}, and {tautness}")
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return what the passive tendons impose on the references (20)."""

@@ -12,6 +12,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.joint_friction import JointForces, JointFriction
+from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
@@ -31,6 +32,7 @@ class FingerSignals:
         joints: Joint reaction and friction.
         limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
         limiter_torque: tau^r, shape (..., n), N m.
+        spring_torque: tau^k of the joints' springs, shape (..., n), N m.
         tendon_torque: H_c2^T f, shape (..., n), N m, (11).
         external_torque: J^T F, shape (..., n), N m, (6).
         acceleration: theta'', shape (..., n), rad/s2, (18).
@@ -44,6 +46,7 @@ class FingerSignals:
     joints: JointForces
     limiter_depth: Array
     limiter_torque: Array
+    spring_torque: Array
     tendon_torque: Array
     external_torque: Array
     acceleration: Array
@@ -60,6 +63,7 @@ class Finger:
         tendons: The tendon layer.
         joint_friction: The friction of the joints.
         stroke_limiter: The stroke limiters.
+        springs: The springs of the joints.
         layout: Order and sizes of the packed state.
     """
 
@@ -82,6 +86,7 @@ class Finger:
         self.routing = self.tendons.routing
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
+        self.springs = JointSprings.from_description(description)
         self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive)
 
     @classmethod
@@ -178,7 +183,8 @@ class Finger:
         depth = self.stroke_limiter.depth(state.position)
         limiter = self.stroke_limiter.torque(depth, state.velocity)
         torque = tendons.strands @ self.routing.strand_coupling
-        net = torque - joints.friction - limiter + external
+        spring = self.springs.torque(state.position, state.velocity)
+        net = torque - joints.friction - limiter - spring + external
         acceleration = body.forward_dynamics(state.position, state.velocity, net)
         rate = self.layout.pack(
             State(
@@ -198,11 +204,16 @@ class Finger:
             joints=joints,
             limiter_depth=depth,
             limiter_torque=limiter,
+            spring_torque=spring,
             tendon_torque=torque,
             external_torque=external,
             acceleration=acceleration,
             rate=rate,
         )
+
+    def static_torque(self, position: Array) -> Array:
+        """Return what tendons have to exert at rest at theta, shape (n,): G and the springs' torque, N m."""
+        return self.rigid_body.gravity_torque(position) + self.springs.torque(position, np.zeros_like(position))
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n)."""

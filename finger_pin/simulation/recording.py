@@ -30,6 +30,7 @@ _STORED = {
     "gravity": "potential energy of gravity",
     "passive_tendon": "elastic energy of the passive tendons",
     "limiter": "elastic energy of the stroke limiters",
+    "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
 }
@@ -43,6 +44,7 @@ _EXCHANGED = {
     "joint_viscous": "lost in the joints' viscous friction",
     "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
+    "joint_springs": "lost in the joints' springs",
     "slack": "booked where a tension is cut at zero",
 }
 
@@ -120,6 +122,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
         "fingertip_force": _entry(("time", "axis"), force, "N", "force on the fingertip", "6"),
+        "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
     if signals.control.shortfall is not None:

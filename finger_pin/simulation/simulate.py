@@ -102,18 +102,22 @@ def simulate(
     own = [name for name, each in given.items() if each is not None]
     # The margin is that of the paper's controller on the scenario's reference.
     judged = controller is None and reference is None and scenario.controller.kind == "proportional"
+    judged = judged and loop.finger.routing.force_closure().holds
     margin = warn_of_self_locking(scenario) if judged else None
     sampling = _sampling(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
     if sampling is None and method in TABLEAUS and _control(loop) is None:
         method = _CONTINUOUS
-    if scenario.simulation.method not in METHODS_IN_NUMPY:
+    # Springs are not compiled.
+    springs = loop.finger.springs.present
+    if scenario.simulation.method not in METHODS_IN_NUMPY and not springs:
         loop = replace(loop, dynamics=CompiledFinger(loop.finger, loop.fingertip_force))
     answers = loop.controller
     if sampling is not None:
-        if loop.varying_force is not None:
-            raise InputError("controller.sampling", "a sampled controller needs a constant fingertip force")
+        if loop.varying_force is not None or springs:
+            allowed = "a sampled controller needs a constant fingertip force and a finger without springs"
+            raise InputError("controller.sampling", allowed)
         loop = replace(loop, controller=SampledController(loop, sampling))
     elif own:
         # What is wrong with an answer of one's own is told before anything is computed.
@@ -178,10 +182,12 @@ def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | No
 def _control(loop: ClosedLoop) -> Control | None:
     """Return the loop's controller and reference as arrays, or None if they are Python.
 
-    Arrays there are for the paper's controller, references that are sinusoids and a constant fingertip force.
+    Arrays there are for the paper's controller, references that are sinusoids, a constant fingertip force and joints
+    without springs.
     """
     controller, reference = loop.controller, loop.reference
-    if loop.varying_force is not None or not isinstance(controller, ProportionalController):
+    numpy_only = loop.varying_force is not None or loop.finger.springs.present
+    if numpy_only or not isinstance(controller, ProportionalController):
         return None
     if isinstance(reference, SignalReference) and reference.signal.is_harmonic:
         return build_control(controller, reference, loop.finger.routing.actuated)

@@ -106,8 +106,9 @@ def tension_mean(run: Run) -> float:
 
 
 def losses(run: Run) -> float:
-    """Return what friction and limiters took, J."""
-    return losses_tendons(run) + losses_joints(run) + _final(run.result, "limiter")
+    """Return what friction, limiters and springs took, J."""
+    rest = _final(run.result, "limiter") + _final(run.result, "joint_springs")
+    return losses_tendons(run) + losses_joints(run) + rest
 
 
 def losses_tendons(run: Run) -> float:
