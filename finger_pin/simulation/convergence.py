@@ -18,7 +18,7 @@ from finger_pin.core.textbook import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
-from finger_pin.exceptions import InputError, SelfLockingWarning
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.simulation.simulate import simulate
 
 FACTOR, LIMIT = 100.0, 1e-3
@@ -171,7 +171,7 @@ def check_convergence(
     first = run(scenario) if result is None else result
     with warnings.catch_warnings():
         # The first run has said it.
-        warnings.simplefilter("ignore", SelfLockingWarning)
+        warnings.simplefilter("ignore", ScenarioWarning)
         second = run(tighter)
     count = min(first.sizes["time"], second.sizes["time"])
     angles = [each["joint_position"].transpose("time", "joint").values[:count] for each in (first, second)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
+from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
 from finger_pin.control.compiled import build_control
 from finger_pin.control.measurement import MeasuringController
@@ -27,7 +29,7 @@ from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import AXES, METHODS_IN_NUMPY, Scenario
-from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import packed_state
 
@@ -90,6 +92,7 @@ def simulate(
         SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
             the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
             there is neither.
+        MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
@@ -104,6 +107,9 @@ def simulate(
     judged = controller is None and reference is None and scenario.controller.kind == "proportional"
     judged = judged and loop.finger.routing.force_closure().holds
     margin = warn_of_self_locking(scenario) if judged else None
+    driving = micro_damping_advice(scenario.finger)
+    if driving:
+        warnings.warn(driving, MicroDampingWarning, stacklevel=2)
     sampling = _sampling(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
@@ -137,6 +143,8 @@ def simulate(
         result = record(scenario, loop, trajectory, method)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
+    if driving:
+        result.attrs["micro_damping"] = driving
     if own:
         result.attrs["own"] = ", ".join(own)
     result, excess = _finite_part(result)

@@ -19,7 +19,7 @@ from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
-from finger_pin.exceptions import InputError, SelfLockingWarning
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
 
@@ -43,7 +43,7 @@ class Run:
         """What `simulate` returns."""
         with warnings.catch_warnings():
             # Studies look at many designs, and at the margin by its metric.
-            warnings.simplefilter("ignore", SelfLockingWarning)
+            warnings.simplefilter("ignore", ScenarioWarning)
             return simulate(self.scenario)
 
 
