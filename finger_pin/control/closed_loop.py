@@ -145,7 +145,7 @@ class ClosedLoop:
 def _controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:
     if given is None:
         return build_controller(scenario, finger)
-    if isinstance(given, tuple):
+    if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
     if isinstance(given, ProportionalController | CompensatedController | PassiveTensionLoop):
         return given
@@ -156,7 +156,7 @@ def _controller(given: Controller | Samples | None, scenario: Scenario, finger: 
 def _reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> Reference:
     if given is None:
         return SignalReference.from_scenario(scenario, routing)
-    if isinstance(given, tuple):
+    if isinstance(given, tuple | list):
         return SignalReference.from_samples(given, scenario, routing)
     if isinstance(given, SignalReference):
         return given

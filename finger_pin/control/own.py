@@ -30,7 +30,14 @@ class OwnReference:
     """
 
     def __init__(self, reference: Reference, joints: Sequence[str], start: float) -> None:
-        """Take a reference."""
+        """Take a reference.
+
+        Raises:
+            InputError: If it has no ``at``.
+        """
+        if not callable(getattr(reference, "at", None)):
+            allowed = "must have at(time), or be a pair of arrays: times, and angles with one row for each"
+            raise InputError("reference", allowed, type(reference).__name__)
         self.reference, self.joints, self.start = reference, joints, start
 
     def at(self, time: Array | float) -> ReferenceSignals:
@@ -72,7 +79,16 @@ class OwnController:
     """
 
     def __init__(self, controller: Controller, routing: Routing, start: float) -> None:
-        """Take a controller; ``start`` is what its clock shows when the simulation begins, s."""
+        """Take a controller; ``start`` is what its clock shows when the simulation begins, s.
+
+        Raises:
+            InputError: If it has no ``command``.
+        """
+        if not callable(getattr(controller, "command", None)):
+            allowed = (
+                "must have command(time, reference, position, velocity), or be a pair of arrays: times, and tensions"
+            )
+            raise InputError("controller", allowed, type(controller).__name__)
         self.controller, self.problem, self.problem_time = controller, "", -np.inf
         self._routing, self._start, self._asked = routing, start, False
 

@@ -13,6 +13,8 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import JointReference
+from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
+from finger_pin.exceptions import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +64,14 @@ class SignalReference:
             routing: Of its finger.
 
         Raises:
-            InputError: If shapes or numbers are wrong.
+            InputError: If shapes or numbers are wrong, or an angle is beyond two turns.
         """
         coupling = scenario.coupling(routing)
         free = [index for index in range(len(routing.joints)) if index not in coupling.followers]
         given = Signal.from_samples("reference", samples, [routing.joints[index] for index in free])
+        largest = float(np.max(np.abs(np.asarray(samples[1], dtype=float))))
+        if largest > MOST_ANGLE:
+            raise InputError("reference", f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}", largest)
         given = given.later(scenario.simulation.start_time)
         coefficients = np.zeros((*given.coefficients.shape[:2], len(routing.joints)))
         coefficients[..., free] = given.coefficients

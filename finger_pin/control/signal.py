@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,7 +70,7 @@ class Signal:
             raise InputError(name, "times must increase")
         return cls(np.zeros((len(columns), 4)), *_joined([PchipInterpolator(times, each) for each in values.T]))
 
-    @property
+    @cached_property
     def is_harmonic(self) -> bool:
         """Whether there are sinusoids only."""
         return not self.coefficients.any()
@@ -78,13 +79,15 @@ class Signal:
         """Return values and rates at one time, each of shape (k,), or at times of shape (m,), each (m, k)."""
         instant = np.asarray(time, dtype=float)[..., None]
         offset, amplitude, frequency, phase = self.harmonics.T
-        inside = np.clip(instant, self.knots[0], self.knots[-1])
-        piece = np.clip(np.searchsorted(self.knots, inside, side="right") - 1, 0, len(self.knots) - 2)
+        value = harmonic(instant, offset, amplitude, frequency, phase)
+        rate = harmonic_rate(instant, amplitude, frequency, phase)
+        if self.is_harmonic:
+            return value, rate
+        inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], inside, side="right")
         since, factors = inside - self.knots[piece], self.coefficients[:, piece[..., 0]]
-        value = harmonic(instant, offset, amplitude, frequency, phase) + quintic(since, *factors)
         moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
-        rate = harmonic_rate(instant, amplitude, frequency, phase) + moving * quintic_rate(since, *factors[:-1])
-        return value, rate
+        return value + quintic(since, *factors), rate + moving * quintic_rate(since, *factors[:-1])
 
     def later(self, start: float) -> Signal:
         """Return the signals with their time counted from a start, s."""

@@ -80,6 +80,11 @@ def test_a_wrong_first_command_is_refused_in_one_line_before_anything_is_compute
     assert len(calls) == 1
 
 
+def test_what_is_no_controller_at_all_is_refused_in_one_line():
+    with pytest.raises(InputError, match=r"must have command\(time, reference, position, velocity\)"):
+        fp.simulate(scenario(), controller=lambda *given: PULL)
+
+
 def divides(time, position):
     return PULL if time < 0.01 else 1 / 0
 
@@ -125,6 +130,9 @@ def test_a_reference_is_asked_one_time_at_a_time():
         (Path([0.0, 0.5, 0.5]), "position at t = 0 s must be 4 finite numbers"),
         (Path([0.0, 0.5, 0.5, np.inf]), "position at t = 0 s must be 4 finite numbers"),
         (Path([0.0, 0.5, 0.5, 0.3], velocity=[0.0]), "velocity at t = 0 s must be 4 finite numbers"),
+        (lambda time: np.zeros(4), r"must have at\(time\)"),
+        (([0.0, 1.0], np.full((2, 3), 45.0)), "is it in degrees"),
+        ([[0.0, 1.0], np.zeros((2, 2))], "one column for each of abduction, proximal, medial"),
         (type("Bare", (), {"at": lambda self, time: np.zeros(4)})(), "must return ReferenceSignals"),
     ],
 )
