@@ -77,6 +77,7 @@ class ClosedLoop:
         scenario: Scenario,
         controller: Controller | Samples | None = None,
         reference: Reference | Samples | None = None,
+        fingertip_force: Samples | None = None,
     ) -> ClosedLoop:
         """Build the loop that a scenario describes, with a controller or reference of one's own if given.
 
@@ -85,6 +86,7 @@ class ClosedLoop:
             controller: Replaces its controller: an object, or times (m,), s, and tensions (m, a), N.
             reference: Replaces its reference: an object, or times (m,), s, and angles (m, k), rad, one column for each
                 of the k joints that no passive tendon drives.
+            fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame.
 
         Raises:
             InputError: If samples have the wrong shape, are not finite, or tensions are negative.
@@ -98,7 +100,10 @@ class ClosedLoop:
             dynamics=finger,
         )
         signals = scenario.environment.fingertip_force_signal
-        if signals:
+        if fingertip_force is not None:
+            force = Signal.from_samples("fingertip_force", fingertip_force, AXES)
+            loop = replace(loop, fingertip_force=np.zeros(3), varying_force=force.later(start))
+        elif signals:
             force = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES])
             loop = replace(loop, varying_force=force.later(start))
         initial = scenario.simulation.initial

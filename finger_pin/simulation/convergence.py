@@ -20,6 +20,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.simulation.simulate import simulate
+from finger_pin.simulation.starting import own_parts
 
 FACTOR, LIMIT = 100.0, 1e-3
 
@@ -151,8 +152,7 @@ def check_convergence(
         raise InputError("limit", "must be above 0 and finite", limit)
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
-    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
-    own = ", ".join(name for name, each in given.items() if each is not None)
+    own = own_parts(controller, reference, fingertip_force, initial)
     if result is not None and result.attrs.get("own", "") != own:
         raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")
 

@@ -20,7 +20,6 @@ from finger_pin.control.own import OwnController
 from finger_pin.control.proportional import Controller, ProportionalController
 from finger_pin.control.reference import Reference, SignalReference
 from finger_pin.control.sampling import SampledController
-from finger_pin.control.signal import Signal
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
@@ -28,10 +27,10 @@ from finger_pin.core.plant import Control, held_control
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import AXES, METHODS_IN_NUMPY, Scenario
+from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.simulation.recording import record
-from finger_pin.simulation.starting import packed_state
+from finger_pin.simulation.starting import own_parts, packed_state
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -56,8 +55,9 @@ def simulate(
 ) -> xr.Dataset:
     """Simulate a scenario, from rest on its reference unless something else is asked for.
 
-    The compiled methods run without Python inside as long as controller and reference are the paper's. A controller or
-    reference of one's own is Python, and so is what a scenario adds to the paper's controller: with a
+    The compiled methods run without Python inside as long as the controller is the paper's, references are sinusoids,
+    the fingertip force is constant and joints have no springs. The rest is Python, a controller of one's own as well as
+    what a scenario adds to the paper's: with a
     ``control_period``, or ``controller.sampling`` in the scenario, it is sampled and held, and the compiled core runs
     between the samples; without one it acts continuously, which calls it at every evaluation of scipy's Radau method:
     that takes seconds for a simulated second.
@@ -95,14 +95,10 @@ def simulate(
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     method = scenario.simulation.method
-    loop = ClosedLoop.from_scenario(scenario, controller, reference)
-    if fingertip_force is not None:
-        force = Signal.from_samples("fingertip_force", fingertip_force, AXES).later(scenario.simulation.start_time)
-        loop = replace(loop, fingertip_force=np.zeros(3), varying_force=force)
+    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
-    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
-    own = [name for name, each in given.items() if each is not None]
+    own = own_parts(controller, reference, fingertip_force, initial)
     # The margin is that of the paper's controller on the scenario's reference.
     judged = controller is None and reference is None and scenario.controller.kind == "proportional"
     judged = judged and loop.finger.routing.force_closure().holds
@@ -146,7 +142,7 @@ def simulate(
     if driving:
         result.attrs["micro_damping"] = driving
     if own:
-        result.attrs["own"] = ", ".join(own)
+        result.attrs["own"] = own
     result, excess = _finite_part(result)
     if trajectory.failure:
         if isinstance(answers, OwnController) and answers.problem_time >= reached:

@@ -1,4 +1,4 @@
-"""Where a simulation starts: a packed state, or the last saved state of a result."""
+"""Where a simulation starts: a packed state, or the last saved state of a result; and what of it is a user's own."""
 
 from __future__ import annotations
 
@@ -20,6 +20,19 @@ _PARTS = {
     "tendon_stiction": "tendon_stiction",
     "joint_stiction": "joint_stiction",
 }
+
+
+def own_parts(controller: object, reference: object, fingertip_force: object, initial: object) -> str:
+    """Return what of a simulation is a user's own, such as ``controller, reference``; empty for nothing.
+
+    Args:
+        controller: As for `simulate`.
+        reference: As for `simulate`.
+        fingertip_force: As for `simulate`.
+        initial: As for `simulate`.
+    """
+    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
+    return ", ".join(name for name, each in given.items() if each is not None)
 
 
 def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
