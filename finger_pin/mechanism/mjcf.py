@@ -1,8 +1,8 @@
 """MJCF of a finger, for MuJoCo: what of the model MuJoCo can express, as text. MuJoCo itself is not needed here.
 
-Exported are the rigid body, the routing, the passive tendons with their lumped mass, viscous friction, gravity and the
-shapes. MuJoCo has no counterpart of the stiction and Coulomb parts of law (9), of the stroke limiters (2) and of the
-cut at zero of a delivered tension (12); they are left out, and the file says so at its head.
+Exported are the rigid body, the routing, the passive tendons with their lumped mass, the springs of joints, viscous
+friction, gravity and the shapes. MuJoCo has no counterpart of the stiction and Coulomb parts of law (9), of the stroke
+limiters (2) and of the cut at zero of a delivered tension (12); they are left out, and the file says so at its head.
 """
 
 from __future__ import annotations
