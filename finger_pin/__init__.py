@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 from finger_pin.description.loading import list_fingers, list_scenarios, load_finger, load_scenario, to_toml
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, SelfLockingWarning
+from finger_pin.exceptions import (
+    FingerPinError,
+    InputError,
+    IntegrationError,
+    Interrupted,
+    MicroDampingWarning,
+    ScenarioWarning,
+    SelfLockingWarning,
+)
 
 if TYPE_CHECKING:
     from finger_pin.analysis import (
@@ -145,10 +153,12 @@ __all__ = [
     "LiveView",
     "LocalProcesses",
     "Metric",
+    "MicroDampingWarning",
     "PassiveTensionLoop",
     "PseudoInverse",
     "Range",
     "Scenario",
+    "ScenarioWarning",
     "SelfLockingWarning",
     "Simulator",
     "TendonFeedforward",

@@ -15,7 +15,15 @@ class FingerPinError(Exception):
     """Root of the project's exceptions."""
 
 
-class SelfLockingWarning(UserWarning):
+class ScenarioWarning(UserWarning):
+    """Root of what the project warns of: a scenario that runs, but not as its author may expect."""
+
+
+class MicroDampingWarning(ScenarioWarning):
+    """The micro-damping of a law (9) is more than its viscous friction covers: friction can drive motion."""
+
+
+class SelfLockingWarning(ScenarioWarning):
     """A scenario comes close to the joint friction at which its finger locks itself, or exceeds it."""
 
 

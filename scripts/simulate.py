@@ -123,7 +123,7 @@ def simulate(
 ) -> tuple[int, xr.Dataset | None, str]:
     """Return the exit code, the result as far as it goes, and what went wrong if anything did."""
     from finger_pin.commands.console import progress_bar
-    from finger_pin.exceptions import IntegrationError, Interrupted, SelfLockingWarning
+    from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
     from finger_pin.simulation.simulate import simulate
 
     shown = sys.stderr.isatty() and not options.quiet
@@ -134,7 +134,7 @@ def simulate(
         observe = live.observe if live else None
         try:
             # The summary says what it would say.
-            warnings.simplefilter("ignore", SelfLockingWarning)
+            warnings.simplefilter("ignore", ScenarioWarning)
             return DONE, simulate(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested), ""
         except IntegrationError as error:
             return FAILED, error.result, str(error)

@@ -88,7 +88,7 @@ def self_locking_map(
     postures = postures @ coupling.matrix.T
     flat = postures.reshape(-1, len(base))
     signs, sliding = directions_of_motion(finger.tendons, np.ones(len(base), dtype=bool))
-    weight = np.array([finger.rigid_body.gravity_torque(theta) for theta in flat])
+    weight = np.array([finger.static_torque(theta) for theta in flat])
     minimum = expand(minimum_tension, len(routing.tendons))
     loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
     coefficient, tension = np.full(len(flat), np.inf), np.zeros(len(flat))

@@ -141,9 +141,9 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     Raises:
         InputError: If something is missing in the result, or a joint carries no link.
     """
-    scenario, finger = _scenario(result)
+    _, finger = _scenario(result)
     position, velocity, acceleration = (_values(result, name) for name in _MOTION)
-    strands, force = _strands(result, finger), np.array(scenario.environment.fingertip_force)
+    strands, force = _strands(result, finger), _values(result, "fingertip_force")
     found, other = (
         pin_wrench(finger, position, velocity, acceleration, strands, force, groove)
         for groove in (Groove.DISTAL, Groove.PROXIMAL)

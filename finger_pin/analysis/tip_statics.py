@@ -2,7 +2,7 @@
 
 At rest at theta, with E = -F the force that the fingertip exerts on what it touches, (18) reads
 
-    J^T E = H_c2^T f - G - tau^f,
+    J^T E = H_c2^T f - G - tau^k - tau^f,
 
 linear in E and the tensions f of the strands. With bounds on the commands f^a it describes a polytope of (E, f^a, f,
 tau^f), and the forces are its projection on E. Passive tendons carry whatever the balance asks of them, without
@@ -61,7 +61,7 @@ class TipStatics:
         equal: Rows that vanish, shape (., a + s + n).
         below: Rows that are at most zero, shape (., a + s + n).
         torque: Rows (n) of H_c2^T f - tau^f.
-        weight: G, shape (n,), N m.
+        weight: G and the torque of springs, shape (n,), N m.
         sizes: a, s, n.
     """
 
@@ -104,7 +104,7 @@ class TipStatics:
             equal=np.concatenate([np.zeros((0, width)), *equal]),
             below=np.concatenate([np.zeros((0, width)), *below]),
             torque=torque,
-            weight=finger.rigid_body.gravity_torque(theta),
+            weight=finger.static_torque(theta),
             sizes=(a, s, n),
         )
 

@@ -1,7 +1,7 @@
 """Sine and cosine of one angle together, in a third of the time that two calls of the library take.
 
-Reduction to a quarter turn in three parts and polynomials are those of fdlibm (Sun Microsystems, 1993; k_sin.c, k_cos.c,
-e_rem_pio2.c), which are within one unit in the last place.
+Reduction to a quarter turn in three parts and polynomials are those of fdlibm (Sun Microsystems, 1993; k_sin.c,
+k_cos.c, e_rem_pio2.c), which are within one unit in the last place.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from typing import Any
 
 import tomli_w
 
+from finger_pin.description.columns import read_columns
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, nearest, validate
@@ -21,6 +22,14 @@ from finger_pin.exceptions import InputError
 from finger_pin.publishing import settle
 
 Table = dict[str, Any]
+# Sections that may name a CSV file, the key that does, and where its columns go.
+_SIGNAL_FILES = (
+    ("reference", "file", "joints"),
+    ("controller", "file", "tensions"),
+    ("environment", "fingertip_force_file", "fingertip_force_signal"),
+)
+# Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
+_KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
 _LARGEST = 10_000_000
 
 
@@ -74,7 +83,9 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
         if "finger" not in table:
             raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
         table["finger"] = _resolve_finger(table["finger"], folder)
-        _apply(overrides, table)
+        # A kind comes before what belongs to it.
+        _apply(dict(sorted(overrides.items(), key=lambda each: not each[0].endswith(".kind"))), table)
+        _resolve_signals(table, Path())
         return validate(Scenario, table, ())
 
 
@@ -147,6 +158,7 @@ def _read_scenario(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tupl
     if identity in seen:
         raise InputError("extends", "a scenario cannot start from itself", name)
     folder = path.parent
+    _resolve_signals(table, folder)
     if "extends" not in table:
         return table, folder
     base = table.pop("extends")
@@ -181,10 +193,35 @@ def _resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> A
     return finger
 
 
+def _resolve_signals(table: Table, folder: Path) -> None:
+    """Put the columns of CSV files where a file may say them itself: as samples of signals by name."""
+    for section, key, target in _SIGNAL_FILES:
+        settings = table.get(section)
+        if not isinstance(settings, dict) or key not in settings:
+            continue
+        name = settings.pop(key)
+        entry = f"{section}.{key}"
+        if not isinstance(name, str):
+            raise InputError(entry, "must be the path of a CSV file", name)
+        try:
+            text = _read_bytes(f"{entry} {name}", folder / _expand(name)).decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{entry} {name}", "is not a text file in UTF-8") from None
+        times, *columns = read_columns(f"{entry} {name}", text).items()
+        samples = {name: {"kind": "samples", "times": times[1], "values": values} for name, values in columns}
+        settings[target] = {**_as_table(settings.get(target)), **samples}
+
+
+def _is_other_kind(base: Table, top: Table) -> bool:
+    """Return whether a signal or controller is of another kind than the one that it is put on."""
+    kinds = {base.get("kind"), top["kind"]} if "kind" in top else set()
+    return len(kinds) == 2 and not _KINDS_APART.isdisjoint(kinds)
+
+
 def _merge(base: Table, top: Table) -> Table:
     merged = dict(base)
     for key, value in top.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not _is_other_kind(merged[key], value)
         merged[key] = _merge(merged[key], value) if both else value
     return merged
 
@@ -200,6 +237,8 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
             if not isinstance(below, dict):
                 raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
             inner = below
+        if last == "kind" and isinstance(value, str) and _is_other_kind(inner, {"kind": value}):
+            inner.clear()
         inner[last] = copy.deepcopy(value)
 
 

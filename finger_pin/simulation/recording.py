@@ -30,6 +30,7 @@ _STORED = {
     "gravity": "potential energy of gravity",
     "passive_tendon": "elastic energy of the passive tendons",
     "limiter": "elastic energy of the stroke limiters",
+    "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
 }
@@ -43,6 +44,7 @@ _EXCHANGED = {
     "joint_viscous": "lost in the joints' viscous friction",
     "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
+    "joint_springs": "lost in the joints' springs",
     "slack": "booked where a tension is cut at zero",
 }
 
@@ -97,6 +99,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     halves = tendons.strands[..., actuated:]
     tension = loop.finger.routing.tendon_tension(tendons.strands)
     error = signals.reference.position - state.position
+    force = np.broadcast_to(finger.fingertip_force, motion.tip.shape)
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
         "joint_velocity": _entry(_JOINT, state.velocity, "rad/s", "joint velocity"),
@@ -118,6 +121,8 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "joint_stiction": _entry(_JOINT, state.joint_stiction, "N m", "joint stiction torque", "9a"),
         "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
+        "fingertip_force": _entry(("time", "axis"), force, "N", "force on the fingertip", "6"),
+        "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
     if signals.control.shortfall is not None:

@@ -16,6 +16,9 @@ from finger_pin.publishing import Stage, settle
 from finger_pin.simulation.recording import save
 
 _MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
+_MARK_OF_OWN = (
+    "# The scenario of the results in this folder, run with a {} of its own: alone it gives another motion.\n"
+)
 _FILES = ("scenario.toml", "trajectory.nc", "animation.html")
 _FIGURES = "figures"
 
@@ -66,7 +69,9 @@ class ResultFolder:
         Raises:
             OSError: If they cannot be written, such as on a full disk.
         """
-        (self.stage / "scenario.toml").write_text(_MARK + result.attrs["scenario"], encoding="utf-8", newline="\n")
+        own = result.attrs.get("own")
+        mark = _MARK_OF_OWN.format(own) if own else _MARK
+        (self.stage / "scenario.toml").write_text(mark + result.attrs["scenario"], encoding="utf-8", newline="\n")
         try:
             save(result, self.stage / "trajectory.nc")
         except RuntimeError as error:
@@ -125,7 +130,8 @@ def _artifacts(folder: Path) -> list[Path]:
 def _is_marked(folder: Path) -> bool:
     try:
         with open(folder / "scenario.toml", "rb") as file:
-            return file.read(len(_MARK)) == _MARK.encode("utf-8")
+            line = file.readline(1000).decode("utf-8", "replace")
+            return any(line.startswith(mark.split("{")[0]) for mark in (_MARK, _MARK_OF_OWN))
     except OSError:
         return False
 

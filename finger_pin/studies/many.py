@@ -13,7 +13,7 @@ import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning
+from finger_pin.exceptions import InputError, IntegrationError, ScenarioWarning, SelfLockingWarning
 from finger_pin.simulation.simulate import simulate
 from finger_pin.studies.processes import process_context, usable_cores
 
@@ -116,7 +116,7 @@ def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:
     try:
         with warnings.catch_warnings():
             # Other processes cannot warn here, and a hundred runs should not warn a hundred times.
-            warnings.simplefilter("ignore", SelfLockingWarning)
+            warnings.simplefilter("ignore", ScenarioWarning)
             result = simulate(scenario)
     except IntegrationError as error:
         assert error.result is not None

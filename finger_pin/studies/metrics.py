@@ -15,11 +15,11 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
-from finger_pin.exceptions import InputError, SelfLockingWarning
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
 
@@ -43,7 +43,7 @@ class Run:
         """What `simulate` returns."""
         with warnings.catch_warnings():
             # Studies look at many designs, and at the margin by its metric.
-            warnings.simplefilter("ignore", SelfLockingWarning)
+            warnings.simplefilter("ignore", ScenarioWarning)
             return simulate(self.scenario)
 
 
@@ -106,8 +106,9 @@ def tension_mean(run: Run) -> float:
 
 
 def losses(run: Run) -> float:
-    """Return what friction and limiters took, J."""
-    return losses_tendons(run) + losses_joints(run) + _final(run.result, "limiter")
+    """Return what friction, limiters and springs took, J."""
+    rest = _final(run.result, "limiter") + _final(run.result, "joint_springs")
+    return losses_tendons(run) + losses_joints(run) + rest
 
 
 def losses_tendons(run: Run) -> float:
@@ -142,7 +143,7 @@ def fingertip_force(run: Run) -> float:
     """
     finger = Finger(run.scenario.finger)
     times = run.scenario.simulation.duration * (np.arange(500) + 0.5) / 500
-    posture = np.mean(HarmonicReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
+    posture = np.mean(SignalReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
     offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
     return float(np.min(offsets)) if offsets.size else 0.0
 

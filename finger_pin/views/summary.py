@@ -30,7 +30,7 @@ def summarize(result: xr.Dataset) -> str:
     Args:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
-    head = [*_head(result), *_locking(result)]
+    head = [*_head(result), *_own(result), *_warnings(result)]
     blocks = [head, _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
 
@@ -96,9 +96,15 @@ def _head(result: xr.Dataset) -> list[str]:
     return [title, f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"]
 
 
-def _locking(result: xr.Dataset) -> list[str]:
+def _own(result: xr.Dataset) -> list[str]:
+    own = result.attrs.get("own")
+    return [f"Not what the scenario alone gives: {own} of one's own"] if own else []
+
+
+def _warnings(result: xr.Dataset) -> list[str]:
     advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
-    return [f"Warning: {advice}"] if advice else []
+    driving = str(result.attrs.get("micro_damping", ""))
+    return [line for each in (advice, driving) if each for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:

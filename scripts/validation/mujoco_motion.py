@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -67,7 +67,7 @@ def follow(scenario: Scenario, model: Any, step: float) -> Array:
     inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
     gain = np.broadcast_to(scenario.controller.gain, len(routing.joints))
     minimum = np.broadcast_to(scenario.controller.minimum_tension, len(routing.tendons))
-    reference = HarmonicReference.from_scenario(scenario, routing).at(step * np.arange(round(DURATION / step))).position
+    reference = SignalReference.from_scenario(scenario, routing).at(step * np.arange(round(DURATION / step))).position
     model.opt.timestep = step
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -96,7 +96,7 @@ def none_passive():
 def lugre():
     """`two_passive` with the micro-damping and the Stribeck exponent of the LuGre model."""
     table = two_passive().model_dump()
-    table["finger"]["tendon_friction"] |= {"micro_damping": 3.0, "stribeck_exponent": 2.0}
+    table["finger"]["tendon_friction"] |= {"micro_damping": 2.0, "stribeck_exponent": 2.0}
     table["finger"]["joint_friction"] |= {"micro_damping": 1e-3, "stribeck_exponent": 2.0}
     return fp.Scenario.model_validate(table)
 

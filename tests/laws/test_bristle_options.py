@@ -23,6 +23,8 @@ OPTIONS = {
     "finger.joint_friction.micro_damping": [2e-3, 1e-3, 0.0, 3e-3],
 }
 FORCE = np.array([0.3, -0.2, 0.5])
+# Far beyond what viscous friction covers, to see the options.
+pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.MicroDampingWarning")
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
-STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "tendon_bristles", "joint_bristles")
+STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
 LOST = (
     "tendon_coulomb",
     "tendon_viscous",
@@ -21,6 +21,7 @@ LOST = (
     "joint_viscous",
     "joint_micro_damping",
     "limiter",
+    "joint_springs",
     "slack",
 )
 UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "supplied")

@@ -6,7 +6,8 @@ import numpy as np
 
 from finger_pin.analysis import self_locking_margin
 from finger_pin.description.routing import Routing
-from finger_pin.description.scenario import JointReference, Scenario
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import JointReference
 from finger_pin.description.validation import Numbers, expand
 
 #: Half a period of the swing in which a finger is led to self-locking, s.
@@ -60,10 +61,7 @@ def lasting(scenario: Scenario, duration: float, samples: int) -> Scenario:
 
 def at_speed(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario whose reference runs through the same motion in its time over a factor."""
-    joints = {
-        name: joint.model_copy(update={"frequency": joint.frequency * factor})
-        for name, joint in scenario.reference.joints.items()
-    }
+    joints = {name: joint.faster(factor) for name, joint in scenario.reference.joints.items()}
     settings = scenario.simulation
     update = {"duration": settings.duration / factor, "sample_rate": settings.sample_rate * factor}
     return scenario.model_copy(

@@ -30,6 +30,7 @@ _STORED = {
     "gravity": "gravity",
     "passive_tendon": "passive tendons",
     "limiter": "limiters",
+    "joint_springs": "joints' springs",
     "tendon_bristles": "tendon bristles",
     "joint_bristles": "joint bristles",
 }
@@ -42,6 +43,7 @@ _LOST = {
     "joint_viscous": ("joints viscous", SKY),
     "joint_micro_damping": ("joints' micro-damping", BLACK),
     "limiter": ("stroke limiters", GREEN),
+    "joint_springs": ("joints' springs", "saddlebrown"),
     "slack": ("tensions cut at zero", PURPLE),
 }
 _MILLI = 1e3
