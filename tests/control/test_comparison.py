@@ -33,7 +33,7 @@ def rows(runs, coupling):
 
 def test_every_case_is_a_scenario():
     for overrides in CASES.values():
-        fp.build_controller(fp.load_scenario("fig6", overrides))
+        fp.control.build_controller(fp.load_scenario("fig6", overrides))
 
 
 def test_friction_compensation_cuts_the_error_by_three_at_no_more_than_1_3_times_the_peak_tension(rows):
