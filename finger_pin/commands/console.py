@@ -118,7 +118,7 @@ def noted(note: str) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        if not isinstance(error, InputError | typer.TyperException):
+        if not isinstance(error, InputError | Unsuccessful | typer.TyperException):
             error.add_note(note)
         raise
 

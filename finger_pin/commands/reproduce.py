@@ -19,7 +19,7 @@ EXPECTED_TENSIONS = {"T3": "up to about 9", "T5": "1 to 7, never slack"}
 
 
 def reproduce(output: Output = Path("results/paper")) -> None:
-    """Simulate the scenario fig6 and draw the paper's figures, with the losses and the energy account, into one folder."""
+    """Simulate the scenario fig6 and draw the paper's figures, with the losses and the energy account."""
     shown = talks(quiet=False)
     from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.simulate import simulate

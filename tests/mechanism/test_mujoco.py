@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from validation import mujoco_motion
 
 import finger_pin as fp
+from finger_pin.commands.validation import mujoco_motion
 from finger_pin.description.loading import list_fingers
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mjcf import to_mjcf
