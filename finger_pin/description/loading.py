@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import re
 import tomllib
@@ -18,7 +17,6 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, nearest, validate
 from finger_pin.exceptions import InputError
-from finger_pin.publishing import settle
 
 Table = dict[str, Any]
 _LARGEST = 10_000_000
@@ -95,8 +93,6 @@ def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
     """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
     if _is_path(name):
         what, path = f"{kind} file {name}", folder / _expand(name)
-        with contextlib.suppress(OSError, ValueError):
-            settle(path.parent)
         data = _read_bytes(what, path)
     else:
         what, path = f"{kind} {name}", Path(name)
