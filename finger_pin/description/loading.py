@@ -9,13 +9,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin
 
 import tomli_w
 
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, nearest, validate
+from finger_pin.description.validation import Description, find_field, nearest, validate
 from finger_pin.exceptions import InputError
 
 Table = dict[str, Any]
@@ -45,8 +45,8 @@ def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) ->
     overrides = _from_here(overrides or {}, {"finger"})
     table: Table = {"finger": str(name)}
     with _depth_limited("finger"):
-        _apply(overrides, table)
-        return validate(FingerDescription, _resolve_finger(table["finger"], Path()), ("finger",))
+        _override(overrides, table, Path())
+        return validate(FingerDescription, table["finger"], ("finger",))
 
 
 def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -67,12 +67,7 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     with _depth_limited("scenario"):
         table, folder = _read_scenario(str(name), Path())
         table.setdefault("name", _as_name(Path(str(name)).stem))
-        # Another finger replaces the old one before entries on top of either are applied.
-        _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
-        if "finger" not in table:
-            raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
-        table["finger"] = _resolve_finger(table["finger"], folder)
-        _apply(overrides, table)
+        _override(overrides, table, folder)
         return validate(Scenario, table, ())
 
 
@@ -185,18 +180,42 @@ def _merge(base: Table, top: Table) -> Table:
     return merged
 
 
+def _override(overrides: Table, table: Table, folder: Path) -> None:
+    """Resolve the finger of a table, and apply overrides: another finger before entries on top of either."""
+    _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
+    if "finger" not in table:
+        raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+    table["finger"] = _resolve_finger(table["finger"], folder)
+    _apply(overrides, table)
+
+
 def _apply(overrides: Mapping[str, Any], table: Table) -> None:
     for key, value in overrides.items():
         *path, last = key.split(".")
         inner = table
         for depth, part in enumerate(path):
+            _refuse_new([*path[:depth], part], inner, table)
             below = inner.setdefault(part, {})
             if isinstance(below, str) and path[: depth + 1] == ["finger"]:
                 below = inner[part] = {"base": below}
             if not isinstance(below, dict):
                 raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
             inner = below
+        _refuse_new([*path, last], inner, table)
         inner[last] = copy.deepcopy(value)
+
+
+def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
+    """Raise where an override would bring a joint, a tendon or the like into being: only a file does."""
+    *owner, name = path
+    field = find_field(Scenario, owner) if owner else None
+    if field is None or get_origin(field.annotation) is not dict:
+        return
+    # A joint that is held at zero has no entry of its own yet.
+    names = _as_table(_as_table(table.get("finger")).get("joints")) if owner == ["reference", "joints"] else siblings
+    if name not in names:
+        allowed = f"no such {owner[-1].removesuffix('s')}; there are {', '.join(names) or 'none'}"
+        raise InputError(".".join(path), f"{allowed}{_hint(name, names)}")
 
 
 def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:

@@ -118,23 +118,29 @@ OTHER_OVERRIDES = [
     ("finger.tendons.T5.mass_after=3", "finger.tendons.T5.mass_after", "at most the 2 crossings"),
     ("finger.tendons.T5.mass_after=-1", "finger.tendons.T5.mass_after", "at least 0"),
     ("finger.tendons.T5.mass_after=1.5", "finger.tendons.T5.mass_after", "whole number"),
-    ("finger.tendons.T1.crossings.thumb={radius = 0.01}", "finger.tendons.T1.crossings.thumb", "no such joint"),
-    ("finger.tendons.T1.crossings.medial={}", "finger.tendons.T1.crossings.medial.radius", "is missing"),
-    ("finger.tendons.T1.crossings.medial=0.01", "finger.tendons.T1.crossings.medial", "must be a table"),
+    ("finger.tendons.T1.crossings.proximal={}", "finger.tendons.T1.crossings.proximal.radius", "is missing"),
+    ("finger.tendons.T1.crossings.proximal=0.01", "finger.tendons.T1.crossings.proximal", "must be a table"),
     ("finger.tendons.T1.crossings.abduction.bends=1", "finger.tendons.T1.crossings.abduction.bends", "true or false"),
     ("finger.tendons.T1.crossings.abduction.radius=8", "finger.tendons.T1.crossings.abduction.radius", "millimetres"),
     ("finger.tendons.T1.crossings={}", "finger.tendons.T1.crossings", "at least one entry"),
     ("finger.tendons.T4.crossings.medial.radius=0.0053", "finger.tendons", "force closure"),
-    ("finger.tendons.T6={crossings = {distal = {radius = 0.0}}}", "finger.tendons.T6.crossings", "differ from zero"),
+    ("finger.tendons.T2.crossings={distal = {radius = 0.0}}", "finger.tendons.T2.crossings", "differ from zero"),
     (
-        'finger.tendons.T6={kind = "passive", crossings = {medial = {radius = 0.004}, distal = {radius = -0.004}}}',
+        'finger.tendons.T4={kind = "passive", crossings = {medial = {radius = 0.004}, distal = {radius = -0.004}}}',
         "finger.tendons",
         ("determine the same joint twice", "force closure"),
     ),
-    ("finger.joints.thumb={}", "finger.joints.thumb.range", "is missing"),
+    # Nothing comes into being.
+    ("finger.tendons.t3.curvature_offset=1", "finger.tendons.t3", "there are T1, T2, T3, T4, T5; did you mean T3?"),
+    ("finger.tendons.T33.crossings.medial.radius=0.01", "finger.tendons.T33", "no such tendon"),
+    ("finger.tendons.T6={crossings = {distal = {radius = 0.01}}}", "finger.tendons.T6", "no such tendon"),
+    ("finger.tendons.T1.crossings.thumb={radius = 0.01}", "finger.tendons.T1.crossings.thumb", "no such crossing"),
+    ("finger.tendons.T3.crossings.mediale.radius=0.01", "finger.tendons.T3.crossings.mediale", "did you mean medial?"),
+    ("finger.joints.thumb={}", "finger.joints.thumb", "no such joint; there are abduction"),
+    ("reference.joints.proximl.offset=0.1", "reference.joints.proximl", "did you mean proximal?"),
     ("finger.joints={}", "finger.joints", "at least one entry"),
     ("finger.tendons={}", "finger.tendons", "at least one entry"),
-    ("reference.joints.thumb={offset = 0.1}", "reference.joints.thumb", "no such joint; the joints are abduction"),
+    ("reference.joints.thumb={offset = 0.1}", "reference.joints.thumb", "no such joint; there are abduction"),
     ("reference.joints.distal={offset = 0.1}", "reference.joints.distal", "passive tendon"),
     ("reference.joints.medial=0.5", "reference.joints.medial", "must be a table"),
     ("reference.joints=[1.0]", "reference.joints", "must be a table"),
@@ -184,7 +190,7 @@ OTHER_OVERRIDES = [
     ("finger.joint_friction=1", "finger.joint_friction", "must be a table"),
     ("finger.tendon_friction.coulomb_=1", "finger.tendon_friction.coulomb_", "finger.tendon_friction.coulomb?"),
     ("finger.joints.proximal.lnk.mass=1", "finger.joints.proximal.lnk", "finger.joints.proximal.link?"),
-    ("finger.joints.proximl.link.mass=1", "finger.joints.proximl.range", "is missing"),
+    ("finger.joints.proximl.link.mass=1", "finger.joints.proximl", "did you mean proximal?"),
 ]
 OVERRIDES = NUMBER_OVERRIDES + OTHER_OVERRIDES
 
@@ -403,6 +409,12 @@ def test_overrides_win_over_the_file(tmp_path):
     assert scenario.simulation.duration == 3.0
     assert scenario.finger.gravity == (0.0, 0.0, 0.0)
     assert scenario.reference.joints["proximal"].offset == 0.6
+
+
+def test_a_joint_that_the_file_leaves_at_rest_may_be_moved_by_an_override(tmp_path):
+    (tmp_path / "s.toml").write_text(PLANAR.replace("[reference.joints.distal]\noffset = 0.4\n", ""))
+    key = "reference.joints.distal.offset"
+    assert load_scenario(tmp_path / "s.toml", {key: 0.2}).reference.joints["distal"].offset == 0.2
 
 
 def test_an_override_may_replace_the_finger_and_change_the_new_one_in_either_order():
