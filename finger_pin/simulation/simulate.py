@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -22,6 +23,7 @@ from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
 from finger_pin.core.plant import Control, held_control
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
+from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
@@ -37,7 +39,7 @@ _CHUNK, _CHUNK_OBSERVED = 256, 4
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
     controller: Controller | None = None,
     reference: Reference | None = None,
@@ -55,7 +57,7 @@ def simulate(
     that takes seconds for a simulated second.
 
     Args:
-        scenario: What to simulate, from `load_scenario`.
+        scenario: What to simulate, from `load_scenario`, or what that takes: the name of one, or the path of a file.
         controller: Replaces the scenario's controller.
         reference: Replaces the scenario's reference.
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
@@ -77,6 +79,8 @@ def simulate(
             the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
             there is neither.
     """
+    if isinstance(scenario, str | Path):
+        scenario = load_scenario(scenario)
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference)
     # The margin is that of the paper's controller on the scenario's reference.
