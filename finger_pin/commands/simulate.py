@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import warnings
 from contextlib import nullcontext
 from pathlib import Path
@@ -10,18 +11,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
+from finger_pin.commands.drawing import Drawing, NotDrawn, without_dask
 from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
-from finger_pin.exceptions import FingerPinError, IntegrationError, Interrupted, SelfLockingWarning
+from finger_pin.exceptions import IntegrationError, Interrupted, SelfLockingWarning
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from finger_pin.description.scenario import Scenario
     from finger_pin.simulation.results import ResultFolder
-
-
-class NotDrawn(FingerPinError):
-    """Figures or animation cannot be drawn; the data are kept."""
 
 
 def simulate(
@@ -46,11 +44,15 @@ def simulate(
     if listed:
         print_text(listing())
         return
-    with Interrupts() as interrupts:
+    with Interrupts() as interrupts, without_dask(), Drawing() if figures else nullcontext() as drawing:
+        # Imports leave no garbage to look for.
+        gc.disable()
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
         from finger_pin.views.summary import summarize
+
+        gc.enable()
 
         loaded = load_scenario(scenario, changed)
         output = output or Path("results", default_name(loaded, settings, duration, method))
@@ -69,7 +71,7 @@ def simulate(
                     # Who interrupts wants an end soon: the data are kept, the views are not drawn.
                     problem = problem or KeyboardInterrupt()
                 else:
-                    problem = draw(result, folder, figures) or problem
+                    problem = draw(result, folder, drawing) or problem
                 with interrupts.patient():
                     folder.publish()
         if not quiet:
@@ -122,16 +124,16 @@ def compute(
     return result, None
 
 
-def draw(result: xr.Dataset, folder: ResultFolder, figures: bool) -> BaseException | None:
+def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> BaseException | None:
     """Draw animation and figures, all or none; return what went wrong if anything did."""
     try:
+        if drawing is not None:
+            drawing.start(folder.stage)
         from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")
-        if figures:
-            from finger_pin.views.plots import draw_all
-
-            draw_all(result, folder.stage / "figures")
+        if drawing is not None:
+            drawing.wait()
     except OSError:
         raise
     except (KeyboardInterrupt, Exception) as error:
@@ -139,7 +141,8 @@ def draw(result: xr.Dataset, folder: ResultFolder, figures: bool) -> BaseExcepti
         folder.discard_views()
         if isinstance(error, KeyboardInterrupt):
             return error
-        return NotDrawn(f"animation and figures cannot be drawn: {type(error).__name__}: {error}")
+        what = str(error) if isinstance(error, NotDrawn) else f"{type(error).__name__}: {error}"
+        return NotDrawn(f"animation and figures cannot be drawn: {what}")
     return None
 
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from test_loading import FILES, OTHER_OVERRIDES, PLANAR
 
 import finger_pin as fp
 from finger_pin.commands import application
+from finger_pin.commands.drawing import Drawing, NotDrawn
 from finger_pin.commands.options import overrides
 from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import IntegrationError
@@ -44,6 +46,18 @@ def run(capsys, here):
     return run
 
 
+class Quick:
+    """In place of the process that draws."""
+
+    def start(self, folder):
+        (folder / "figures").mkdir()
+        for name in ("fig6", "energy"):
+            (folder / "figures" / f"{name}.png").write_text(name)
+
+    def wait(self):
+        pass
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """Views that cost nothing: the real ones have tests of their own."""
@@ -51,13 +65,8 @@ def quick(monkeypatch):
     def write_animation(result, path):
         Path(path).write_text("animation")
 
-    def draw_all(result, folder):
-        Path(folder).mkdir()
-        for name in ("fig6", "energy"):
-            (Path(folder) / f"{name}.png").write_text(name)
-
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", write_animation)
-    monkeypatch.setattr("finger_pin.views.plots.draw_all", draw_all)
+    monkeypatch.setattr("finger_pin.commands.simulate.Drawing", lambda: nullcontext(Quick()))
 
 
 def refused(answer, *says):
@@ -442,10 +451,10 @@ def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monke
 def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monkeypatch):
     assert run("s.toml", "--output", "out")[0] == 0
 
-    def fail(*arguments):
-        raise ValueError("axis limits cannot be NaN")
+    def fail(drawing):
+        raise NotDrawn("ValueError: axis limits cannot be NaN")
 
-    monkeypatch.setattr("finger_pin.views.plots.draw_all", fail)
+    monkeypatch.setattr(Quick, "wait", fail)
     code, _, lines = run("s.toml", "--output", "out", "--duration", "0.003")
     assert code == 1
     assert len(lines) == 1
@@ -498,22 +507,41 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
     assert contents(here) == before
 
 
+def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_that_started_it(tmp_path):
+    with Drawing() as drawing:
+        drawing.start(tmp_path / "no\nwhere é")
+        with pytest.raises(FileNotFoundError):
+            drawing.wait()
+    with Drawing() as drawing:
+        (tmp_path / "trajectory.nc").write_text("no netCDF")
+        drawing.start(tmp_path)
+        with pytest.raises(NotDrawn, match="Unknown file format"):
+            drawing.wait()
+    with Drawing() as drawing:
+        os.kill(drawing.process.pid, signal.SIGKILL)
+        drawing.process.wait()
+        drawing.start(tmp_path)
+        with pytest.raises(NotDrawn, match="killed"):
+            drawing.wait()
+    with Drawing() as drawing:
+        pass
+    assert drawing.process.returncode == -signal.SIGKILL
+
+
 def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(run, here, quick, monkeypatch):
-    def slow(result, folder):
-        Path(folder).mkdir()
-        (Path(folder) / "fig6.png").write_text("half")
+    def slow(drawing):
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(1.0)
         pytest.fail("went on")
 
-    monkeypatch.setattr("finger_pin.views.plots.draw_all", slow)
+    monkeypatch.setattr(Quick, "wait", slow)
     code, _, lines = run("s.toml", "--output", "out")
     assert code == 130
     assert lines == ["simulate.py: interrupted; what was computed is in out"]
     assert set(contents(here / "out")) == {"scenario.toml", "trajectory.nc"}
 
 
-@pytest.mark.parametrize("broken", ["finger_pin.simulation.results.save", "finger_pin.views.plots.draw_all"])
+@pytest.mark.parametrize("broken", ["saving", "drawing"])
 def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quick, monkeypatch, broken):
     assert run("s.toml", "--output", "out")[0] == 0
     before = contents(here)
@@ -521,10 +549,13 @@ def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quic
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(broken, fail)
+    if broken == "saving":
+        monkeypatch.setattr("finger_pin.simulation.results.save", fail)
+    else:
+        monkeypatch.setattr(Quick, "wait", fail)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "0.003")
     assert (code, out, len(lines)) == (1, "", 1)
-    assert "No space left on device" in lines[0]
+    assert "No space left on device; earlier results are as they were" in lines[0]
     assert contents(here) == before
 
 
@@ -553,6 +584,17 @@ def test_listing_imports_neither_matplotlib_nor_meshcat(here):
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=here, capture_output=True, text=True, check=True)
     assert done.stderr == "set()\n"
+
+
+def test_a_run_does_not_import_what_only_happens_to_be_installed(here):
+    code = (
+        "import sys\n"
+        "from finger_pin.commands.application import run\n"
+        "print(run('simulate', ['s.toml', '--no-figures', '--quiet']))\n"
+        "print({'dask', 'distributed', 'matplotlib', 'scipy.optimize', 'scipy.integrate'} & set(sys.modules))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=here, capture_output=True, text=True, check=True)
+    assert done.stdout == "0\nset()\n"
 
 
 def test_a_reader_that_has_gone_is_no_error(here):
