@@ -17,10 +17,15 @@ from finger_pin.mechanism.urdf import to_urdf
 mujoco = pytest.importorskip("mujoco")
 
 TWO_PASSIVE = {
-    "finger.tendons.T6": {
-        "kind": "passive",
-        "mass_after": 0,
-        "crossings": {"abduction": {"radius": 0.004}, "distal": {"radius": -0.006}},
+    "finger": {
+        "base": "ub",
+        "tendons": {
+            "T6": {
+                "kind": "passive",
+                "mass_after": 0,
+                "crossings": {"abduction": {"radius": 0.004}, "distal": {"radius": -0.006}},
+            }
+        },
     },
     "finger.passive_tendon.mass": [1e-5, 3e-4],
     "finger.passive_tendon.stiffness": [5e4, 2e4],
