@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from harness import Quick
-from test_loading import PLANAR
+from wrong_inputs import PLANAR
 
 from finger_pin.commands import application
 

@@ -5,7 +5,7 @@ import os
 import pytest
 from harness import refused
 from test_files import contents
-from test_loading import FILES, OTHER_OVERRIDES, PLANAR
+from wrong_inputs import FILES, OTHER_OVERRIDES, PLANAR
 
 
 @pytest.mark.parametrize(("text", "entry", "says"), OTHER_OVERRIDES, ids=[text[:50] for text, _, _ in OTHER_OVERRIDES])

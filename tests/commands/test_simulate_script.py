@@ -6,7 +6,7 @@ import sys
 
 from harness import ALL, SCRIPT
 from test_files import contents
-from test_loading import PLANAR
+from wrong_inputs import PLANAR
 
 import finger_pin as fp
 from finger_pin.commands.options import overrides

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from test_files import contents
-from test_loading import PLANAR
+from wrong_inputs import PLANAR
 
 import finger_pin as fp
 from finger_pin.commands.application import run as run_command
