@@ -1,5 +1,6 @@
 """The compiler's cache: where it is, when it is thrown away, and that nothing is compiled before it is needed."""
 
+import logging
 import os
 import shutil
 import subprocess
@@ -115,6 +116,8 @@ def doubled():
 
 @pytest.fixture
 def said(caplog):
+    # A command that was run without a terminal has silenced it.
+    caplog.set_level(logging.WARNING, logger="finger_pin")
     compilation._say.cache_clear()
     yield lambda: [record.getMessage() for record in caplog.records]
     compilation._say.cache_clear()
