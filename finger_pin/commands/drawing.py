@@ -76,8 +76,13 @@ class Drawing:
             OSError: If they cannot be written.
             NotDrawn: If they cannot be drawn.
         """
-        out, complaint = self.process.communicate()
-        number, text = json.loads(out) if out else (0, (complaint.strip().splitlines() or ["killed"])[-1])
+        assert self.process.stdout is not None and self.process.stderr is not None
+        # Its answer is enough: to end takes it a while.
+        answer = self.process.stdout.readline()
+        if answer:
+            number, text = json.loads(answer)
+        else:
+            number, text = 0, (self.process.stderr.read().strip().splitlines() or ["killed"])[-1]
         if number:
             raise OSError(number, os.strerror(number))
         if text:
@@ -96,13 +101,15 @@ def serve() -> None:
         folder = sys.stdin.readline()
         if not folder:
             return
+        answer: tuple[int, str] = (0, "")
         try:
             stage = Path(json.loads(folder))
             draw_all(xr.load_dataset(stage / "trajectory.nc", engine="netcdf4"), stage / "figures")
         except Exception as error:
-            print(json.dumps([max(getattr(error, "errno", None) or 0, 0), f"{type(error).__name__}: {error}"]))
-        else:
-            print(json.dumps([0, ""]))
+            # The netCDF library has negative numbers of its own.
+            number = getattr(error, "errno", None) or 0
+            answer = (max(number, 0), f"{type(error).__name__}: {error}")
+        print(json.dumps(answer), flush=True)
 
 
 if __name__ == "__main__":
