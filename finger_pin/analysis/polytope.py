@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import scipy.spatial
+import scipy
 
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture

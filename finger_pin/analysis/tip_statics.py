@@ -31,7 +31,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-import scipy.interpolate
+import scipy
 
 from finger_pin.core.textbook import Statistics, Stop, Trajectory, Watch
 from finger_pin.description.routing import Array

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.integrate
-import scipy.linalg
+import scipy
 
 from finger_pin.description.routing import Array
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import re
 import tomllib
@@ -10,16 +9,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin
 
 import tomli_w
 
 from finger_pin.description.columns import read_columns
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, nearest, validate
+from finger_pin.description.scenario import AXES, Scenario
+from finger_pin.description.validation import Description, find_field, nearest, validate
 from finger_pin.exceptions import InputError
-from finger_pin.publishing import settle
 
 Table = dict[str, Any]
 # Sections that may name a CSV file, the key that does, and where its columns go.
@@ -56,8 +54,8 @@ def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) ->
     overrides = _from_here(overrides or {}, {"finger"})
     table: Table = {"finger": str(name)}
     with _depth_limited("finger"):
-        _apply(overrides, table)
-        return validate(FingerDescription, _resolve_finger(table["finger"], Path()), ("finger",))
+        _override(overrides, table, Path())
+        return validate(FingerDescription, table["finger"], ("finger",))
 
 
 def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -78,13 +76,7 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     with _depth_limited("scenario"):
         table, folder = _read_scenario(str(name), Path())
         table.setdefault("name", _as_name(Path(str(name)).stem))
-        # Another finger replaces the old one before entries on top of either are applied.
-        _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
-        if "finger" not in table:
-            raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
-        table["finger"] = _resolve_finger(table["finger"], folder)
-        # A kind comes before what belongs to it.
-        _apply(dict(sorted(overrides.items(), key=lambda each: not each[0].endswith(".kind"))), table)
+        _override(overrides, table, folder)
         _resolve_signals(table, Path())
         return validate(Scenario, table, ())
 
@@ -106,8 +98,6 @@ def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
     """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
     if _is_path(name):
         what, path = f"{kind} file {name}", folder / _expand(name)
-        with contextlib.suppress(OSError, ValueError):
-            settle(path.parent)
         data = _read_bytes(what, path)
     else:
         what, path = f"{kind} {name}", Path(name)
@@ -226,11 +216,22 @@ def _merge(base: Table, top: Table) -> Table:
     return merged
 
 
+def _override(overrides: Table, table: Table, folder: Path) -> None:
+    """Resolve the finger of a table, and apply overrides: another finger before entries on top of either."""
+    _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
+    if "finger" not in table:
+        raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+    table["finger"] = _resolve_finger(table["finger"], folder)
+    # A kind comes before what belongs to it.
+    _apply(dict(sorted(overrides.items(), key=lambda each: not each[0].endswith(".kind"))), table)
+
+
 def _apply(overrides: Mapping[str, Any], table: Table) -> None:
     for key, value in overrides.items():
         *path, last = key.split(".")
         inner = table
         for depth, part in enumerate(path):
+            _refuse_new([*path[:depth], part], inner, table)
             below = inner.setdefault(part, {})
             if isinstance(below, str) and path[: depth + 1] == ["finger"]:
                 below = inner[part] = {"base": below}
@@ -239,7 +240,29 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
             inner = below
         if last == "kind" and isinstance(value, str) and _is_other_kind(inner, {"kind": value}):
             inner.clear()
+        _refuse_new([*path, last], inner, table)
         inner[last] = copy.deepcopy(value)
+
+
+def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
+    """Raise where an override would bring a joint, a tendon or the like into being: only a file does."""
+    *owner, name = path
+    field = find_field(Scenario, owner) if owner else None
+    if field is None or get_origin(field.annotation) is not dict:
+        return
+    finger = _as_table(table.get("finger"))
+    # A signal for a joint, a tendon or an axis that is there may have no entry of its own yet.
+    present: dict[tuple[str, ...], Iterable[str]] = {
+        ("reference", "joints"): _as_table(finger.get("joints")),
+        ("controller", "tensions"): _as_table(finger.get("tendons")),
+        ("environment", "fingertip_force_signal"): AXES,
+        ("simulation", "initial", "position"): _as_table(finger.get("joints")),
+        ("simulation", "initial", "velocity"): _as_table(finger.get("joints")),
+    }
+    names = present.get(tuple(owner), siblings)
+    if name not in names:
+        allowed = f"no such {owner[-1].removesuffix('s')}; there are {', '.join(names) or 'none'}"
+        raise InputError(".".join(path), f"{allowed}{_hint(name, names)}")
 
 
 def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -119,12 +121,15 @@ class Finger:
     """
 
     def __init__(
-        self, description: FingerDescription, rigid_body: RigidBody | None = None, rows: Sequence[Rows] = ()
+        self,
+        description: FingerDescription | str | Path,
+        rigid_body: RigidBody | None = None,
+        rows: Sequence[Rows] = (),
     ) -> None:
         """Build a finger.
 
         Args:
-            description: The finger.
+            description: The finger, or what `load_finger` takes: the name of one, or the path of a file.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
@@ -132,6 +137,8 @@ class Finger:
         Raises:
             InputError: If the joints of the two differ.
         """
+        if isinstance(description, str | Path):
+            description = load_finger(description)
         self.description = description
         self.rigid_body = rigid_body or build_rigid_body(description)
         if len(self.rigid_body.joints) != len(description.joints):

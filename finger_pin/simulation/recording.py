@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
@@ -20,7 +19,6 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
 from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.publishing import settle
 from finger_pin.simulation.account import Account, account
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
@@ -78,19 +76,32 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a result to a netCDF4 file, whole or not at all."""
+    """Write a result to a netCDF4 file, whole or not at all.
+
+    Raises:
+        OSError: If it cannot be written, such as on a full disk.
+    """
     with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+        try:
+            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+        except RuntimeError as error:
+            # The netCDF library does not say why; as many plain bytes do where the disk is full.
+            with open(temporary, "ab") as file:
+                file.write(bytes(dataset.nbytes + 2**20))
+            raise OSError(f"{Path(path).name}: {error}") from error
 
 
 def load_result(path: str | Path) -> xr.Dataset:
     """Read a result that `save` wrote into memory.
 
-    In a folder of results whose run was killed while it moved them into place, the moves are finished before.
+    Args:
+        path: A netCDF file, or a folder of results, whose ``trajectory.nc`` is read.
+
+    Raises:
+        OSError: If there is no such file, or it cannot be read.
     """
-    with contextlib.suppress(OSError):
-        settle(Path(path).parent)
-    return xr.load_dataset(path, engine="netcdf4")
+    file = Path(path, "trajectory.nc") if Path(path).is_dir() else path
+    return xr.load_dataset(file, engine="netcdf4")
 
 
 def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:

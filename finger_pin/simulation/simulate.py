@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -26,6 +27,7 @@ from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
+from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, MicroDampingWarning
@@ -42,7 +44,7 @@ _CHUNK, _CHUNK_OBSERVED = 256, 4
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
@@ -63,7 +65,7 @@ def simulate(
     that takes seconds for a simulated second.
 
     Args:
-        scenario: What to simulate, from `load_scenario`.
+        scenario: What to simulate, from `load_scenario`, or what that takes: the name of one, or the path of a file.
         controller: Replaces the scenario's controller: an object with ``command``, asked for one time at a time, or
             tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N.
         reference: Replaces the scenario's reference: an object with ``at``, asked for one time at a time, or times,
@@ -94,6 +96,8 @@ def simulate(
             there is neither.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
+    if isinstance(scenario, str | Path):
+        scenario = load_scenario(scenario)
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force)
     if initial is not None:

@@ -14,12 +14,12 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from validation.mujoco_motion import EXPRESSIBLE
 
 import finger_pin as fp
 from benchmarks.runs import Job, Point, compiled, point, rms, truth
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
+from finger_pin.commands.validation.mujoco_motion import EXPRESSIBLE
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array

@@ -6,6 +6,7 @@ from typing import Any
 import kernels
 import numpy as np
 import pinocchio as pin
+from finger_pin.core.plant import build_plant, build_work
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -13,7 +14,6 @@ from finger_pin.control.compiled import build_control
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import TABLEAUS, Stepper
 from finger_pin.core.linearisation import build_linear
-from finger_pin.core.plant import build_plant, build_work
 
 BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(

@@ -8,14 +8,14 @@ import kernels
 import numpy as np
 import pytest
 from core_cases import Case
+from finger_pin.core.plant import held_control
 from test_core_linearisation import pieces
-from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
+from finger_pin.commands.validation.order import END, mean_order, smooth_motion, step_errors
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import TABLEAUS, _interpolant
-from finger_pin.core.plant import held_control
 
 METHODS = tuple(TABLEAUS)
 ORDER = {"Rodas4": 4, "Rodas5P": 5}

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 
+from finger_pin.commands.validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 from finger_pin.description.loading import list_fingers, load_finger
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.shapes import MATERIALS

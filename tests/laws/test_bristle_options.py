@@ -4,15 +4,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.elimination import factorise, solve
+from finger_pin.core.plant import build_plant, build_work, held_control
 
 import finger_pin as fp
 from finger_pin.core import dynamics as at
 from finger_pin.core.compilation import entry
-from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.dynamics import evaluate
-from finger_pin.core.elimination import factorise, solve
 from finger_pin.core.linearisation import build_linear, linearise
-from finger_pin.core.plant import build_plant, build_work, held_control
 from finger_pin.core.rigid_body import MASS_MATRIX
 from finger_pin.simulation.energy import powers
 

@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from validation import mujoco_motion
 
 import finger_pin as fp
+from finger_pin.commands.validation import mujoco_motion
 from finger_pin.description.loading import list_fingers
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mjcf import to_mjcf
@@ -17,10 +17,15 @@ from finger_pin.mechanism.urdf import to_urdf
 mujoco = pytest.importorskip("mujoco")
 
 TWO_PASSIVE = {
-    "finger.tendons.T6": {
-        "kind": "passive",
-        "mass_after": 0,
-        "crossings": {"abduction": {"radius": 0.004}, "distal": {"radius": -0.006}},
+    "finger": {
+        "base": "ub",
+        "tendons": {
+            "T6": {
+                "kind": "passive",
+                "mass_after": 0,
+                "crossings": {"abduction": {"radius": 0.004}, "distal": {"radius": -0.006}},
+            }
+        },
     },
     "finger.passive_tendon.mass": [1e-5, 3e-4],
     "finger.passive_tendon.stiffness": [5e4, 2e4],

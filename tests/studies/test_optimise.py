@@ -14,8 +14,8 @@ from finger_pin.studies.search import Search, nondominated
 from finger_pin.studies.variables import parse_variable, point_at
 
 SHORT = {"simulation.duration": 0.02}
-TWO = fp.LocalProcesses(2)
-FEW = fp.Effort(population=8, generations=3)
+TWO = fp.studies.LocalProcesses(2)
+FEW = fp.studies.Effort(population=8, generations=3)
 ABDUCTION = "finger.tendons.{}.crossings.abduction.radius"
 
 
@@ -160,7 +160,7 @@ def test_designs_that_cannot_be_run_do_not_count_and_are_recorded_with_their_rea
 
 
 def test_what_is_best_is_found_though_some_designs_raise():
-    result = search_gain(minimise=[], maximise=[GAIN, RAISES], effort=fp.Effort(population=8, generations=8))
+    result = search_gain(minimise=[], maximise=[GAIN, RAISES], effort=fp.studies.Effort(population=8, generations=8))
     assert result["controller.gain"].values[result["front"].values == 1] > 1.9
 
 
@@ -211,4 +211,4 @@ def test_wrong_input_writes_nothing(tmp_path, over, options):
 @pytest.mark.parametrize("numbers", [{"population": 3}, {"generations": 0}, {"seed": -1}])
 def test_an_effort_that_is_none_is_refused(numbers):
     with pytest.raises(fp.InputError):
-        fp.Effort(**numbers)
+        fp.studies.Effort(**numbers)

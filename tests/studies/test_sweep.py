@@ -11,7 +11,7 @@ from finger_pin.studies.metrics import METRICS, Run
 
 RADIUS = "finger.tendons.T3.crossings.medial.radius"
 SHORT = {"simulation.duration": 0.02}
-TWO = fp.LocalProcesses(2)
+TWO = fp.studies.LocalProcesses(2)
 
 
 def lines(folder):
@@ -81,7 +81,7 @@ def test_the_same_again_repeats_no_run(grid):
     before = (folder / "runs.jsonl").read_bytes()
     seen = []
     again = fp.sweep(
-        "fig6", fp.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
+        "fig6", fp.studies.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
         metrics=["tracking_rms", "tension_peak"], overrides=SHORT, output=folder, executor=TWO,
         progress=lambda *numbers: seen.append(numbers),
     )  # fmt: skip
@@ -91,8 +91,8 @@ def test_the_same_again_repeats_no_run(grid):
 
 
 def test_samples_have_every_key_as_a_coordinate():
-    cube = fp.LatinHypercube(
-        {"controller.gain": fp.Range(0.5, 2.0), "environment.fingertip_force[2]": fp.Range(0, 1)}, 3
+    cube = fp.studies.LatinHypercube(
+        {"controller.gain": fp.studies.Range(0.5, 2.0), "environment.fingertip_force[2]": fp.studies.Range(0, 1)}, 3
     )
     result = fp.sweep("fig6", cube, metrics=[GAIN], overrides=SHORT, executor=TWO)
     assert result["gain"].dims == ("sample",)

@@ -7,10 +7,10 @@ import io
 from html import escape
 from typing import TYPE_CHECKING
 
-from validation.check import Check, Picture, Verdict
+from finger_pin.commands.validation.check import Check, Picture, Verdict
 
 if TYPE_CHECKING:
-    from validation.report import Family, Report
+    from finger_pin.commands.validation.report import Family, Report
 
 _STYLE = """
 :root { --ink: #1d2433; --soft: #5d6678; --line: #e3e6ec; --pass: #0b7a55; --differs: #a15c00; --fail: #c0271d; }

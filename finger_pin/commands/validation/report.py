@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
+from finger_pin.commands.validation.check import Check, Section, Verdict
+from finger_pin.commands.validation.page import page
 from finger_pin.files import replacing
-from validation.check import Check, Section, Verdict
-from validation.page import page
 
 PAGE, DATA = "validation.html", "validation.json"
 _PACKAGES = (

@@ -6,11 +6,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.commands.validation.check import Check, Picture, Section, compare
 from finger_pin.description.loading import list_scenarios, load_scenario
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.lines import series, trace
 from finger_pin.views.plots.style import new_figure, styled
-from validation.check import Check, Picture, Section, compare
 
 TITLE = "Energy account"
 TOLERANCES = (1e-4, 1e-6, 1e-8)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.commands.validation.check import Comparison, Section, compare
 from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator
-from validation.check import Comparison, Section, compare
 
 TITLE = "Mirror and units"
 _WIDTH, _MASS = 0.01, 0.02

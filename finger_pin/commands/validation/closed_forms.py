@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
+from finger_pin.commands.validation.check import Check, Comparison, Picture, Section, compare
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, new_figure, styled
-from validation.check import Check, Comparison, Picture, Section, compare
 
 TITLE = "Closed forms"
 FRICTIONLESS: dict[str, Any] = {
@@ -93,7 +93,7 @@ def slide(finger: Finger, velocity: float, travel: float = 2e-3, stiction: float
         x[2] += h / 6.0 * (slopes[0] + 2.0 * slopes[1] + 2.0 * slopes[2] + slopes[3])
         record.append(x[2])
     delivered = float(core.evaluate(x, tension).tendons.strands[0])
-    return Slide(np.arange(1, steps + 1) * velocity * h, np.array(record), delivered)
+    return Slide(np.arange(1, steps + 1, dtype=np.float64) * velocity * h, np.array(record), delivered)
 
 
 def capstan_tension(velocity: float) -> float:

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.commands.validation.check import Check, Picture, Section, compare, skipped
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.scenario import METHODS
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import new_figure, styled
-from validation.check import Check, Picture, Section, compare, skipped
 
 TITLE = "Integrators against each other"
 #: Scenario and how much of it the slowest methods can afford, s.

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
+from finger_pin.commands.validation.check import Check, Picture, Section, compare
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import build_control
 from finger_pin.core import rosenbrock
@@ -19,7 +20,6 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import new_figure, styled
-from validation.check import Check, Picture, Section, compare
 
 TITLE = "Order of the integrators"
 ORDER = {"Rodas5P": 5, "Rodas4": 4}

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.commands.validation.check import Check, Comparison, Section, compare, skipped
 from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
-from validation.check import Check, Comparison, Section, compare, skipped
 
 TITLE = "Forward kinematics"
 POSTURES = 1000

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.commands.validation.check import Check, Picture, Section, compare, skipped
 from finger_pin.control.reference import SignalReference
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
@@ -20,7 +21,6 @@ from finger_pin.mechanism.mjcf import to_mjcf
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import GREY, new_figure, styled
-from validation.check import Check, Picture, Section, compare, skipped
 
 TITLE = "Whole motions against MuJoCo"
 # What MuJoCo cannot express is taken away. With mu_e = 0 a bristle F^s carries at most sigma_0 times the path that its
@@ -67,7 +67,8 @@ def follow(scenario: Scenario, model: Any, step: float) -> Array:
     inverse, internal = np.linalg.pinv(routing.coupling.T), routing.force_closure().tension
     gain = np.broadcast_to(scenario.controller.gain, len(routing.joints))
     minimum = np.broadcast_to(scenario.controller.minimum_tension, len(routing.tendons))
-    reference = SignalReference.from_scenario(scenario, routing).at(step * np.arange(round(DURATION / step))).position
+    times = step * np.arange(round(DURATION / step), dtype=np.float64)
+    reference = SignalReference.from_scenario(scenario, routing).at(times).position
     model.opt.timestep = step
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.commands.validation.check import Check, Comparison, Picture, Section, compare
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
-from validation.check import Check, Comparison, Picture, Section, compare
 
 TITLE = "Infinite stiffness of the passive tendon"
 STIFFNESSES = (5e5, 5e6, 5e7)
