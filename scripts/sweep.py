@@ -80,7 +80,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Run the sweep, draw it, tell what came out; return the exit code."""
     from finger_pin.commands.console import print_text, runs_bar
-    from finger_pin.exceptions import FingerPinError, InputError
+    from finger_pin.exceptions import FingerPinError, InputError, StudyError
     from finger_pin.studies import DEFAULT_METRICS, DaskCluster, LocalProcesses, sweep
     from finger_pin.studies.keys import Starting
 
@@ -93,18 +93,21 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
         if shown:
             tell_compilation()
         with runs_bar("sweep") if shown else nullcontext() as progress, interrupts.patient():
-            result = sweep(
-                options.scenario,
-                design,
-                metrics=options.metric or DEFAULT_METRICS,
-                overrides=dict(options.set),
-                output=output,
-                executor=executor,
-                restart=options.restart,
-                retry_failed=options.retry_failed,
-                progress=progress,
-                stop=lambda: interrupts.requested,
-            )
+            try:
+                result = sweep(
+                    options.scenario,
+                    design,
+                    metrics=options.metric or DEFAULT_METRICS,
+                    overrides=dict(options.set),
+                    output=output,
+                    executor=executor,
+                    restart=options.restart,
+                    retry_failed=options.retry_failed,
+                    progress=progress,
+                    stop=lambda: interrupts.requested,
+                )
+            except StudyError as error:
+                result = error.result
         if options.figures and not interrupts.requested:
             draw(result, output)
     except InputError as error:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from finger_pin.studies.cluster import ClusterError, DaskCluster
 from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
-from finger_pin.studies.local import LocalProcesses
 from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
+from finger_pin.studies.problem import Variable, radii
+from finger_pin.studies.processes import LocalProcesses
 from finger_pin.studies.sweeping import sweep
-from finger_pin.studies.variables import Variable, radii
 
 __all__ = [
     "DEFAULT_CONSTRAINTS",

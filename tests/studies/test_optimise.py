@@ -9,9 +9,8 @@ from planted import CHEAP, DEAR, GAIN, RAISES
 
 import finger_pin as fp
 from finger_pin.studies import radii
-from finger_pin.studies.goals import Constraint, Goals, parse_constraint
+from finger_pin.studies.problem import Constraint, Goals, parse_constraint, parse_variable, point_at
 from finger_pin.studies.search import Search, nondominated
-from finger_pin.studies.variables import parse_variable, point_at
 
 SHORT = {"simulation.duration": 0.02}
 TWO = fp.LocalProcesses(2)

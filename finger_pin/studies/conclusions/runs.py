@@ -11,7 +11,7 @@ import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import IntegrationError, SelfLockingWarning
+from finger_pin.exceptions import IntegrationError, SelfLockingWarning, StudyError
 from finger_pin.studies.many import simulate_many
 
 Progress = Callable[[int], None]
@@ -79,7 +79,10 @@ def simulated(
     with warnings.catch_warnings():
         # Experiments go to the edge on purpose.
         warnings.simplefilter("ignore", SelfLockingWarning)
-        runs = simulate_many(scenarios, variables=variables, progress=tell)
+        try:
+            runs = simulate_many(scenarios, variables=variables, progress=tell)
+        except StudyError as error:
+            runs = error.result
     for failure, end in zip(runs["failure"].values, runs["end_time"].values, strict=True):
         if failure:
             raise IntegrationError(float(end), str(failure), "other factors of friction, tension or speed")
