@@ -61,7 +61,7 @@ def test_a_stop_leaves_the_rest_and_the_pool_can_be_used_again(pool):
     assert dict(pool.do(planted.tripled, [1], never)) == {0: 3}
 
 
-SCRIPT = """
+SWEEP = """
 import finger_pin as fp
 from finger_pin.studies import Metric
 
@@ -73,17 +73,25 @@ def doubled(run):
 
 
 result = fp.sweep("fig6", {"controller.gain": [1.0, 3.0]}, metrics=[Metric("doubled", "N m/rad", "doubled", doubled)])
+print(result["doubled"].values, end="")
+"""
+RUNS = """
 runs = [fp.load_scenario("fig6", {"simulation.duration": 0.3, "controller.gain": 1.0 + 0.01 * n}) for n in range(40)]
 stacked = fp.simulate_many(runs, workers=2, variables=["tracking_error"])
-print(result["doubled"].values, int(stacked["tracking_error"].notnull().all()), end="")
+print("", int(stacked["tracking_error"].notnull().all()), end="")
 """
 
 
-@pytest.mark.parametrize("how", ["file", "input"])
-def test_a_plain_script_without_a_guard_works_with_a_metric_of_its_own(tmp_path, how):
-    (tmp_path / "plain.py").write_text(SCRIPT)
-    name, text = ("plain.py", None) if how == "file" else ("-", SCRIPT)
-    ended = subprocess.run(
-        [sys.executable, name], input=text, cwd=tmp_path, capture_output=True, text=True, encoding="utf-8", timeout=100
-    )
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "[2. 6.] 1", "")
+def ends_of(tmp_path, arguments, **options):
+    settings = {"cwd": tmp_path, "capture_output": True, "text": True, "encoding": "utf-8", "timeout": 100}
+    ended = subprocess.run([sys.executable, *arguments], **settings, **options)
+    return ended.returncode, ended.stdout, ended.stderr
+
+
+def test_a_plain_script_without_a_guard_works_with_a_metric_of_its_own(tmp_path):
+    (tmp_path / "plain.py").write_text(SWEEP + RUNS)
+    assert ends_of(tmp_path, ["plain.py"]) == (0, "[2. 6.] 1", "")
+
+
+def test_what_is_typed_works_with_a_metric_of_its_own(tmp_path):
+    assert ends_of(tmp_path, ["-"], input=SWEEP) == (0, "[2. 6.]", "")
