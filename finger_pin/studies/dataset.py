@@ -35,10 +35,12 @@ def assemble(
         The metrics, ``status`` (done, failed or missing) and ``reason``, over the dimensions of the design.
     """
     dims = design.dims
-    coordinates = {
-        key: ((SAMPLE if dims == (SAMPLE,) else key,), np.array(values), describe(key))
-        for key, values in design.values.items()
-    }
+    coordinates = {}
+    for key, values in design.values.items():
+        attributes = describe(key)
+        if not isinstance(values[0], float):
+            del attributes["units"]
+        coordinates[key] = ((SAMPLE if dims == (SAMPLE,) else key,), np.array(values), attributes)
     shape = (len(design.points()),) if dims == (SAMPLE,) else tuple(map(len, design.values.values()))
     rows = list(records)
 
@@ -57,7 +59,7 @@ def assemble(
     reason = over(["" if row is None else row.reason for row in rows])
     variables["status"] = (dims, status, {"long_name": "what came of the run: done, failed or missing"})
     variables["reason"] = (dims, reason, {"long_name": "why the run failed"})
-    return xr.Dataset(variables, coords=coordinates, attrs=attributes(scenario))
+    return xr.Dataset(variables, coords=coordinates, attrs=origin(scenario))
 
 
 def checked(result: xr.Dataset) -> xr.Dataset:
@@ -71,7 +73,7 @@ def checked(result: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def attributes(scenario: Scenario) -> Mapping[str, str]:
+def origin(scenario: Scenario) -> Mapping[str, str]:
     """Return what a Dataset says about its origin: the scenario and the versions of packages."""
     used = {f"version_{name.replace('-', '_')}": version for name, version in versions().items()}
     return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **used}
