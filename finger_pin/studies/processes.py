@@ -131,7 +131,10 @@ class Pool:
             # It is still at what an earlier call was stopped in.
             self._remove(worker)
         waiting, deaths = deque(range(len(items))), Counter[int]()
-        starter = threading.Thread(target=self._grow, args=(len(items) - helping,))
+        if helping:
+            # It compiles what the processes then find, in the cache or in themselves.
+            yield waiting.popleft(), function(items[0])
+        starter = threading.Thread(target=self._grow, args=(len(waiting),))
         starter.start()
         try:
             if not helping:
