@@ -66,8 +66,13 @@ class Starting:
                 changed[name][index] = value
         return load_scenario(self.name, changed)
 
-    def check(self, key: str, values: Sequence[Value]) -> None:
+    def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
         """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.
+
+        Args:
+            key: What is varied.
+            values: What it is given.
+            alone: Whether no other key is varied, which might make the values fit.
 
         Raises:
             InputError: If there is no such key, it holds something else, or allows none of the values.
@@ -86,10 +91,13 @@ class Starting:
             try:
                 scenario = self.at({key: value})
             except InputError as error:
-                if not error.entry.startswith(split(key)[0]):
-                    # The value is right as such: other keys of the study may make it fit.
+                if error.entry.startswith(split(key)[0]):
+                    problem = problem or error
+                elif alone:
+                    problem = problem or InputError(key, f"no value of it can be simulated: {error}")
+                else:
+                    # The value is right as such.
                     return
-                problem = problem or error
                 continue
             if numbers and not _is_number(_look_up(scenario, key)):
                 raise self._nothing(key, numbers)

@@ -68,7 +68,7 @@ def sweep(
     chosen = choose(metrics)
     starting = Starting.load(scenario, overrides)
     for key, values in design.values.items():
-        starting.check(key, values)
+        starting.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:
         workers = stack.enter_context((executor or LocalProcesses()).start())
         if output is None:

@@ -75,6 +75,8 @@ def test_a_key_is_right_if_any_of_its_values_is_or_may_be_with_other_keys(fig6):
         fig6.check("controller.gain", [-1.0, -2.0])
     # Neither has force closure, but other radii may give it.
     fig6.check(RADIUS, [-0.005, -0.006])
+    with pytest.raises(fp.InputError, match=f"{RADIUS}: no value of it can be simulated: .*force closure"):
+        fig6.check(RADIUS, [-0.005, -0.006], alone=True)
 
 
 def test_a_key_may_hold_a_name_or_a_whole_table_that_a_name_stands_for(fig6):
