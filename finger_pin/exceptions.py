@@ -79,6 +79,19 @@ class Interrupted(FingerPinError):
         super().__init__(f"interrupted at t = {time:.6g} s")
 
 
+class StudyError(FingerPinError):
+    """Every run of a study failed.
+
+    Attributes:
+        result: What the study returns otherwise, with the reason of every run.
+    """
+
+    def __init__(self, reason: str, result: xr.Dataset) -> None:
+        """Say why the first run failed, and keep what came out."""
+        self.result = result
+        super().__init__(_one_line(f"every run failed; the first one: {reason}"))
+
+
 def toml_like(value: Any) -> str:
     """Return a value as a person would write it in a TOML file, cut where it is long."""
     return _shorten(_toml_like(value, 4), 80)

@@ -25,7 +25,7 @@ from finger_pin.commands import (
     validate,
 )
 from finger_pin.commands.console import Unsuccessful, complain
-from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted
+from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, StudyError
 
 # What is left when a process ends is not worth a search for garbage, which takes half a second.
 atexit.register(gc.freeze)
@@ -88,6 +88,7 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
             kinds = {
                 InputError: WRONG_INPUT,
                 IntegrationError: FAILED,
+                StudyError: FAILED,
                 Unsuccessful: FAILED,
                 Interrupted: INTERRUPTED,
             }

@@ -80,6 +80,7 @@ def sweep(
     changed, shown = overrides(settings), talks(quiet)
     with Interrupts() as interrupts, noted(KEPT):
         executor = pool(workers, scheduler)
+        from finger_pin.exceptions import StudyError
         from finger_pin.studies import DEFAULT_METRICS, sweep
         from finger_pin.studies.keys import Starting
 
@@ -88,18 +89,22 @@ def sweep(
         chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
         output = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
         with runs_bar("sweep") if shown else nullcontext() as progress, interrupts.patient():
-            result = sweep(
-                scenario,
-                points,
-                metrics=metric or DEFAULT_METRICS,
-                overrides=changed,
-                output=output,
-                executor=executor,
-                restart=restart,
-                retry_failed=retry_failed,
-                progress=progress,
-                stop=lambda: interrupts.requested,
-            )
+            try:
+                result = sweep(
+                    scenario,
+                    points,
+                    metrics=metric or DEFAULT_METRICS,
+                    overrides=changed,
+                    output=output,
+                    executor=executor,
+                    restart=restart,
+                    retry_failed=retry_failed,
+                    progress=progress,
+                    stop=lambda: interrupts.requested,
+                )
+            except StudyError as error:
+                # The summary tells what every run died of.
+                result = error.result
         if figures and not interrupts.requested:
             from finger_pin.views.plots import plot_sweep, save_figure
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+import cloudpickle
 import numpy as np
 import xarray as xr
 
@@ -55,7 +56,7 @@ class Metric:
         name: How it is asked for.
         unit: SI unit.
         long_name: What it is.
-        measure: Takes a run and returns the number. Other processes import it: a function of a module.
+        measure: Takes a run and returns the number. Other processes call it.
     """
 
     name: str
@@ -68,7 +69,7 @@ def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
     """Return metrics by name; those given as such are kept.
 
     Raises:
-        InputError: If there are none, one is unknown, or one comes twice.
+        InputError: If there are none, one is unknown or comes twice, or cannot be sent to other processes.
     """
     chosen: dict[str, Metric] = {}
     for each in names:
@@ -77,6 +78,11 @@ def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
             hint = f"; did you mean {near}?" if near else ""
             raise InputError("metric", f"there is no such metric; there are {', '.join(METRICS)}{hint}", each)
         metric = METRICS[each] if isinstance(each, str) else each
+        try:
+            cloudpickle.dumps(metric)
+        except Exception as error:
+            what = f"cannot be sent to other processes: {type(error).__name__}: {error}"
+            raise InputError("metric", what, metric.name) from None
         if metric.name in chosen:
             raise InputError("metric", "must not come twice", metric.name)
         chosen[metric.name] = metric

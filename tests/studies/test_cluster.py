@@ -95,10 +95,10 @@ def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
     np.testing.assert_array_equal(again["slow_gain"], GAINS)
 
 
-def test_workers_of_another_version_are_refused(cluster, monkeypatch):
-    monkeypatch.setattr("finger_pin.studies.runs.version", lambda: "0.0.0")
+def test_workers_of_another_source_are_refused(cluster, monkeypatch):
+    monkeypatch.setattr("finger_pin.studies.runs.source_digest", lambda: "another")
     executor = fp.studies.DaskCluster(cluster.scheduler_address)
-    with pytest.raises(ClusterError, match=r"a worker has finger_pin \d.*, not 0\.0\.0"):
+    with pytest.raises(ClusterError, match=r"a worker has another finger_pin \(\d.*\), not that of source another"):
         fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
 
 

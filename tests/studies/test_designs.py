@@ -45,12 +45,15 @@ def test_a_seed_gives_the_same_points_again_and_another_one_others():
         ("a.b=1,-2.5,1e-3", (1.0, -2.5, 0.001)),
         ("a.b=7", (7.0,)),
         ("a.b=2:9:1", (2.0,)),
+        ("a.b=Rodas4, Rodas5P", ("Rodas4", "Rodas5P")),
+        ("a.b=true,false", (True, False)),
+        ("a.b=mine.toml,ub", ("mine.toml", "ub")),
     ],
 )
 def test_values_are_spelt_as_steps_or_as_a_list(text, values):
     key, found = parse_values(text)
     assert key == "a.b"
-    assert found == pytest.approx(values)
+    assert found == (values if isinstance(values[0], str) else pytest.approx(values))
 
 
 def test_a_range_is_spelt_by_its_ends():
@@ -60,7 +63,7 @@ def test_a_range_is_spelt_by_its_ends():
 
 @pytest.mark.parametrize(
     "text",
-    ["a", "a=", "=1,2", "a=1:2", "a=1:2:0", "a=1:2:x", "a=1:2:3:4", "a=1,,2", "a=nan", "a=1:inf:3", "a=x,y",
+    ["a", "a=", "=1,2", "a=1:2", "a=1:2:0", "a=1:2:x", "a=1:2:3:4", "a=1,,2", "a=nan", "a=1:inf:3", "a=1,y",
      "a=-1:2:3:log", "a=1:2:99999999999999999999", "a=1:2:2.5"],
 )  # fmt: skip
 def test_wrong_values_are_told_in_one_line(text):
@@ -84,6 +87,10 @@ def test_wrong_ranges_are_told_in_one_line(text):
         lambda: fp.studies.Grid({"a": [1.0, 1.0]}),
         lambda: fp.studies.Grid({"a": [float("nan")]}),
         lambda: fp.studies.Grid({"a[x]": [1.0]}),
+        lambda: fp.studies.Grid({"a": ["x", "x"]}),
+        lambda: fp.studies.Grid({"a": ["x", 1.0]}),
+        lambda: fp.studies.Grid({"a": [None, None]}),
+        lambda: fp.studies.Grid({"a": [[1.0], [2.0]]}),
         lambda: fp.studies.Grid({"a": range(1001), "b": range(1001)}),
         lambda: fp.studies.Listing({"a": [1.0], "b": [1.0, 2.0]}),
         lambda: fp.studies.LatinHypercube({}, 3),

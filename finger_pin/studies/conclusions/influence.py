@@ -24,9 +24,12 @@ from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.studies.conclusions.runs import Measures, Progress, measured, simulated
-from finger_pin.studies.conclusions.variations import (
+from finger_pin.studies.conclusions.runs import (
+    Measures,
+    Progress,
     lasting,
+    measured,
+    simulated,
     swinging_to_lock,
     with_joint_friction,
     with_minimum_tension,

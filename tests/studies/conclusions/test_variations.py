@@ -5,7 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.reference import SignalReference
-from finger_pin.studies.conclusions.variations import (
+from finger_pin.studies.conclusions.runs import (
     at_speed,
     internal_passive_tension,
     swinging_to_lock,
