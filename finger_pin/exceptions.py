@@ -15,7 +15,15 @@ class FingerPinError(Exception):
     """Root of the project's exceptions."""
 
 
-class SelfLockingWarning(UserWarning):
+class ScenarioWarning(UserWarning):
+    """Root of what the project warns of: a scenario that runs, but not as its author may expect."""
+
+
+class MicroDampingWarning(ScenarioWarning):
+    """The micro-damping of a law (9) is more than its viscous friction covers: friction can drive motion."""
+
+
+class SelfLockingWarning(ScenarioWarning):
     """A scenario comes close to the joint friction at which its finger locks itself, or exceeds it."""
 
 
@@ -69,6 +77,19 @@ class Interrupted(FingerPinError):
         self.time = time
         self.result = result
         super().__init__(f"interrupted at t = {time:.6g} s")
+
+
+class StudyError(FingerPinError):
+    """Every run of a study failed.
+
+    Attributes:
+        result: What the study returns otherwise, with the reason of every run.
+    """
+
+    def __init__(self, reason: str, result: xr.Dataset) -> None:
+        """Say why the first run failed, and keep what came out."""
+        self.result = result
+        super().__init__(_one_line(f"every run failed; the first one: {reason}"))
 
 
 def toml_like(value: Any) -> str:

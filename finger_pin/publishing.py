@@ -1,162 +1,103 @@
-"""A set of files that takes the place of another as a whole, even if the process is killed on the way.
+"""A set of files that takes the place of another at one instant, for whoever looks, even if a process is killed.
 
-The new set is complete in a stage, a hidden folder inside the one that it is for, with a manifest of what comes and
-what goes. Renaming the stage is the moment of decision: before it the earlier set stays, after it the new one comes.
-Then files are moved one by one. Whoever finds a renamed stage whose owner is gone finishes the moves: the next writer,
-or the next reader.
+The new set is complete in a hidden folder inside the one that it is for, beside hard links to the earlier set, and a
+symbolic link ``now`` says which of the two counts. While files change places every name in the folder leads through
+``now``: switching that one link is the moment of decision. Then the links give way to the files themselves. Whatever
+instant a process is killed at, every name leads to a file of the same set; the next one who publishes there tidies up.
 """
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import json
 import os
 import shutil
-import tempfile
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
-_STAGE, _DECIDED = ".unfinished-", ".publishing"
-_MANIFEST, _EARLIER = ".manifest", ".earlier"
+_HIDDEN, _NOW, _OLD = ".publishing", "now", "old"
+#: Where to write the new set in a folder that is to be published.
+NEW = "new"
+# Publishing takes milliseconds: what takes longer, s, was killed.
+_PATIENCE = 5.0
 
 
-class Stage:
-    """A folder in which a set of files is made. It is locked by its owner, so that others know whether he lives.
+def publish(stage: Path, folder: Path, earlier: Callable[[], Iterable[str]]) -> None:
+    """Put a set of files in the place of another.
 
-    Attributes:
-        folder: What the files are for.
-        path: Where to write them; gone after `publish` and `discard`.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        """Make a stage in a folder, finish what a killed process left half moved, and remove stages of the dead.
-
-        Raises:
-            OSError: If it cannot be written.
-        """
-        self.folder = folder
-        settle(folder)
-        for stale in folder.glob(f"{_STAGE}*"):
-            _remove_ownerless(stale)
-        self._lock: int | None = None
-        while self._lock is None:
-            self.path = Path(tempfile.mkdtemp(dir=folder, prefix=_STAGE))
-            # Before it is locked, another process may take it for one of the dead, and remove it.
-            self._lock = _locked(self.path)
-
-    def publish(self, new: Iterable[Path], earlier: Iterable[Path]) -> None:
-        """Move files into place and others out of the way; first all earlier ones go, then all new ones come.
-
-        Args:
-            new: Files in the stage.
-            earlier: Files in the folder, listed when it was settled.
-
-        Raises:
-            OSError: If a file cannot be moved; the earlier ones are then back in place.
-        """
-        manifest = {
-            "new": [each.relative_to(self.path).as_posix() for each in new],
-            "earlier": [each.relative_to(self.folder).as_posix() for each in earlier],
-        }
-        with open(self.path / _MANIFEST, "w", encoding="utf-8") as file:
-            json.dump(manifest, file)
-            file.flush()
-            os.fsync(file.fileno())
-        decided = self.folder / _DECIDED
-        os.rename(self.path, decided)
-        done: list[tuple[Path, Path]] = []
-        try:
-            _move(self.folder, done)
-            os.rename(decided, self.path)
-        except BaseException:
-            for source, target in reversed(done):
-                os.rename(target, source)
-            os.rename(decided, self.path)
-            raise
-        _remove_emptied(self.folder, manifest["earlier"])
-        self.discard()
-
-    def discard(self) -> None:
-        """Remove the stage, and let go of it."""
-        shutil.rmtree(self.path, ignore_errors=True)
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
-
-
-def settle(folder: Path) -> None:
-    """Finish what a process that was killed had begun to publish in a folder; wait for one that is at it.
+    Args:
+        stage: A folder inside the other one, on the same file system; the set is below ``stage / NEW``. Gone after it.
+        folder: Where the files go.
+        earlier: Lists the names, relative to the folder, that the earlier set has.
 
     Raises:
-        OSError: If a file cannot be moved.
+        OSError: If a file cannot be written; the earlier set then stays in place.
     """
-    decided = folder / _DECIDED
-    while (lock := _locked(decided)) is not None:
+    hidden = folder / _HIDDEN
+    _claim(stage, hidden)
+    try:
+        for name in earlier():
+            (hidden / _OLD / name).parent.mkdir(parents=True, exist_ok=True)
+            _link(folder / name, hidden / _OLD / name)
         try:
-            earlier = _move(folder, [])
-            remains = tempfile.mkdtemp(dir=folder, prefix=_STAGE)
-            os.rename(decided, remains)
-            _remove_emptied(folder, earlier)
-            shutil.rmtree(remains, ignore_errors=True)
-        finally:
-            os.close(lock)
-
-
-def _move(folder: Path, done: list[tuple[Path, Path]]) -> list[str]:
-    """Make the moves of a manifest that have not been made, and list them; return the names of the earlier files.
-
-    Every state on the way is told from every other: a new file is either still in the stage or in place, and an
-    earlier file is in place only as long as a new one of its name is not.
-    """
-    decided = folder / _DECIDED
-    manifest = json.loads((decided / _MANIFEST).read_text(encoding="utf-8"))
-    new, earlier = manifest["new"], manifest["earlier"]
-    goes = [name for name in earlier if name not in new or os.path.lexists(decided / name)]
-    moves = [(folder / name, decided / _EARLIER / name) for name in goes]
-    moves += [(decided / name, folder / name) for name in new]
-    for source, target in moves:
-        if os.path.lexists(source):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.rename(source, target)
-            done.append((source, target))
-    return list(earlier)
-
-
-def _remove_emptied(folder: Path, names: Iterable[str]) -> None:
-    """Remove folders that files have left empty."""
-    for parent in {(folder / name).parent for name in names} - {folder}:
+            os.symlink(_OLD, hidden / _NOW)
+        except OSError:
+            # A file system without links: file by file, each of them whole.
+            os.rename(hidden / NEW, hidden / _NOW)
+            for name in set(_names(hidden / _OLD)) - set(_names(hidden / _NOW)):
+                os.unlink(folder / name)
+            return
+        for name in _names(hidden / NEW) + _names(hidden / _OLD):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            os.symlink(os.path.relpath(hidden / _NOW / name, (folder / name).parent), hidden / "link")
+            os.replace(hidden / "link", folder / name)
+        os.symlink(NEW, hidden / "next")
+        os.replace(hidden / "next", hidden / _NOW)
+    finally:
+        # Every name leads to the right file by now; who publishes next does what cannot be done.
         with contextlib.suppress(OSError):
-            parent.rmdir()
+            _tidy(folder)
 
 
-def _remove_ownerless(stage: Path) -> None:
-    """Remove a stage whose owner was killed."""
-    lock = _locked(stage, wait=False)
-    if lock is not None:
-        shutil.rmtree(stage, ignore_errors=True)
-        os.close(lock)
-
-
-def _locked(stage: Path, *, wait: bool = True) -> int | None:
-    """Return the open lock of a stage; None where there is no stage, or it is another's and not waited for.
-
-    Where locks are not supported one that is waited for is taken for granted, and no other.
-    """
+def _claim(stage: Path, hidden: Path) -> None:
+    """Rename a stage; wait for another who is publishing, and tidy up for one who was killed."""
+    deadline = time.monotonic() + _PATIENCE
     while True:
         try:
-            lock = os.open(stage, os.O_RDONLY | os.O_DIRECTORY)
-        except (FileNotFoundError, NotADirectoryError):
-            return None
-        try:
-            # The system lets go of it when its owner dies, however that happens.
-            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.rename(stage, hidden)
+            return
         except OSError:
-            if not wait:
-                os.close(lock)
-                return None
+            if not hidden.is_dir():
+                raise
         with contextlib.suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(lock), os.stat(stage)):
-                return lock
-        # While we waited its owner renamed it, and there may be another of its name by now.
-        os.close(lock)
+            if time.monotonic() > deadline or time.time() > hidden.stat().st_mtime + _PATIENCE:
+                _tidy(hidden.parent)
+        time.sleep(0.01)
+
+
+def _tidy(folder: Path) -> None:
+    """Put the files that count in the place of the links to them, and remove the rest."""
+    hidden = folder / _HIDDEN
+    for name in _names(hidden / NEW) + _names(hidden / _OLD) + _names(hidden / _NOW):
+        target = folder / name
+        if (hidden / _NOW / name).exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(hidden / _NOW / name, target)
+        elif target.is_symlink() and not target.exists():
+            target.unlink()
+            if target.parent != folder:
+                with contextlib.suppress(OSError):
+                    target.parent.rmdir()
+    shutil.rmtree(hidden)
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(each.relative_to(folder).as_posix() for each in folder.rglob("*") if each.is_file())
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a file a second name; copy it where there is no such thing."""
+    try:
+        os.link(source.resolve(), target)
+    except OSError:
+        shutil.copy2(source, target)

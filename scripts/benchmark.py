@@ -1,39 +1,47 @@
-"""Measure the simulator: time against error, against MuJoCo, in steps, in many runs, and as a main job.
-
-Every part is saved as soon as it is measured, and an interrupted benchmark goes on from there; parts are measured anew
-when the code has changed. Times are the least of several turns that the compared jobs take in alternation, and ratios
-are of times from one run. Run it on a quiet machine.
-"""
+"""Measure the simulator: time against error, against MuJoCo, in steps, in many runs, and as a main job."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
 import sys
+from functools import partial
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from command_line import DONE, INTERRUPTED, NOT_WRITTEN, Parser, complain
+import typer
 
-PROGRAM = "benchmark.py"
+from finger_pin.commands.application import run_function
+from finger_pin.commands.console import noted, print_text
+from finger_pin.commands.options import Output, wrong
+
 PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "scikit-sundae")
 STAGES = ("work-precision", "step-interface", "joints", "mujoco", "many-runs", "main-job")
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, and write; return the exit code."""
-    options = parse(arguments)
+def benchmark(
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter and fewer runs, to see that all works.")] = False,
+    only: Annotated[str, typer.Option(metavar="STAGES", help=f"Some of {','.join(STAGES)}.")] = ",".join(STAGES),
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure every part anew.")] = False,
+    output: Output = Path("results/benchmark"),
+) -> None:
+    """Measure the simulator: time against error, against MuJoCo, in steps, in many runs, and as a main job.
+
+    Every part is saved as soon as it is measured, and an interrupted benchmark goes on from there; parts are measured
+    anew when the code has changed. Times are the least of several turns that the compared jobs take in alternation, and
+    ratios are of times from one run. Run it on a quiet machine.
+    """
+    names = chosen(only)
     from benchmarks.store import Store, say, write
 
-    try:
-        options.output.mkdir(parents=True, exist_ok=True)
-        store = Store(options.output, options.quick, options.fresh)
+    output.mkdir(parents=True, exist_ok=True)
+    with noted(f"what was measured is in {output}"):
+        store = Store(output, quick, fresh)
         around = surroundings()
         stages = {}
-        for name in options.only:
+        for name in names:
             stages[name] = stage(name).measure(store)
             if stages[name] is None:
                 say(f"{name}: left out, what it needs is not installed")
@@ -41,34 +49,13 @@ def main(arguments: list[str] | None = None) -> int:
         from benchmarks.targets import targets
 
         reached = targets(stages)
-        lines = report.text(stages, reached, options.quick)
-        whole = {"surroundings": around, "quick": options.quick, "stages": stages}
+        lines = report.text(stages, reached, quick)
+        whole = {"surroundings": around, "quick": quick, "stages": stages}
         whole["targets"] = [each._asdict() for each in reached]
-        write(options.output / "benchmark.json", json.dumps(whole, indent=1))
-        write(options.output / "benchmark.txt", lines)
-        draw(stages, options.output)
-    except KeyboardInterrupt:
-        complain(PROGRAM, f"interrupted; what was measured is in {options.output}")
-        return INTERRUPTED
-    except OSError as error:
-        complain(PROGRAM, f"{options.output}: cannot be written: {error.strerror or error}")
-        return NOT_WRITTEN
-    from finger_pin.commands.console import print_text
-
-    print_text(f"{lines}\n\nResults are in {options.output}")
-    return DONE
-
-
-def parse(arguments: list[str] | None) -> argparse.Namespace:
-    """Parse a command line, or exit."""
-    parser = Parser(prog=PROGRAM, description=__doc__, allow_abbrev=False)
-    parser.add_argument("--quick", action="store_true", help="shorter and fewer runs, to see that all works")
-    parser.add_argument("--only", type=chosen, default=STAGES, metavar="STAGES", help=f"of {','.join(STAGES)}")
-    parser.add_argument("--fresh", action="store_true", help="measure every part anew")
-    parser.add_argument(
-        "--output", type=Path, default=Path("results/benchmark"), metavar="DIR", help="default %(default)s"
-    )
-    return parser.read(arguments)
+        write(output / "benchmark.json", json.dumps(whole, indent=1))
+        write(output / "benchmark.txt", lines)
+        draw(stages, output)
+    print_text(f"{lines}\n\nResults are in {output}")
 
 
 def chosen(names: str) -> tuple[str, ...]:
@@ -76,7 +63,7 @@ def chosen(names: str) -> tuple[str, ...]:
     wanted = [name.strip() for name in names.split(",")]
     for name in wanted:
         if name not in STAGES:
-            raise argparse.ArgumentTypeError(f"{name}: no such stage; there are {', '.join(STAGES)}")
+            raise wrong("--only", f"{name}: no such stage; there are {', '.join(STAGES)}")
     return tuple(name for name in STAGES if name in wanted)
 
 
@@ -128,6 +115,8 @@ def draw(stages: dict[str, Any], folder: Path) -> None:
     if stages.get("joints"):
         save_figure(report.plot_joints(stages["joints"]), folder / "joints.png")
 
+
+main = partial(run_function, benchmark)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Annotated
 
+import typer
+
+from finger_pin.commands.application import run_function
 from finger_pin.description.loading import list_fingers, load_finger
 from finger_pin.mechanism.urdf import to_urdf
 
 FOLDER = Path(__file__).resolve().parents[1] / "urdf"
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write or check the files; return the exit code, 1 where a check fails."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is not current")
-    check = parser.parse_args(arguments).check
+def generate_urdf(
+    check: Annotated[bool, typer.Option("--check", help="Write nothing; fail if a file is not current.")] = False,
+) -> int:
+    """Write the URDF of every shipped finger to urdf/, or check that the files there are current."""
     texts = {f"{name}.urdf": to_urdf(load_finger(name)) for name in list_fingers()}
     present = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.urdf")}
     stale = sorted(name for name in texts.keys() | present.keys() if texts.get(name) != present.get(name))
@@ -33,6 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"removed urdf/{name}: no such finger")
     return int(check and bool(stale))
 
+
+main = partial(run_function, generate_urdf)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.directions import directions_of_motion
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
@@ -16,34 +17,37 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 
-@dataclass(frozen=True, eq=False)
-class SelfLockingMap:
-    """Critical coefficients over two joint angles.
+@dataclass(frozen=True, eq=False, repr=False)
+class SelfLockingMap(Finding):
+    """Critical coefficients over the angles of two joints, or of one where no other is free.
 
     Attributes:
-        joints: Names of the two joints.
-        first: Angles of the first one, shape (a,), rad.
-        second: Angles of the second one, shape (b,), rad.
+        joints: Names of the joints.
+        angles: Of every one of them, shape (a,) and (b,), rad.
         coefficient: M_crit, shape (a, b), m. It varies only where the friction of a passive tendon does, so for
             passive tendons whose canals no joint bends it is the same everywhere.
         tension: Largest tension that the controller commands while the finger moves slowly, under its own friction
             and weight, in the direction that needs most, shape (a, b), N; infinite where it locks.
-        tip: Fingertip position, shape (a, b, 3), m, base frame.
+        tip: Fingertip position, shape (a, b, 3), m, base frame. Of one joint all these lack the second dimension.
         actual: The finger's largest stiction coefficient M^c, m.
     """
 
-    joints: tuple[str, str]
-    first: Array
-    second: Array
+    joints: tuple[str, ...]
+    angles: tuple[Array, ...]
     coefficient: Array
     tension: Array
     tip: Array
     actual: float
 
+    @property
+    def uniform(self) -> bool:
+        """Whether the critical coefficient is the same at every posture."""
+        return bool(np.max(self.coefficient) <= (1.0 + 1e-6) * np.min(self.coefficient))
+
 
 def self_locking_map(
     finger: Finger,
-    joints: tuple[str, str] | None = None,
+    joints: tuple[str, ...] | None = None,
     *,
     fixed: Mapping[str, float] | None = None,
     minimum_tension: float | tuple[float, ...] = 1.0,
@@ -55,32 +59,36 @@ def self_locking_map(
 
     Args:
         finger: A finger with force closure.
-        joints: Names of the two joints; by default the last two that no passive tendon drives.
+        joints: Names of two joints or one; by default the last two that no passive tendon drives, if there are two.
         fixed: Angles of the others, rad; the angle of their range nearest to zero by default.
         minimum_tension: f0, N, one number or one per tendon, for the tensions of the map.
         samples: Angles along either axis.
 
     Raises:
-        InputError: If a joint does not exist or is driven by a passive tendon, or there is no force closure.
+        InputError: If a joint does not exist, is named twice or is driven by a passive tendon, or there is no force
+            closure.
     """
     routing, limiter = finger.routing, finger.stroke_limiter
     coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
     free = [name for index, name in enumerate(routing.joints) if index not in coupling.followers]
-    first, second = joints or (free[0], free[-1]) if len(free) < 3 else joints or (free[-2], free[-1])
-    for name in (first, second, *(fixed or {})):
+    chosen = tuple(free[-2:]) if joints is None else tuple(joints)
+    if len(chosen) not in (1, 2) or len(set(chosen)) < len(chosen):
+        raise InputError("joints", "must be one joint or two different ones", list(chosen))
+    for name in (*chosen, *(fixed or {})):
         if name not in free:
             raise InputError("joints", f"must be among {', '.join(free)}", name)
     base = np.clip(np.zeros(len(routing.joints)), limiter.lower, limiter.upper)
     for name, angle in (fixed or {}).items():
         base[routing.joints.index(name)] = angle
-    columns = [routing.joints.index(name) for name in (first, second)]
-    axes = [np.linspace(limiter.lower[j], limiter.upper[j], samples) for j in columns]
-    postures = np.tile(base, (samples, samples, 1))
-    postures[..., columns[0]], postures[..., columns[1]] = np.meshgrid(*axes, indexing="ij")
+    columns = [routing.joints.index(name) for name in chosen]
+    axes = tuple(np.linspace(limiter.lower[j], limiter.upper[j], samples) for j in columns)
+    shape = (samples,) * len(axes)
+    postures = np.tile(base, (*shape, 1))
+    postures[..., columns] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     postures = postures @ coupling.matrix.T
     flat = postures.reshape(-1, len(base))
     signs, sliding = directions_of_motion(finger.tendons, np.ones(len(base), dtype=bool))
-    weight = np.array([finger.rigid_body.gravity_torque(theta) for theta in flat])
+    weight = np.array([finger.static_torque(theta) for theta in flat])
     minimum = expand(minimum_tension, len(routing.tendons))
     loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
     coefficient, tension = np.full(len(flat), np.inf), np.zeros(len(flat))
@@ -100,11 +108,10 @@ def self_locking_map(
         tension = np.maximum(tension, command[:, : routing.actuated].max(axis=1))
     tips = [finger.rigid_body.tip_position(theta) for theta in flat]
     return SelfLockingMap(
-        joints=(first, second),
-        first=axes[0],
-        second=axes[1],
-        coefficient=coefficient.reshape(samples, samples),
-        tension=tension.reshape(samples, samples),
-        tip=np.array(tips).reshape(samples, samples, 3),
+        joints=chosen,
+        angles=axes,
+        coefficient=coefficient.reshape(shape),
+        tension=tension.reshape(shape),
+        tip=np.array(tips).reshape(*shape, 3),
         actual=float(np.max(static)),
     )

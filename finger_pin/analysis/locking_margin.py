@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
@@ -22,8 +23,8 @@ CLOSE_TO_LOCKING = 1.2
 _CASES = 48
 
 
-@dataclass(frozen=True, eq=False)
-class SelfLockingMargin:
+@dataclass(frozen=True, eq=False, repr=False)
+class SelfLockingMargin(Finding):
     """How far a scenario stays from self-locking.
 
     Attributes:
@@ -58,7 +59,7 @@ def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None
     routing = tendons.routing
     # Midpoints: a reference that starts or ends at rest moves there.
     times = scenario.simulation.duration * (np.arange(samples) + 0.5) / samples
-    motion = HarmonicReference.from_scenario(scenario, routing).at(times)
+    motion = SignalReference.from_scenario(scenario, routing).at(times)
     size = len(routing.joints)
     # What stands still but for rounding does not move.
     speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)

@@ -26,13 +26,14 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
 
 
-@dataclass(frozen=True, eq=False)
-class PinWrench:
+@dataclass(frozen=True, eq=False, repr=False)
+class PinWrench(Finding):
     """What the pins exert on what the joints carry, base frame, moments about the joints' origins; shapes (m, n, 3).
 
     Attributes:
@@ -76,7 +77,7 @@ def pin_wrench(
         velocity: theta', shape (m, n), rad/s.
         acceleration: theta'', shape (m, n), rad/s2.
         strands: f, shape (m, s), N.
-        fingertip_force: F, shape (3,), N, base frame.
+        fingertip_force: F, shape (3,) or (m, 3), N, base frame.
         groove: What the grooves are part of.
 
     Raises:
@@ -85,8 +86,8 @@ def pin_wrench(
     geometry, body, routing = TendonGeometry(finger.description), finger.rigid_body, finger.routing
     carried = -body.distal_weights()
     links = _links(finger, position, velocity, acceleration)
-    origin = links.translation[:, 1:]
-    moment = links.moment - np.cross(links.tip[:, None] - origin, fingertip_force)
+    origin, force = links.translation[:, 1:], fingertip_force[..., None, :]
+    moment = links.moment - np.cross(links.tip[:, None] - origin, force)
     tendons = np.zeros_like(moment)
     for cut in geometry.cuts(groove):
         j, turn = cut.joint - 1, links.rotation[:, cut.link]
@@ -100,7 +101,7 @@ def pin_wrench(
         tendons=tendons,
         carried=np.broadcast_to(carried, tendons.shape),
         inertia=links.force - carried,
-        external=np.broadcast_to(-fingertip_force, tendons.shape),
+        external=np.broadcast_to(-force, tendons.shape),
         moment=moment,
     )
 

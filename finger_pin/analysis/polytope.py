@@ -8,8 +8,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import scipy.spatial
+import scipy
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -20,20 +21,21 @@ _FLAT = 1e-7
 _NEW = 1e-7
 
 
-@dataclass(frozen=True, eq=False)
-class ForcePolytope:
+@dataclass(frozen=True, eq=False, repr=False)
+class ForcePolytope(Finding):
     """The forces that a fingertip can exert, in the directions that its joints can move it.
 
     Attributes:
         position: theta, shape (n,), rad.
         tip: Fingertip, shape (3,), m, base frame.
         friction: What was assumed of friction.
-        basis: Orthonormal directions that the set spans, shape (3, r), base frame.
+        basis: Orthonormal directions that the set spans, shape (3, r), base frame: r = 3 for a body, 2 for a polygon,
+            as of a finger whose two joints are parallel, 1 for a line, as of a finger of one joint.
         vertices: Shape (v, 3), N, base frame.
-        faces: Indices of vertices, shape (faces, r): triangles where r = 3, edges where r = 2; empty where r < 2 or the
-            set is flat.
-        normals: Outer unit normals of the faces, shape (faces, 3).
-        offsets: normals @ E <= offsets, shape (faces,), N.
+        faces: Indices of vertices, shape (faces, r): triangles where r = 3, edges where r = 2, ends where r = 1.
+        normals: Outer unit normals, shape (f, 3): of the faces, then both ways of every direction in which the joints
+            can move the fingertip and the set has no extent.
+        offsets: normals @ E <= offsets, shape (f,), N.
     """
 
     position: Array
@@ -46,7 +48,7 @@ class ForcePolytope:
     offsets: Array
 
     def contains(self, force: Sequence[float] | Array, tolerance: float = 1e-6) -> bool:
-        """Return whether a force, shape (3,), N, lies in the set; its part outside the basis does not count."""
+        """Return whether a force, shape (3,), N, lies in the set; what the structure carries of it does not count."""
         return bool(np.all(self.normals @ np.asarray(force, dtype=float) <= self.offsets + tolerance))
 
     def support(self, direction: Sequence[float] | Array) -> float:
@@ -59,21 +61,21 @@ class ForcePolytope:
         On a surface their corners run counter-clockwise as seen from outside. There are none where the set is a line.
         """
         rank = self.basis.shape[1]
-        if not len(self.faces) or rank < 2:
+        if rank < 2:
             return np.zeros((0, 3), dtype=int)
         if rank == 2:
             around = self._around()
             return np.array([(around[0], a, b) for a, b in pairwise(around[1:])])
         corners = self.vertices[self.faces]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        inwards = np.einsum("fi,fi->f", across, self.normals) < 0.0
+        inwards = np.einsum("fi,fi->f", across, self.normals[: len(self.faces)]) < 0.0
         return np.where(inwards[:, None], self.faces[:, ::-1], self.faces)
 
     def ridges(self) -> list[tuple[int, int]]:
         """Return pairs of vertices: the edges between faces that do not lie in one plane; the outline of a flat set."""
         rank = self.basis.shape[1]
-        if not len(self.faces):
-            return [(int(np.argmin(line)), int(np.argmax(line))) for line in (self.vertices @ self.basis).T[:1]]
+        if rank < 2:
+            return [(0, 1)] if rank else []
         if rank == 2:
             return [(int(first), int(second)) for first, second in self.faces]
         beside: dict[tuple[int, int], list[int]] = {}
@@ -131,37 +133,68 @@ def force_polytope(
             raise InputError("limit", "no tensions within the limits balance the finger's weight", bounds)
         return np.asarray(found.x[:rank])
 
+    points, spanned = _spanning(rank, extreme)
+    axes, thin = basis @ spanned.T, basis @ _complement(spanned).T
+    points, faces, normals, offsets = _grow(points, spanned, extreme)
+    vertices = points @ basis.T
+    level = vertices[0] @ thin
+    return ForcePolytope(
+        position=theta,
+        tip=finger.rigid_body.tip_position(theta),
+        friction=friction,
+        basis=axes,
+        vertices=vertices,
+        faces=faces,
+        normals=np.concatenate([normals @ axes.T, thin.T, -thin.T]),
+        offsets=np.concatenate([offsets, level, -level]),
+    )
+
+
+def _spanning(rank: int, extreme: Any) -> tuple[Array, Array]:
+    """Return extreme points that span the set, shape (m, rank), and the directions that they span, (r, rank)."""
     points = np.array([extreme(sign * axis) for axis in np.eye(rank) for sign in (1.0, -1.0)])
-    hull, points = _grow(points, extreme)
-    tip = finger.rigid_body.tip_position(theta)
-    if hull is None:
-        empty = np.zeros((0, rank), dtype=int)
-        return ForcePolytope(theta, tip, friction, basis, points @ basis.T, empty, np.zeros((0, 3)), np.zeros(0))
-    used = np.unique(hull.simplices)
-    number = np.zeros(len(points), dtype=int)
-    number[used] = np.arange(len(used))
-    normals, offsets = hull.equations[:, :-1] @ basis.T, -hull.equations[:, -1]
-    return ForcePolytope(theta, tip, friction, basis, points[used] @ basis.T, number[hull.simplices], normals, offsets)
+    while True:
+        scale = max(float(np.max(np.abs(points))), 1e-12)
+        _, extents, axes = np.linalg.svd(points - points.mean(axis=0))
+        spanned = axes[: int(np.sum(extents > _FLAT * scale))]
+        # Extreme points may lie in a plane though the set does not: look to both sides of it.
+        beside = [extreme(sign * axis) for axis in axes[len(spanned) :] for sign in (1.0, -1.0)]
+        fresh = [p for p in beside if np.max(np.abs(axes[len(spanned) :] @ (p - points[0]))) > _FLAT * scale]
+        if not fresh:
+            return points, spanned
+        points = np.vstack([points, *fresh])
 
 
-def _grow(points: Array, extreme: Any) -> tuple[Any, Array]:
-    """Return the hull of all extreme points, None where it is flat or a line, and the points."""
+def _complement(rows: Array) -> Array:
+    """Return orthonormal rows perpendicular to orthonormal rows."""
+    return np.asarray(np.linalg.svd(np.eye(rows.shape[1]) - rows.T @ rows)[2][: rows.shape[1] - len(rows)])
+
+
+def _grow(points: Array, axes: Array, extreme: Any) -> tuple[Array, Any, Array, Array]:
+    """Return vertices, faces, and normals along the axes with their offsets, of the hull of all extreme points."""
+    if len(axes) == 0:
+        return points[:1], np.zeros((0, 0), dtype=int), np.zeros((0, 0)), np.zeros(0)
+    if len(axes) == 1:
+        along, sides = points @ axes[0], np.array([-1.0, 1.0])
+        ends = [int(np.argmin(along)), int(np.argmax(along))]
+        return points[ends], np.array([[0], [1]]), sides[:, None], sides * along[ends]
     scale = max(float(np.max(np.abs(points))), 1e-12)
-    rank = points.shape[1]
-    if rank < 2 or np.linalg.svd(points - points.mean(axis=0))[1][-1] < _FLAT * scale:
-        return None, points
     asked: set[tuple[float, ...]] = set()
     while True:
-        hull = scipy.spatial.ConvexHull(points)
+        hull = scipy.spatial.ConvexHull(points @ axes.T)
         fresh = []
         for equation in hull.equations:
             key = tuple(equation[:-1].round(9))
             if key in asked:
                 continue
             asked.add(key)
-            point = extreme(equation[:-1])
-            if equation[:-1] @ point + equation[-1] > _NEW * scale:
+            point = extreme(equation[:-1] @ axes)
+            if equation[:-1] @ (axes @ point) + equation[-1] > _NEW * scale:
                 fresh.append(point)
         if not fresh:
-            return hull, points
+            break
         points = np.vstack([points, *fresh])
+    used = np.unique(hull.simplices)
+    number = np.zeros(len(points), dtype=int)
+    number[used] = np.arange(len(used))
+    return points[used], number[hull.simplices], hull.equations[:, :-1], -hull.equations[:, -1]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -25,8 +26,8 @@ from finger_pin.mechanism.geometry import Groove
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 
 
-@dataclass(frozen=True, eq=False)
-class JointReactions:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointReactions(Finding):
     """Reactions of n joints at m instants, shapes (m, n), N unless said otherwise.
 
     Attributes:
@@ -140,9 +141,9 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     Raises:
         InputError: If something is missing in the result, or a joint carries no link.
     """
-    scenario, finger = _scenario(result)
+    _, finger = _scenario(result)
     position, velocity, acceleration = (_values(result, name) for name in _MOTION)
-    strands, force = _strands(result, finger), np.array(scenario.environment.fingertip_force)
+    strands, force = _strands(result, finger), _values(result, "fingertip_force")
     found, other = (
         pin_wrench(finger, position, velocity, acceleration, strands, force, groove)
         for groove in (Groove.DISTAL, Groove.PROXIMAL)

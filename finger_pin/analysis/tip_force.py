@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.tip_statics import (
     INFEASIBLE,
     UNBOUNDED,
@@ -14,7 +15,7 @@ from finger_pin.analysis.tip_statics import (
     TipStatics,
     command_bounds,
     posture,
-    slides,
+    slips,
 )
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
@@ -22,8 +23,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 
-@dataclass(frozen=True, eq=False)
-class RequiredTension:
+@dataclass(frozen=True, eq=False, repr=False)
+class RequiredTension(Finding):
     """The tensions that a fingertip force needs, those with the least maximum.
 
     Attributes:
@@ -68,8 +69,7 @@ def largest_force(
     theta, bounds = posture(finger, position), command_bounds(finger, minimum, limit)
     along = _unit(direction)
     worst = np.inf
-    for slide in slides(finger, friction):
-        signs = np.sign(_clean(finger.rigid_body.jacobian(theta).T @ along))
+    for slide, signs in slips(finger, finger.rigid_body.jacobian(theta), along, friction):
         statics = TipStatics.of(finger, theta, friction, slide, signs)
         extra = (statics.jacobian.T @ along)[:, None]
         if friction is Friction.HINDERING:
@@ -104,12 +104,11 @@ def tension_for_force(
     """
     theta, bounds = posture(finger, position), command_bounds(finger, minimum, np.inf)
     wanted = finite_vector("force", force, 3)
-    demand = finger.rigid_body.jacobian(theta).T @ wanted
-    signs = np.sign(_clean(demand))
-    if friction is Friction.HINDERING:
-        demand = demand + signs * finger.joint_friction.kinetic * np.linalg.norm(wanted)
+    jacobian = finger.rigid_body.jacobian(theta)
     needed: list[RequiredTension] = []
-    for slide in slides(finger, friction):
+    for slide, signs in slips(finger, jacobian, wanted, friction):
+        # Without HINDERING there are no signs.
+        demand = jacobian.T @ wanted + signs * finger.joint_friction.kinetic * np.linalg.norm(wanted)
         statics = TipStatics.of(finger, theta, friction, slide, signs)
         a, s, n = statics.sizes
         cost, largest = np.append(1.0, np.zeros(a + s + n)), [(0.0, None)]
@@ -133,7 +132,3 @@ def _unit(direction: Sequence[float] | Array) -> Array:
     if not length > 0.0:
         raise InputError("direction", "must not be zero", vector.tolist())
     return vector / length
-
-
-def _clean(torque: Array) -> Array:
-    return np.where(np.abs(torque) > 1e-12 * np.max(np.abs(torque), initial=0.0), torque, 0.0)

@@ -2,7 +2,7 @@
 
 At rest at theta, with E = -F the force that the fingertip exerts on what it touches, (18) reads
 
-    J^T E = H_c2^T f - G - tau^f,
+    J^T E = H_c2^T f - G - tau^k - tau^f,
 
 linear in E and the tensions f of the strands. With bounds on the commands f^a it describes a polytope of (E, f^a, f,
 tau^f), and the forces are its projection on E. Passive tendons carry whatever the balance asks of them, without
@@ -13,7 +13,8 @@ limit, but never push. Friction enters in one of three ways.
   exp(mu_e phi), and |tau^f_j| <= M^d_j S_j. The set of forces that the finger can hold against a contact that pushes.
 - HINDERING: what is left when the finger pushes and everything slips against it. f_i = f^a_i exp(-mu_e phi_i) at all
   actuated tendons, passive tendons lose to whichever side is worse, and tau^f_j = s_j M^d_j (S_j + |E|) with s_j the
-  sign of (J^T E)_j. It depends on the direction of E, so it is asked about direction by direction; no polytope.
+  sign of (J^T E)_j, whichever is worse where E passes a joint's axis too closely to say. It depends on the direction
+  of E, so it is asked about direction by direction; no polytope.
 
 S_j is the sum of the tensions that cross joint j. The reaction (17) is |-e_j S_j - E|, at most S_j + |E|: so HINDERING
 is on the safe side, and HELPING leaves out what the contact itself adds to the friction.
@@ -30,7 +31,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
@@ -39,6 +40,8 @@ from finger_pin.mechanism.finger import Finger
 
 #: What scipy's linear programmes report.
 INFEASIBLE, UNBOUNDED = 2, 3
+# Part of the largest lever below which a force turns no joint.
+_UNTURNED = 1e-9
 
 
 class Friction(Enum):
@@ -58,7 +61,7 @@ class TipStatics:
         equal: Rows that vanish, shape (., a + s + n).
         below: Rows that are at most zero, shape (., a + s + n).
         torque: Rows (n) of H_c2^T f - tau^f.
-        weight: G, shape (n,), N m.
+        weight: G and the torque of springs, shape (n,), N m.
         sizes: a, s, n.
     """
 
@@ -101,7 +104,7 @@ class TipStatics:
             equal=np.concatenate([np.zeros((0, width)), *equal]),
             below=np.concatenate([np.zeros((0, width)), *below]),
             torque=torque,
-            weight=finger.rigid_body.gravity_torque(theta),
+            weight=finger.static_torque(theta),
             sizes=(a, s, n),
         )
 
@@ -138,10 +141,26 @@ class TipStatics:
         )
 
 
-def slides(finger: Finger, friction: Friction) -> list[tuple[float, ...]]:
-    """Return the ways in which the passive tendons can slip that HINDERING must look at, signs by passive tendon."""
-    passive = finger.routing.passive
-    return list(product((1.0, -1.0), repeat=passive)) if friction is Friction.HINDERING else [(0.0,) * passive]
+def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> list[tuple[tuple[float, ...], Array]]:
+    """Return how everything may slip under a force E, shape (3,): signs of passive tendons, and of joints, shape (n,).
+
+    That is for HINDERING alone. A force that passes a joint's axis at no more than the coefficient M^d of its friction,
+    inside of its friction circle, does not decide which way the joint slips: both ways must be looked at. Where it
+    turns no joint at all the structure carries it, and nothing slips.
+    """
+    passive, kinetic = finger.routing.passive, finger.joint_friction.kinetic
+    still: Array = np.zeros(len(kinetic))
+    if friction is not Friction.HINDERING:
+        return [((0.0,) * passive, still)]
+    turn, size = jacobian.T @ force, float(np.linalg.norm(force))
+    joints = [still]
+    if np.max(np.abs(turn)) > _UNTURNED * size * np.max(np.abs(jacobian)):
+        sides = [
+            (np.sign(each),) if abs(each) >= least else (1.0, -1.0)
+            for each, least in zip(turn, size * kinetic, strict=True)
+        ]
+        joints = [np.array(signs) for signs in product(*sides)]
+    return list(product(product((1.0, -1.0), repeat=passive), joints))
 
 
 def posture(finger: Finger, position: Sequence[float] | Array) -> Array:

@@ -19,6 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import sliding_velocity
+from finger_pin.analysis.finding import Finding
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
@@ -30,8 +31,8 @@ from finger_pin.mechanism.tendons import Tendons
 _SETTLED = 5.0
 
 
-@dataclass(frozen=True, eq=False)
-class TransmissionEfficiency:
+@dataclass(frozen=True, eq=False, repr=False)
+class TransmissionEfficiency(Finding):
     """Delivered over commanded tension, f / f^a, of every tendon; shapes (..., t).
 
     Attributes:
@@ -49,8 +50,8 @@ class TransmissionEfficiency:
     greatest: Array
 
 
-@dataclass(frozen=True, eq=False)
-class TransmissionInMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class TransmissionInMotion(Finding):
     """Delivered over commanded tension along a simulation; shapes (m, t), not a number where nothing is commanded.
 
     Attributes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -9,6 +10,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Self
+
+import typer
+
+from finger_pin.exceptions import FingerPinError, InputError
+
+
+class Unsuccessful(FingerPinError):
+    """Runs were made, and none of them serves."""
 
 
 class Interrupts:
@@ -96,6 +105,30 @@ def runs_bar(what: str) -> Iterator[Callable[[int, int, int], None]]:
             bar.update(tasks[0], completed=finished, total=total, failed=note)
 
         yield show
+
+
+def complain(program: str, message: str) -> None:
+    """Print one line on standard error."""
+    print(f"{program}:", "".join(c if c.isprintable() else repr(c)[1:-1] for c in message), file=sys.stderr)
+
+
+@contextmanager
+def noted(note: str) -> Iterator[None]:
+    """Add a note to what is raised meanwhile: what became of what was done."""
+    try:
+        yield
+    except BaseException as error:
+        if not isinstance(error, InputError | Unsuccessful | typer.TyperException):
+            error.add_note(note)
+        raise
+
+
+def talks(quiet: bool) -> bool:
+    """Return whether to show progress; where not, the package's log is kept silent up to errors."""
+    shown = sys.stderr.isatty() and not quiet
+    if not shown:
+        logging.getLogger("finger_pin").setLevel(logging.ERROR)
+    return shown
 
 
 def print_text(text: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ from finger_pin.analysis import critical_friction
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Distribution, PseudoInverse
 from finger_pin.control.joint_compensation import JointCompensation
+from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import Controller, ProportionalController
 from finger_pin.control.tendon_feedforward import TendonFeedforward
@@ -24,7 +27,9 @@ from finger_pin.mechanism.finger import Finger
 def build_controller(scenario: Scenario, finger: Finger | None = None) -> Controller:
     """Return the controller that a scenario describes.
 
-    The paper's, unless an entry asks for more; then a `CompensatedController`, inside a `PassiveTensionLoop` if asked.
+    Tensions in open loop, or the paper's, unless an entry asks for more; then a `CompensatedController`, inside a
+    `PassiveTensionLoop` if asked. A finger without force closure has no internal tension (22) to raise: its tensions
+    are the least of at least f0 that exert tau^d and hold the springs, or come nearest (`LimitedDistribution`).
 
     Args:
         scenario: The scenario.
@@ -35,7 +40,10 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
     """
     finger = finger or Finger(scenario.finger)
     settings = scenario.controller
-    if settings.is_paper:
+    if settings.kind == "tensions":
+        return OpenLoopTensions.from_scenario(scenario, finger.routing)
+    taut = finger.routing.force_closure().holds
+    if settings.is_paper and taut:
         return ProportionalController.from_scenario(scenario, finger.routing)
     joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)
     controller = CompensatedController(
@@ -43,7 +51,7 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
         law=TorqueLaw(
             gain=expand(settings.gain, joints),
             damping=expand(settings.damping, joints),
-            gravity=finger.rigid_body.gravity_torque if settings.gravity_compensation else None,
+            static=_static(finger, settings.gravity_compensation, settings.spring_compensation or not taut),
         ),
         distribution=_distribution(scenario, finger),
         minimum=expand(settings.minimum_tension, tendons),
@@ -59,12 +67,22 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
 
 def _distribution(scenario: Scenario, finger: Finger) -> Distribution:
     limits = scenario.controller.distribution
-    if limits is None:
+    if limits is None and finger.routing.force_closure().holds:
         return PseudoInverse.from_routing(finger.routing)
     # Importing the solver takes a while, which nobody without limits shall wait for.
     from finger_pin.control.limited_distribution import LimitedDistribution
 
-    return LimitedDistribution(finger.routing, expand(limits.maximum_tension, len(finger.routing.tendons)))
+    maximum = math.inf if limits is None else limits.maximum_tension
+    return LimitedDistribution(finger.routing, expand(maximum, len(finger.routing.tendons)))
+
+
+def _static(finger: Finger, gravity: bool, springs: bool) -> Callable[[Array], Array] | None:
+    """Return what is added to tau^d so that the finger stays where it is: G, the torque of the springs, or both."""
+    if not springs or not finger.springs.present:
+        return finger.rigid_body.gravity_torque if gravity else None
+    if gravity:
+        return finger.static_torque
+    return lambda position: finger.springs.torque(position, np.zeros_like(position))
 
 
 def _feedforward(scenario: Scenario, finger: Finger) -> TendonFeedforward | None:

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from finger_pin.control import build_controller
-from finger_pin.control.proportional import Controller, ControlSignals
-from finger_pin.control.reference import HarmonicReference, ReferenceSignals
-from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
+from finger_pin.control.build import build_controller
+from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.measurement import MeasuringController
+from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
+from finger_pin.control.passive_loop import PassiveTensionLoop
+from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
+from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.signal import Signal
+from finger_pin.description.routing import Array, Routing
+from finger_pin.description.scenario import AXES, Scenario
+from finger_pin.description.signals import ForceSignal
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
 
+# However close points are, steps need not be shorter than this, s.
+_SHORTEST = 1e-4
 
-class Reference(Protocol):
-    """Anything that gives a desired motion."""
-
-    def at(self, time: Array | float) -> ReferenceSignals:
-        """Return theta^d and its rate at one time, or at times of shape (m,)."""
+#: Times, shape (m,), s, and values, one row for each.
+Samples = tuple[ArrayLike, ArrayLike]
 
 
 class Dynamics(Protocol):
@@ -50,8 +57,10 @@ class ClosedLoop:
         finger: The finger.
         controller: Turns reference and motion into tensions.
         reference: The desired motion.
-        fingertip_force: F, shape (3,), N, base frame.
+        fingertip_force: F, or what is constant of it, shape (3,), N, base frame.
         dynamics: What evaluates the finger.
+        varying_force: What varies of F, three signals, N; None for nothing.
+        start: The packed state at the start, shape (size,); None for rest on the reference.
     """
 
     finger: Finger
@@ -59,24 +68,73 @@ class ClosedLoop:
     reference: Reference
     fingertip_force: Array
     dynamics: Dynamics
+    varying_force: Signal | None = None
+    start: Array | None = None
 
     @classmethod
     def from_scenario(
-        cls, scenario: Scenario, controller: Controller | None = None, reference: Reference | None = None
+        cls,
+        scenario: Scenario,
+        controller: Controller | Samples | None = None,
+        reference: Reference | Samples | None = None,
+        fingertip_force: Samples | None = None,
     ) -> ClosedLoop:
-        """Build the loop that a scenario describes, with a controller or reference of one's own if given."""
-        finger = Finger(scenario.finger)
-        return cls(
+        """Build the loop that a scenario describes, with a controller or reference of one's own if given.
+
+        Args:
+            scenario: The scenario.
+            controller: Replaces its controller: an object, or times (m,), s, and tensions (m, a), N.
+            reference: Replaces its reference: an object, or times (m,), s, and angles (m, k), rad, one column for each
+                of the k joints that no passive tendon drives.
+            fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame.
+
+        Raises:
+            InputError: If samples have the wrong shape, are not finite, or tensions are negative.
+        """
+        finger, start = Finger(scenario.finger), scenario.simulation.start_time
+        loop = cls(
             finger=finger,
-            controller=controller or build_controller(scenario, finger),
-            reference=reference or HarmonicReference.from_scenario(scenario, finger.routing),
+            controller=_controller(controller, scenario, finger),
+            reference=_reference(reference, scenario, finger.routing),
             fingertip_force=np.array(scenario.environment.fingertip_force),
             dynamics=finger,
         )
+        signals = scenario.environment.fingertip_force_signal
+        if fingertip_force is not None:
+            force = Signal.from_samples("fingertip_force", fingertip_force, AXES)
+            loop = replace(loop, fingertip_force=np.zeros(3), varying_force=force.later(start))
+        elif signals:
+            force = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES])
+            loop = replace(loop, varying_force=force.later(start))
+        initial = scenario.simulation.initial
+        if initial is not None:
+            joints = finger.routing.joints
+            position = loop.reference.at(0.0).position
+            moved = [initial.position.get(name, own) for name, own in zip(joints, position, strict=True)]
+            velocity = [initial.velocity.get(name, 0.0) for name in joints]
+            loop = replace(loop, start=finger.rest_state(np.array(moved), np.array(velocity)))
+        return loop
 
     def initial_state(self) -> Array:
-        """Return the packed state at rest on the reference, shape (size,)."""
-        return self.finger.rest_state(self.reference.at(0.0).position)
+        """Return the packed state at the start, shape (size,)."""
+        return self.finger.rest_state(self.reference.at(0.0).position) if self.start is None else self.start.copy()
+
+    def force(self, time: Array | float) -> Array:
+        """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame."""
+        if self.varying_force is None:
+            return self.fingertip_force
+        return np.asarray(self.fingertip_force + self.varying_force.at(time)[0])
+
+    def knots(self) -> Array:
+        """Return the times at which a signal may have a kink or a jump, s, in order."""
+        owners = (self.reference, self.controller)
+        signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
+        found = [each.knots for each in (*signals, self.varying_force) if each and not each.is_harmonic]
+        return np.unique(np.concatenate([np.zeros(0), *found]))
+
+    def longest_step(self) -> float:
+        """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
+        return max(float(np.diff(self.knots()).min(initial=np.inf)), _SHORTEST)
 
     def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
         """Return all signals at one time and state, or at times (m,) and states (m, size)."""
@@ -84,8 +142,29 @@ class ClosedLoop:
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
         command = control.tension[..., : self.finger.routing.actuated]
-        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.fingertip_force))
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
 
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
+
+
+def _controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:
+    if given is None:
+        return build_controller(scenario, finger)
+    if isinstance(given, tuple | list):
+        return OpenLoopTensions.from_samples(given, scenario, finger.routing)
+    if isinstance(given, ProportionalController | CompensatedController | PassiveTensionLoop):
+        return given
+    kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
+    return kind(given, finger.routing, scenario.simulation.start_time)
+
+
+def _reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> Reference:
+    if given is None:
+        return SignalReference.from_scenario(scenario, routing)
+    if isinstance(given, tuple | list):
+        return SignalReference.from_samples(given, scenario, routing)
+    if isinstance(given, SignalReference):
+        return given
+    return OwnReference(given, routing.joints, scenario.simulation.start_time)

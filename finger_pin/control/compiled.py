@@ -1,22 +1,44 @@
-"""The paper's controller and a harmonic reference as arrays for the compiled core."""
+"""Controllers and signals as arrays for the compiled core."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import HarmonicReference
-from finger_pin.core.inputs import Control, Signal, planned_control
+from finger_pin.control.reference import SignalReference
+from finger_pin.control.signal import Signal
+from finger_pin.core import inputs
+from finger_pin.core.inputs import Control, held_control, planned_control, scheduled_control
 from finger_pin.description.routing import Array, Routing
 
 
-def build_control(controller: ProportionalController, reference: HarmonicReference, routing: Routing) -> Control:
+def compiled_control(loop: ClosedLoop) -> Control | None:
+    """Return a loop's controller, reference and varying force as arrays, or None where the first two are Python."""
+    controller, reference, mechanism = loop.controller, loop.reference, loop.finger.mechanism
+    control = None
+    if isinstance(controller, OpenLoopTensions):
+        control = scheduled_control(_arrays(controller.signal), mechanism.coordinates)
+    elif isinstance(controller, ProportionalController) and isinstance(reference, SignalReference):
+        control = paper_control(controller, reference, loop.finger.routing)
+    return None if control is None else with_force(control, loop)
+
+
+def sampled_control(loop: ClosedLoop) -> Control:
+    """Return inputs that hold what a sampled controller says, with the loop's varying force."""
+    mechanism = loop.finger.mechanism
+    return with_force(held_control(mechanism.channels, mechanism.coordinates), loop)
+
+
+def paper_control(controller: ProportionalController, reference: SignalReference, routing: Routing) -> Control:
     """Return controller and reference as inputs of a finger's mechanism, whose coordinates are (theta, p)."""
     tendons = np.arange(len(routing.tendons))
 
     def padded(values: Array) -> Array:
         return np.concatenate([values, np.zeros((*values.shape[:-1], routing.passive))], axis=-1)
 
+    matrix = reference.coupling.matrix
     return planned_control(
         routing.actuated,
         gain=padded(controller.gain),
@@ -24,11 +46,24 @@ def build_control(controller: ProportionalController, reference: HarmonicReferen
         inverse=padded(controller.inverse),
         internal=controller.internal,
         channel=np.where(tendons < routing.actuated, tendons, -1),
-        reference=Signal(
-            np.column_stack([reference.offset, reference.amplitude, reference.frequency, reference.phase]),
-            np.zeros(0),
-            np.zeros((1, 0, len(routing.joints))),
-        ),
-        coupling=np.concatenate([reference.coupling.matrix, np.zeros((routing.passive, len(routing.joints)))]),
+        reference=_arrays(reference.signal),
+        coupling=np.concatenate([matrix, np.zeros((routing.passive, len(matrix)))]),
         offset=padded(reference.coupling.offset),
     )
+
+
+def with_force(control: Control, loop: ClosedLoop) -> Control:
+    """Return inputs with what varies of the force at the fingertip; the constant part goes with it."""
+    if loop.varying_force is None:
+        return control
+    force = _arrays(loop.varying_force)
+    force.harmonics[:, 0] += loop.fingertip_force
+    return control._replace(force=force)
+
+
+def _arrays(signal: Signal) -> inputs.Signal:
+    """Return a signal as arrays of the core's own; polynomials that are zero are left out."""
+    harmonics = np.array(signal.harmonics, dtype=float)
+    if signal.is_harmonic:
+        return inputs.Signal(harmonics, np.zeros(0), np.zeros((6, 0, len(harmonics))))
+    return inputs.Signal(harmonics, signal.knots.copy(), np.ascontiguousarray(signal.coefficients))

@@ -13,7 +13,7 @@ limits, and what is missing is told.
 from __future__ import annotations
 
 import numpy as np
-import scipy.optimize
+import scipy
 from proxsuite import proxqp
 
 from finger_pin.control.distribution import Plan

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from finger_pin.control.signal import Signal
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array, Routing
-from finger_pin.description.scenario import JointReference, Scenario
-from finger_pin.laws.harmonic import harmonic, harmonic_rate
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import JointReference
+from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
+from finger_pin.exceptions import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,40 +25,60 @@ class ReferenceSignals:
     velocity: Array
 
 
-@dataclass(frozen=True, eq=False)
-class HarmonicReference:
-    """One sinusoid about an offset per joint, then equation (20) for the followers.
-
-    Attributes:
-        offset: Shape (n,), rad.
-        amplitude: Shape (n,), rad.
-        frequency: Shape (n,), Hz.
-        phase: Shape (n,), rad.
-        coupling: The joints that passive tendons drive.
-    """
-
-    offset: Array
-    amplitude: Array
-    frequency: Array
-    phase: Array
-    coupling: PassiveCoupling
-
-    @classmethod
-    def from_scenario(cls, scenario: Scenario, routing: Routing) -> HarmonicReference:
-        """Read a scenario's reference, for the routing of its finger."""
-        settings = [scenario.reference.joints.get(name, JointReference()) for name in routing.joints]
-        return cls(
-            offset=np.array([joint.offset for joint in settings]),
-            amplitude=np.array([joint.amplitude for joint in settings]),
-            frequency=np.array([joint.frequency for joint in settings]),
-            phase=np.array([joint.phase for joint in settings]),
-            coupling=scenario.coupling(routing),
-        )
+class Reference(Protocol):
+    """Anything that gives a desired motion."""
 
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""
-        instant = np.asarray(time, dtype=float)[..., None]
-        base = harmonic(instant, self.offset, self.amplitude, self.frequency, self.phase)
-        rate = harmonic_rate(instant, self.amplitude, self.frequency, self.phase)
+
+
+@dataclass(frozen=True, eq=False)
+class SignalReference:
+    """A signal per joint, then equation (20) for the followers, whose own signals do not count.
+
+    Attributes:
+        signal: n signals, rad.
+        coupling: The joints that passive tendons drive.
+    """
+
+    signal: Signal
+    coupling: PassiveCoupling
+
+    @classmethod
+    def from_scenario(cls, scenario: Scenario, routing: Routing) -> SignalReference:
+        """Read a scenario's reference, for the routing of its finger."""
+        settings = [scenario.reference.joints.get(name, JointReference()) for name in routing.joints]
+        signal = Signal.from_settings(settings).later(scenario.simulation.start_time)
+        return cls(signal, scenario.coupling(routing))
+
+    @classmethod
+    def from_samples(
+        cls, samples: tuple[ArrayLike, ArrayLike], scenario: Scenario, routing: Routing
+    ) -> SignalReference:
+        """Return the reference through samples of the joints that do not follow (20).
+
+        Args:
+            samples: Times, shape (m,), s, and angles, shape (m, k), rad, one column for each of the k joints, in order,
+                that no passive tendon drives.
+            scenario: Whose passive tendons the others follow.
+            routing: Of its finger.
+
+        Raises:
+            InputError: If shapes or numbers are wrong, or an angle is beyond two turns.
+        """
+        coupling = scenario.coupling(routing)
+        free = [index for index in range(len(routing.joints)) if index not in coupling.followers]
+        given = Signal.from_samples("reference", samples, [routing.joints[index] for index in free])
+        largest = float(np.max(np.abs(np.asarray(samples[1], dtype=float))))
+        if largest > MOST_ANGLE:
+            raise InputError("reference", f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}", largest)
+        given = given.later(scenario.simulation.start_time)
+        coefficients = np.zeros((*given.coefficients.shape[:2], len(routing.joints)))
+        coefficients[..., free] = given.coefficients
+        return cls(Signal(np.zeros((len(routing.joints), 4)), given.knots, coefficients), coupling)
+
+    def at(self, time: Array | float) -> ReferenceSignals:
+        """Return theta^d and its rate at one time, or at times of shape (m,)."""
+        base, rate = self.signal.at(time)
         matrix = self.coupling.matrix.T
         return ReferenceSignals(base @ matrix + self.coupling.offset, rate @ matrix)

@@ -76,7 +76,7 @@ class SampledController:
         motion = self._sensors.motion(state)
         if isinstance(controller, MeasuringController):
             acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
-            strands = loop.dynamics.evaluate(x, acting, loop.fingertip_force).tendons.strands
+            strands = loop.dynamics.evaluate(x, acting, loop.force(time)).tendons.strands
             delivered = loop.finger.routing.tendon_tension(strands)
             controller.sense(self._sensors.tension(delivered), self.period if self._samples else 0.0)
         return controller.command(time, loop.reference.at(time), motion.position, motion.velocity)

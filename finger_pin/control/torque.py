@@ -22,19 +22,20 @@ class TorqueLaw:
     Attributes:
         gain: K_P, shape (n,), N m/rad.
         damping: K_D, shape (n,), N m s/rad.
-        gravity: G of (18), from one position of shape (n,) to shape (n,), N m; None to leave it out.
+        static: G of (18), the torque of springs or both, from one position of shape (n,) to shape (n,), N m; None to
+            leave it out.
     """
 
     gain: Array
     damping: Array
-    gravity: Callable[[Array], Array] | None = None
+    static: Callable[[Array], Array] | None = None
 
     def torque(self, reference: ReferenceSignals, position: Array, velocity: Array) -> Array:
         """Return tau^d for motion of shape (..., n), N m."""
         torque: Array = proportional_torque(self.gain, reference.position, position)
         torque = torque + self.damping * (reference.velocity - velocity)
-        if self.gravity is None:
+        if self.static is None:
             return torque
         rows = position.reshape(-1, position.shape[-1])
-        weight: Array = np.array([self.gravity(row) for row in rows]).reshape(position.shape)
+        weight: Array = np.array([self.static(row) for row in rows]).reshape(position.shape)
         return torque + weight

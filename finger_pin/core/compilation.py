@@ -2,22 +2,33 @@
 
 numba notices a change of a function's own file, not of the functions that it calls. The cache folder is therefore
 named after a digest of every source file that is compiled. Where no folder can be written, everything is compiled
-anew in each process.
+anew in each process. What takes its time is said once, as a warning of the logger ``finger_pin``, which Python prints
+on standard error unless logging is set up otherwise.
 """
 
 from __future__ import annotations
 
 import hashlib
+import logging
+import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 import platformdirs
+from numba.core import event
+from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_LOGGER = logging.getLogger("finger_pin")
+
+
+def _root() -> str:
+    return os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin")
 
 
 def _digest() -> str:
@@ -29,8 +40,7 @@ def _digest() -> str:
 
 
 def _cache_folder() -> str | None:
-    root = os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin")
-    folder = Path(root) / _digest()
+    folder = Path(_root()) / _digest()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / f".probe-{os.getpid()}"
@@ -57,6 +67,39 @@ _OPTIONS: dict[str, Any] = {
 def is_cached() -> bool:
     """Return whether compiled code is at hand, so that the first simulation starts at once."""
     return CACHE_FOLDER is not None and any(Path(CACHE_FOLDER).rglob("*.nbi"))
+
+
+@cache
+def _say(text: str) -> None:
+    """Warn once in a process, and not in those that a process starts."""
+    if multiprocessing.parent_process() is None:
+        _LOGGER.warning(text)
+
+
+class _Announcer(event.Listener):
+    """Says that the model is being compiled."""
+
+    def on_start(self, event: Any) -> None:
+        if event.data["dispatcher"].py_func.__module__.startswith("finger_pin."):
+            often = "once for this version" if CACHE_FOLDER else f"in every run, as {_root()} cannot be written"
+            advice = "" if CACHE_FOLDER else "; FINGER_PIN_CACHE_DIR may name another folder"
+            _say(f"Compiling the model, {often}: about half a minute{advice} ...")
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
+
+
+class _Cache(FunctionCache):
+    """numba's cache, where a full disk costs the next run half a minute and not this one its results."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except OSError as error:
+            _say(f"the compile cache {CACHE_FOLDER} cannot be written: {error.strerror}; the next run compiles again")
 
 
 def compiled(function: _Function) -> _Function:
@@ -118,4 +161,7 @@ def _cache_directory() -> Iterator[None]:
 
 def _compile(function: _Function, **kind: Any) -> _Function:
     with _cache_directory():
-        return numba.njit(**{"nogil": True, **_OPTIONS, **kind})(function)  # type: ignore[no-any-return]
+        dispatcher = numba.njit(**{"nogil": True, **_OPTIONS, **kind})(function)
+        if kind["cache"]:
+            dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+        return dispatcher  # type: ignore[no-any-return]

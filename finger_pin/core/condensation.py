@@ -39,6 +39,11 @@ def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
     for j in range(width):
         for c in range(wide):
             force[j, c] = 0.0
+    if tables.loaded:
+        for t in range(tables.tip_body.size):
+            for j in range(width):
+                for r in range(3):
+                    force[j, last] += work.jacobian[t, r, j] * work.force_rate[t, r]
     for k in range(count):
         row, state = linear.gain[k], tables.state[k]
         of_length, of_speed, of_curvature = slopes[at.F_LENGTH, k], slopes[at.F_SPEED, k], slopes[at.F_CURVATURE, k]
@@ -62,6 +67,7 @@ def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
             if tables.loaded and tables.pins[k] >= 0:
                 for c in range(width):
                     load[c] += linear.load_by_position[k, c]
+                load[last] += linear.load_by_time[k]
             for c in range(wide):
                 row[c] = of_load * load[c]
             if by_load != 0.0:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-import scipy.interpolate
+import scipy
 
 from finger_pin.core.textbook import Statistics, Stop, Trajectory, Watch
 from finger_pin.description.routing import Array
@@ -21,6 +21,7 @@ def integrate_cvode(
     *,
     rtol: float,
     atol: Array,
+    longest: float = np.inf,
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
@@ -32,6 +33,7 @@ def integrate_cvode(
         duration: s.
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
+        longest: The longest step, s.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
 
@@ -50,7 +52,9 @@ def integrate_cvode(
         evaluations += 1
         rate[:] = rhs(instant, x)
 
-    solver = CVODE(fill, rtol=rtol, atol=atol, max_num_steps=100_000, linsolver="dense")
+    # Zero is no limit.
+    most = longest if np.isfinite(longest) else 0.0
+    solver = CVODE(fill, rtol=rtol, atol=atol, max_step=most, max_num_steps=100_000, linsolver="dense")
     solver.init_step(0.0, start)
     times, states, rates = [0.0], [start], [rhs(0.0, start)]
     reason, interrupted, jacobians = "", False, 0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import inputs
+from finger_pin.core.inputs import inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.tables import BENT, END, FED, FIRST, PRESSED, STATEFUL
@@ -125,6 +125,7 @@ def evaluate(tables: Any, control: Any, time: float, x: Any, work: Any, rate: An
     inputs(control, time, q, work.command)
     move(tables, q, v, work)
     if tables.loaded:
+        tip_forces(control, time, tables)
         _tips(tables, work)
     _exert(tables, q, v, z, work, rate[2 * width :])
     mass_matrix(tables, work)

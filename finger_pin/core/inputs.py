@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 from finger_pin.core.binding import Indices, Layers, Matrix, Vector
 from finger_pin.core.compilation import compiled
 from finger_pin.core.law_code import inlined
+from finger_pin.core.trigonometry import sine_cosine
 from finger_pin.description.routing import Array
 from finger_pin.laws import controller as controller_laws
-from finger_pin.laws import harmonic as harmonic_laws
+from finger_pin.laws.quintic import quintic, quintic_rate
 
 HELD, PLANNED, SCHEDULED = range(3)
 
-_harmonic = inlined(harmonic_laws.harmonic)
-_harmonic_rate = inlined(harmonic_laws.harmonic_rate)
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
+_quintic = inlined(quintic)
+_quintic_rate = inlined(quintic_rate)
 
 
 class Signal(NamedTuple):
@@ -28,7 +29,7 @@ class Signal(NamedTuple):
     Attributes:
         harmonics: Offset, amplitude, frequency, phase, shape (k, 4).
         knots: Shape (m,); m = 0 without polynomials. Outside, these keep their value.
-        coefficients: Of (t - knot)^(d - i), shape (d + 1, m - 1, k).
+        coefficients: Of (t - knot)^(5 - i), shape (6, m - 1, k).
     """
 
     harmonics: Matrix
@@ -52,6 +53,7 @@ class Control(NamedTuple):
         coupling: Shape (N, r).
         offset: Shape (N,).
         schedule: Inputs over time, u functions.
+        force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
         desired, rate: Memory, theta^d and its rate, shape (N,).
         planned: Memory, f_hat, shape (T,).
         active: Memory, the tension that sets lambda, by controller.
@@ -73,6 +75,7 @@ class Control(NamedTuple):
     coupling: Matrix
     offset: Vector
     schedule: Signal
+    force: Signal
     desired: Vector
     rate: Vector
     planned: Vector
@@ -85,7 +88,7 @@ class Control(NamedTuple):
 
 def no_signal() -> Signal:
     """Return a signal of no functions."""
-    return Signal(np.zeros((0, 4)), np.zeros(0), np.zeros((1, 0, 0)))
+    return Signal(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
 
 
 def planned_control(
@@ -164,6 +167,7 @@ def _control(
         coupling=np.ascontiguousarray(coupling, dtype=float),
         offset=np.array(offset, dtype=float),
         schedule=schedule,
+        force=no_signal(),
         desired=np.zeros(coordinates),
         rate=np.zeros(coordinates),
         planned=np.zeros(len(minimum)),
@@ -197,14 +201,12 @@ def signal_values(signal: Any, time: float, out: Any) -> None:
     for j in range(table.shape[0]):
         out[j] = table[j, 0]
         if table[j, 1] != 0.0:
-            out[j] = _harmonic(time, table[j, 0], table[j, 1], table[j, 2], table[j, 3])
+            out[j] += table[j, 1] * sine_cosine(2.0 * np.pi * table[j, 2] * time + table[j, 3])[0]
     if signal.knots.size > 0:
         piece, since = _piece(signal, time)
         for j in range(table.shape[0]):
-            value = 0.0
-            for i in range(signal.coefficients.shape[0]):
-                value = value * since + signal.coefficients[i, piece, j]
-            out[j] += value
+            c = signal.coefficients[:, piece, j]
+            out[j] += _quintic(since, c[0], c[1], c[2], c[3], c[4], c[5])
 
 
 @compiled
@@ -214,15 +216,13 @@ def signal_rates(signal: Any, time: float, out: Any) -> None:
     for j in range(table.shape[0]):
         out[j] = 0.0
         if table[j, 1] != 0.0:
-            out[j] = _harmonic_rate(time, table[j, 1], table[j, 2], table[j, 3])
-    if knots.size > 0 and knots[0] <= time <= knots[knots.size - 1]:
+            circular = 2.0 * np.pi * table[j, 2]
+            out[j] = table[j, 1] * circular * sine_cosine(circular * time + table[j, 3])[1]
+    if knots.size > 0 and knots[0] <= time < knots[knots.size - 1]:
         piece, since = _piece(signal, time)
-        degree = signal.coefficients.shape[0] - 1
         for j in range(table.shape[0]):
-            value = 0.0
-            for i in range(degree):
-                value = value * since + (degree - i) * signal.coefficients[i, piece, j]
-            out[j] += value
+            c = signal.coefficients[:, piece, j]
+            out[j] += _quintic_rate(since, c[0], c[1], c[2], c[3], c[4])
 
 
 @compiled
@@ -288,3 +288,17 @@ def input_slopes(control: Any, time: float) -> None:
             slope = -control.gain[j] * (control.inverse[i, j] - control.internal[i] * shared)
             by_position[row, j] = slope
             by_time[row] -= slope * control.rate[j]
+
+
+@compiled
+def tip_forces(control: Any, time: float, tables: Any) -> None:
+    """Fill the forces at the tips where they vary in time."""
+    if control.force.harmonics.shape[0] > 0:
+        signal_values(control.force, time, tables.tip_force.reshape(-1))
+
+
+@compiled
+def tip_force_rates(control: Any, time: float, rates: Any) -> None:
+    """Fill their time derivatives, shape (t, 3)."""
+    if control.force.harmonics.shape[0] > 0:
+        signal_rates(control.force, time, rates.reshape(-1))

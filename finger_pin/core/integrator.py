@@ -106,6 +106,7 @@ def integrate_compiled(
     names: tuple[str, ...],
     *,
     held: Held | None = None,
+    knots: Array | None = None,
     watch: Watch | None = None,
     chunk: int = 256,
     stop: Stop | None = None,
@@ -117,6 +118,7 @@ def integrate_compiled(
         duration: s.
         names: Names of the numbers of the state, for messages.
         held: A controller that holds its tensions in between.
+        knots: Times at which an input may jump, in order, s: steps end there.
         watch: Called with the simulated time and the state after every chunk of steps.
         chunk: Most steps between two calls.
         stop: Asked now and then; true ends the integration there.
@@ -127,23 +129,31 @@ def integrate_compiled(
     recorders = [_Recorder(part, chunk) for part in stepper.parts]
     alone = len(recorders) == 1
     reason, interrupted = "", False
+    knotted = set(() if knots is None else knots[(knots > 0.0) & (knots < duration)].tolist())
+    pending = sorted(knotted)
     while stepper.time < duration and not reason and not interrupted:
-        end = duration
+        end = min((knot for knot in pending if knot > stepper.time), default=duration)
         if held is not None:
             if stepper.time >= held.instant:
                 stepper.hold(held.act(stepper.x))
-            end = min(duration, held.instant)
+            end = min(end, held.instant)
         elif not alone and watch is not None:
-            end = min(duration, stepper.time + duration / _SLICES)
+            end = min(end, stepper.time + duration / _SLICES)
+        # At a knot itself the value after the jump counts: a step that ends there must not see it.
+        jump = end in knotted
+        goal = float(np.nextafter(end, 0.0)) if jump else end
         if alone:
-            statuses = [recorders[0].advance(end, 1)]
+            statuses = [recorders[0].advance(goal, 1)]
         else:
-            statuses = in_threads(partial(_Recorder.advance, end=end), recorders)
+            statuses = in_threads(partial(_Recorder.advance, end=goal), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
             places = stepper.places(recorder.part.island)
             reason = reason or failure(recorder.part, status, [names[at] for at in places])
             if not reason and recorder.full and recorder.part.time < duration:
                 reason = f"after {recorder.taken} steps the trajectory has reached the most that is kept in memory"
+        if jump and stepper.time == goal:
+            for part in stepper.parts:
+                part.memory[core.TIME] = end
         if watch is not None:
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()

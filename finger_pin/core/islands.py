@@ -142,11 +142,6 @@ def select_control(control: Control, island: Island) -> Control:
     coordinates, planned, channels = island.coordinates, island.planned, island.channels
     loops = np.unique(control.loop[planned])
     channel = _renumbered(channels, len(control.tension))
-    schedule = control.schedule
-    if len(schedule.harmonics):
-        schedule = Signal(
-            schedule.harmonics[channels], schedule.knots, np.ascontiguousarray(schedule.coefficients[:, :, channels])
-        )
     return control._replace(
         tension=control.tension[channels],
         gain=control.gain[coordinates],
@@ -157,7 +152,8 @@ def select_control(control: Control, island: Island) -> Control:
         channel=_mapped(channel, control.channel[planned]),
         coupling=np.ascontiguousarray(control.coupling[coordinates]),
         offset=control.offset[coordinates],
-        schedule=schedule,
+        schedule=_chosen(control.schedule, channels),
+        force=_chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel()),
         desired=np.zeros(len(coordinates)),
         rate=np.zeros(len(coordinates)),
         planned=np.zeros(len(planned)),
@@ -167,6 +163,14 @@ def select_control(control: Control, island: Island) -> Control:
         by_position=np.zeros((len(channels), len(coordinates))),
         by_time=np.zeros(len(channels)),
     )
+
+
+def _chosen(signal: Signal, functions: Indices) -> Signal:
+    """Return some functions of a signal; none of none."""
+    if not len(signal.harmonics):
+        return signal
+    coefficients = np.ascontiguousarray(signal.coefficients[:, :, functions])
+    return Signal(signal.harmonics[functions], signal.knots, coefficients)
 
 
 def _entries(start: Indices, rows: Indices) -> tuple[Indices, Indices]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.core.binding import Indices, Matrix, Vector
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import input_slopes
+from finger_pin.core.inputs import input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
@@ -30,6 +30,7 @@ class Linear(NamedTuple):
         bend: d(curvature)/dq, as in the tables, shape (bends,).
         load_slope: dN/dS, S the sum of earlier forces, shape (K,).
         load_by_position: dN/dq at constant S, shape (K, N).
+        load_by_time: dN/dt at constant S, shape (K,).
         gain: d phi, shape (K, wide).
         state_gain: d z, shape (Z, wide).
         load, command: Of one row, shape (wide,).
@@ -48,6 +49,7 @@ class Linear(NamedTuple):
     bend: Vector
     load_slope: Vector
     load_by_position: Matrix
+    load_by_time: Vector
     gain: Matrix
     state_gain: Matrix
     load: Vector
@@ -76,6 +78,7 @@ def build_linear(tables: Tables) -> Linear:
         bend=tables.bend.copy(),
         load_slope=np.zeros(count),
         load_by_position=np.zeros((count, width)),
+        load_by_time=np.zeros(count),
         gain=np.zeros((count, wide)),
         state_gain=np.zeros((states, wide)),
         load=np.zeros(wide),
@@ -130,6 +133,10 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
             x -= tables.carried[t, body] * tables.tip_force[t, 0]
             y -= tables.carried[t, body] * tables.tip_force[t, 1]
             z -= tables.carried[t, body] * tables.tip_force[t, 2]
+        linear.load_by_time[k] = 0.0
+        for t in range(tables.tip_body.size):
+            for r in range(3):
+                linear.load_by_time[k] += tables.carried[t, body] * work.force_rate[t, r] * pull[r] / size
         for j in range(tables.parents.size):
             linear.load_by_position[k, j] = 0.0
         j = tables.carriers[body]
@@ -157,6 +164,8 @@ def linearise(tables: Any, control: Any, time: float, x: Any, work: Any, linear:
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
+    if tables.loaded:
+        tip_force_rates(control, time, work.force_rate)
     _load_slopes(tables, work, linear)
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]

@@ -15,6 +15,7 @@ import numpy as np
 
 from finger_pin.core.compilation import compiled
 from finger_pin.core.spatial import add_force_cross, apply_inertia, dot, motion_cross
+from finger_pin.core.trigonometry import sine_cosine
 
 # Columns of the table of bodies.
 ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, BODY_COLUMNS = 0, 9, 12, 13, 16, 22
@@ -50,7 +51,7 @@ def _place(tables: Any, i: int, angle: float, work: Any) -> None:
                 + above[r, 2] * body[TRANSLATION + 2]
             )
     prismatic = tables.kinds[i] == PRISMATIC
-    cosine, sine = (1.0, 0.0) if prismatic else (np.cos(angle), np.sin(angle))
+    sine, cosine = (0.0, 1.0) if prismatic else sine_cosine(angle)
     for r in range(3):
         rotation[r, 0] = cosine * frame[r, 0] + sine * frame[r, 1]
         rotation[r, 1] = cosine * frame[r, 1] - sine * frame[r, 0]
@@ -164,14 +165,14 @@ def mass_matrix(tables: Any, work: Any) -> None:
 
 @compiled
 def factorise_mass(size: int, work: Any) -> None:
-    """Fill work.square[CHOLESKY] with the Cholesky factor of M."""
+    """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted."""
     factor = work.square[CHOLESKY]
     for i in range(size):
         for j in range(i + 1):
             value = work.square[MASS_MATRIX, i, j]
             for k in range(j):
                 value -= factor[i, k] * factor[j, k]
-            factor[i, j] = np.sqrt(value) if i == j else value / factor[j, j]
+            factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
 
 
 @compiled
@@ -182,9 +183,9 @@ def solve_mass(size: int, work: Any, vector: Any) -> None:
         value = vector[i]
         for k in range(i):
             value -= factor[i, k] * vector[k]
-        vector[i] = value / factor[i, i]
+        vector[i] = value * factor[i, i]
     for i in range(size - 1, -1, -1):
         value = vector[i]
         for k in range(i + 1, size):
             value -= factor[k, i] * vector[k]
-        vector[i] = value / factor[i, i]
+        vector[i] = value * factor[i, i]

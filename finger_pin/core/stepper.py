@@ -198,8 +198,9 @@ class Stepper:
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
         tables = build_tables(mechanism)
-        if force is not None and np.any(force):
-            tables.tip_force[:] = force
+        varying = len(control.force.harmonics) > 0
+        if varying or (force is not None and np.any(force)):
+            tables.tip_force[:] = 0.0 if force is None else force
             tables = tables._replace(loaded=True)
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         laws = [table.law for table in mechanism.rows]

@@ -121,6 +121,7 @@ class Work(NamedTuple):
         lever: The pin's link direction, shape (K, 3).
         tip: Positions of the tips, shape (t, 3), m.
         jacobian: Of the tips, shape (t, 3, N).
+        force_rate: Time derivatives of the forces at the tips, shape (t, 3), N/s.
         torque, external, bias, acceleration: Shape (N,).
         command: Inputs, shape (u,).
     """
@@ -145,6 +146,7 @@ class Work(NamedTuple):
     lever: Matrix
     tip: Matrix
     jacobian: Layers
+    force_rate: Matrix
     torque: Vector
     external: Vector
     bias: Vector
@@ -312,6 +314,7 @@ def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
         lever=np.zeros((count, 3)),
         tip=np.zeros((tips, 3)),
         jacobian=np.zeros((tips, 3, width)),
+        force_rate=np.zeros((tips, 3)),
         torque=np.zeros(width),
         external=np.zeros(width),
         bias=np.zeros(width),

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.integrate
-import scipy.linalg
+import scipy
 
 from finger_pin.description.routing import Array
 
@@ -107,6 +106,7 @@ def integrate(
     method: str,
     rtol: float,
     atol: Array,
+    longest: float = np.inf,
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
@@ -119,6 +119,7 @@ def integrate(
         method: ``Radau``, ``BDF`` or ``LSODA``.
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
+        longest: The longest step, s.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
     """
@@ -129,7 +130,15 @@ def integrate(
         # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
         with np.errstate(over="ignore", invalid="ignore"):
             return scipy.integrate.solve_ivp(
-                system, (0.0, end), start, method=method, rtol=rtol, atol=atol, dense_output=True, events=monitor
+                system,
+                (0.0, end),
+                start,
+                method=method,
+                rtol=rtol,
+                atol=atol,
+                max_step=longest,
+                dense_output=True,
+                events=monitor,
             )
 
     reason = ""

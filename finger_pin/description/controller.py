@@ -7,12 +7,15 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.signals import ForceSignal
 from finger_pin.description.validation import (
     Description,
+    Name,
     Numbers,
     check_size,
     choice,
     expand,
+    nearest,
     problem,
     quantity,
     real,
@@ -92,10 +95,19 @@ class SamplingSettings(Description):
 
 
 class ControllerSettings(Description):
-    """The paper's controller (19)-(22), and what is built around it where a table or entry asks for it."""
+    """The paper's controller (19)-(22), and what is built around it where a table or entry asks for it.
 
-    kind: Annotated[Literal["proportional"], choice("proportional")] = quantity(
-        "proportional", unit="1", source="(19)", doc="Which controller."
+    With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
+    columns are ``time`` and actuated tendons, and become samples of ``tensions``.
+    """
+
+    file_keys = ("file",)
+
+    kind: Annotated[Literal["proportional", "tensions"], choice("proportional", "tensions")] = quantity(
+        "proportional", unit="1", source="(19)", doc="Which controller; tensions: open loop."
+    )
+    tensions: dict[Name, ForceSignal] | None = Field(
+        None, description="By actuated tendon; one without a signal is held at its minimum tension."
     )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
@@ -110,6 +122,9 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    spring_compensation: bool = Field(
+        False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
+    )
     tendon_friction_feedforward: TendonFeedforwardSettings | None = Field(None, description="By (9) and (16).")
     joint_friction_compensation: JointCompensationSettings | None = Field(None, description="By (9) and (17).")
     passive_tension_loop: PassiveTensionSettings | None = Field(None, description="Closed loop on f5; sampled.")
@@ -132,11 +147,13 @@ class ControllerSettings(Description):
             self.distribution,
         )
         damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
-        return not self.gravity_compensation and not any(damping) and all(each is None for each in added)
+        plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
+        return plain and not any(damping) and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
     """Raise the error of an entry that does not fit the finger, or another entry."""
+    _check_tensions(settings, finger)
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
     sizes: list[tuple[str, Numbers | None, tuple[tuple[str, ...], str]]] = [
@@ -170,3 +187,37 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
                 raise problem("controller.distribution.maximum_tension", allowed, limits.maximum_tension)
     if settings.passive_tension_loop is not None and not finger.passive_names:
         raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")
+
+
+# What only the controller (19)-(22) has.
+_CLOSED_LOOP = (
+    "gain",
+    "damping",
+    "gravity_compensation",
+    "spring_compensation",
+    "tendon_friction_feedforward",
+    "joint_friction_compensation",
+    "passive_tension_loop",
+    "distribution",
+)
+
+
+def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
+    if settings.kind == "proportional":
+        if settings.tensions is not None:
+            raise problem("controller.tensions", 'are for controller.kind = "tensions"')
+        return
+    for entry in _CLOSED_LOOP:
+        if getattr(settings, entry) != ControllerSettings.model_fields[entry].default:
+            raise problem(f"controller.{entry}", 'has no effect with controller.kind = "tensions"; leave it out')
+    names = finger.actuated_names
+    for name, signal in (settings.tensions or {}).items():
+        entry = f"controller.tensions.{name}"
+        if name in finger.passive_names:
+            raise problem(entry, f"is a passive tendon, which nobody pulls; actuated are {', '.join(names)}")
+        if name not in names:
+            near = nearest(name, names)
+            hint = f"; did you mean {near}?" if near else ""
+            raise problem(entry, f"no such tendon; actuated are {', '.join(names)}{hint}")
+        if signal.lowest < 0.0:
+            raise problem(entry, f"a tendon only pulls: the tension must stay at or above 0 N, not {signal.lowest:g} N")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import re
 import tomllib
@@ -10,17 +9,25 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin
 
 import tomli_w
 
+from finger_pin.description.columns import read_columns
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, nearest, validate
+from finger_pin.description.scenario import AXES, Scenario
+from finger_pin.description.validation import Description, find_field, nearest, validate
 from finger_pin.exceptions import InputError
-from finger_pin.publishing import settle
 
 Table = dict[str, Any]
+# Sections that may name a CSV file, the key that does, and where its columns go.
+_SIGNAL_FILES = (
+    ("reference", "file", "joints"),
+    ("controller", "file", "tensions"),
+    ("environment", "fingertip_force_file", "fingertip_force_signal"),
+)
+# Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
+_KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
 _LARGEST = 10_000_000
 
 
@@ -47,8 +54,8 @@ def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) ->
     overrides = _from_here(overrides or {}, {"finger"})
     table: Table = {"finger": str(name)}
     with _depth_limited("finger"):
-        _apply(overrides, table)
-        return validate(FingerDescription, _resolve_finger(table["finger"], Path()), ("finger",))
+        _override(overrides, table, Path())
+        return validate(FingerDescription, table["finger"], ("finger",))
 
 
 def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -69,12 +76,8 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     with _depth_limited("scenario"):
         table, folder = _read_scenario(str(name), Path())
         table.setdefault("name", _as_name(Path(str(name)).stem))
-        # Another finger replaces the old one before entries on top of either are applied.
-        _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
-        if "finger" not in table:
-            raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
-        table["finger"] = _resolve_finger(table["finger"], folder)
-        _apply(overrides, table)
+        _override(overrides, table, folder)
+        _resolve_signals(table, Path())
         return validate(Scenario, table, ())
 
 
@@ -95,8 +98,6 @@ def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
     """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
     if _is_path(name):
         what, path = f"{kind} file {name}", folder / _expand(name)
-        with contextlib.suppress(OSError, ValueError):
-            settle(path.parent)
         data = _read_bytes(what, path)
     else:
         what, path = f"{kind} {name}", Path(name)
@@ -147,6 +148,7 @@ def _read_scenario(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tupl
     if identity in seen:
         raise InputError("extends", "a scenario cannot start from itself", name)
     folder = path.parent
+    _resolve_signals(table, folder)
     if "extends" not in table:
         return table, folder
     base = table.pop("extends")
@@ -181,12 +183,47 @@ def _resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> A
     return finger
 
 
+def _resolve_signals(table: Table, folder: Path) -> None:
+    """Put the columns of CSV files where a file may say them itself: as samples of signals by name."""
+    for section, key, target in _SIGNAL_FILES:
+        settings = table.get(section)
+        if not isinstance(settings, dict) or key not in settings:
+            continue
+        name = settings.pop(key)
+        entry = f"{section}.{key}"
+        if not isinstance(name, str):
+            raise InputError(entry, "must be the path of a CSV file", name)
+        try:
+            text = _read_bytes(f"{entry} {name}", folder / _expand(name)).decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{entry} {name}", "is not a text file in UTF-8") from None
+        times, *columns = read_columns(f"{entry} {name}", text).items()
+        samples = {name: {"kind": "samples", "times": times[1], "values": values} for name, values in columns}
+        settings[target] = {**_as_table(settings.get(target)), **samples}
+
+
+def _is_other_kind(base: Table, top: Table) -> bool:
+    """Return whether a signal or controller is of another kind than the one that it is put on."""
+    kinds = {base.get("kind"), top["kind"]} if "kind" in top else set()
+    return len(kinds) == 2 and not _KINDS_APART.isdisjoint(kinds)
+
+
 def _merge(base: Table, top: Table) -> Table:
     merged = dict(base)
     for key, value in top.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not _is_other_kind(merged[key], value)
         merged[key] = _merge(merged[key], value) if both else value
     return merged
+
+
+def _override(overrides: Table, table: Table, folder: Path) -> None:
+    """Resolve the finger of a table, and apply overrides: another finger before entries on top of either."""
+    _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
+    if "finger" not in table:
+        raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+    table["finger"] = _resolve_finger(table["finger"], folder)
+    # A kind comes before what belongs to it.
+    _apply(dict(sorted(overrides.items(), key=lambda each: not each[0].endswith(".kind"))), table)
 
 
 def _apply(overrides: Mapping[str, Any], table: Table) -> None:
@@ -194,13 +231,38 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
         *path, last = key.split(".")
         inner = table
         for depth, part in enumerate(path):
+            _refuse_new([*path[:depth], part], inner, table)
             below = inner.setdefault(part, {})
             if isinstance(below, str) and path[: depth + 1] == ["finger"]:
                 below = inner[part] = {"base": below}
             if not isinstance(below, dict):
                 raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
             inner = below
+        if last == "kind" and isinstance(value, str) and _is_other_kind(inner, {"kind": value}):
+            inner.clear()
+        _refuse_new([*path, last], inner, table)
         inner[last] = copy.deepcopy(value)
+
+
+def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
+    """Raise where an override would bring a joint, a tendon or the like into being: only a file does."""
+    *owner, name = path
+    field = find_field(Scenario, owner) if owner else None
+    if field is None or get_origin(field.annotation) is not dict:
+        return
+    finger = _as_table(table.get("finger"))
+    # A signal for a joint, a tendon or an axis that is there may have no entry of its own yet.
+    present: dict[tuple[str, ...], Iterable[str]] = {
+        ("reference", "joints"): _as_table(finger.get("joints")),
+        ("controller", "tensions"): _as_table(finger.get("tendons")),
+        ("environment", "fingertip_force_signal"): AXES,
+        ("simulation", "initial", "position"): _as_table(finger.get("joints")),
+        ("simulation", "initial", "velocity"): _as_table(finger.get("joints")),
+    }
+    names = present.get(tuple(owner), siblings)
+    if name not in names:
+        allowed = f"no such {owner[-1].removesuffix('s')}; there are {', '.join(names) or 'none'}"
+        raise InputError(".".join(path), f"{allowed}{_hint(name, names)}")
 
 
 def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:

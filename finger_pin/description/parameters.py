@@ -38,6 +38,9 @@ class Link(Description):
     twist: Annotated[float, real(-math.pi, math.pi, hint=IN_RADIANS)] = quantity(
         0.0, unit="rad", source="Table I", doc="alpha, rotation about x from this joint's axis to the next."
     )
+    offset: Annotated[float, real(-2.0, 2.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="Table I", doc="d, distance along this joint's axis at which the link runs along x."
+    )
     section: Annotated[Literal["round", "square"], choice("round", "square")] = quantity(
         "round", unit="1", source="design", doc="Cross-section: a cylinder or a square box."
     )
@@ -85,12 +88,23 @@ class Link(Description):
         return self.centre_of_mass
 
 
+class Spring(Description):
+    """A torsion spring between a joint's two sides."""
+
+    stiffness: Annotated[float, real(0.0, 1e7)] = quantity(..., unit="N m/rad", source="design", doc="k.")
+    rest: Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)] = quantity(
+        0.0, unit="rad", source="design", doc="theta_0, where it is relaxed; it may lie outside the range."
+    )
+    damping: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="N m s/rad", source="design", doc="c.")
+
+
 class Joint(Description):
     """A joint, its range (2) and, for a finger that is built here, the link that it carries."""
 
     range: Annotated[tuple[float, float], vector(2, -MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] = quantity(
         ..., unit="rad", source="(2)", doc="Lower and upper limit that the stroke limiter guards."
     )
+    spring: Spring | None = Field(None, description="A return spring; none in the paper.")
     link: Link | None = Field(None, description="The link that this joint moves; none on a foreign model.")
 
     @field_validator("range")

@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
-import scipy.optimize
+import scipy
 from numpy.typing import NDArray
 
 from finger_pin.description.parameters import FingerDescription
@@ -144,7 +143,8 @@ class ForceClosure:
     def of(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
         """Find the internal tensions of a coupling matrix H_c, shape (t, n)."""
         # The radii differ by less than a few orders of magnitude, so a relative rank tolerance is safe.
-        null_space = scipy.linalg.null_space(coupling.T, rcond=1e-10)
+        _, sizes, directions = np.linalg.svd(coupling.T)
+        null_space = directions[np.count_nonzero(sizes > 1e-10 * sizes[0]) :].T
         count = null_space.shape[1]
         tension = np.zeros(len(tendons))
         if count == 1:

@@ -102,6 +102,18 @@ def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str 
     return BeforeValidator(validate)
 
 
+def series(low: float = -math.inf, high: float = math.inf, hint: str = "") -> BeforeValidator:
+    """Return a validator for a list of finite numbers in [low, high]."""
+    check = _checker(low, high, False, hint)
+
+    def validate(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple):
+            raise problem("", "must be a list of numbers", value)
+        return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
+
+    return BeforeValidator(validate)
+
+
 def choice(*allowed: str) -> BeforeValidator:
     """Return a validator for one of a few names; a near miss is told the nearest one."""
 
@@ -216,8 +228,9 @@ def _fields(model: type[BaseModel], location: Iterable[str]) -> list[str]:
 def _inner(annotation: Any) -> Any:
     """Return the model behind an annotation; for a table of models, a dictionary that says so."""
     arguments = get_args(annotation)
-    if getattr(annotation, "__origin__", None) is dict:
-        return {"values": _inner(arguments[1])}
+    tables = [each for each in (annotation, *arguments) if getattr(each, "__origin__", None) is dict]
+    if tables:
+        return {"values": _inner(get_args(tables[0])[1])}
     models = [each for each in (annotation, *arguments) if isinstance(each, type) and issubclass(each, BaseModel)]
     return models[0] if models else annotation
 

@@ -103,6 +103,12 @@ def micro_loss(rate: Any, velocity: Any, lag: Any) -> Any:
     return lag * rate * velocity
 
 
+def passive_micro_damping(viscous: Any, kinetic: Any, static: Any) -> Any:
+    """Return the most sigma_1 with which friction never drives motion, b M^d / (M^c - M^d); see the module."""
+    excess = static - kinetic
+    return np.where(excess > 0.0, viscous * kinetic / np.where(excess > 0.0, excess, 1.0), np.inf)
+
+
 def steady_force(velocity: Any, normal: Any, coefficient: Any, viscous: Any) -> Any:
     """Return the friction of steady sliding, F^n M(v) sign(v) + b v: (9) with F^s' = 0, the curves of Fig. 3."""
     return normal * coefficient * np.sign(velocity) + viscous * velocity

@@ -27,7 +27,7 @@ from finger_pin.laws.law import Law, Row
 
 
 def capstan_coefficient(surface: Any, curvature: Any) -> Any:
-    """Return mu^d = tanh(mu_e phi / 2), equation (16).
+    """Return mu^d = (1 - exp(-mu_e phi)) / (1 + exp(-mu_e phi)) = tanh(mu_e phi / 2), equation (16).
 
     Steady sliding then loses tension by the capstan law, f / f^a = exp(-mu_e phi) when pulling.
 
@@ -35,7 +35,8 @@ def capstan_coefficient(surface: Any, curvature: Any) -> Any:
         surface: mu_e, Coulomb coefficient between tendon and canal.
         curvature: phi, total curvature of the path, rad.
     """
-    return np.tanh(0.5 * surface * curvature)
+    left = np.exp(-surface * curvature)
+    return (1.0 - left) / (1.0 + left)
 
 
 def capstan_slope(surface: Any, coefficient: Any) -> Any:

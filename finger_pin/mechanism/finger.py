@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.joint_friction import JointFriction
+from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
@@ -19,6 +22,8 @@ from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.urdf import build_rigid_body
+
+_TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +82,7 @@ class FingerSignals:
         joints: Joint reaction and friction.
         limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
         limiter_torque: tau^r, shape (..., n), N m.
+        spring_torque: tau^k of the joints' springs, shape (..., n), N m.
         tendon_torque: H_c2^T f, shape (..., n), N m, (11).
         external_torque: J^T F, shape (..., n), N m, (6).
         acceleration: theta'', shape (..., n), rad/s2, (18).
@@ -91,6 +97,7 @@ class FingerSignals:
     joints: JointForces
     limiter_depth: Array
     limiter_torque: Array
+    spring_torque: Array
     tendon_torque: Array
     external_torque: Array
     acceleration: Array
@@ -108,17 +115,21 @@ class Finger:
         tendons: The tendon layer.
         joint_friction: The friction of the joints.
         stroke_limiter: The stroke limiters.
+        springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
     """
 
     def __init__(
-        self, description: FingerDescription, rigid_body: RigidBody | None = None, rows: Sequence[Rows] = ()
+        self,
+        description: FingerDescription | str | Path,
+        rigid_body: RigidBody | None = None,
+        rows: Sequence[Rows] = (),
     ) -> None:
         """Build a finger.
 
         Args:
-            description: The finger.
+            description: The finger, or what `load_finger` takes: the name of one, or the path of a file.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
@@ -126,6 +137,8 @@ class Finger:
         Raises:
             InputError: If the joints of the two differ, or one has several coordinates.
         """
+        if isinstance(description, str | Path):
+            description = load_finger(description)
         self.description = description
         self.rigid_body = rigid_body or build_rigid_body(description)
         if len(self.rigid_body.joints) != len(description.joints):
@@ -137,6 +150,7 @@ class Finger:
         self.routing = self.tendons.routing
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
+        self.springs = JointSprings.from_description(description)
         self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows))
         joints, passive = self.routing.joints, self.routing.passive
         width = len(joints) + passive
@@ -146,11 +160,18 @@ class Finger:
                 *self.tendons.rows(),
                 self.joint_friction.rows(joints, self.routing.actuated, width),
                 self.stroke_limiter.rows(joints, width),
+                self.springs.rows(joints, width),
                 *rows,
             ],
             self.routing.passive_names,
             self.tendons.mass,
         )
+
+    def __repr__(self) -> str:
+        """Return name, joints and tendons."""
+        described = self.description
+        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
+        return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
 
     @classmethod
     def from_model(
@@ -204,12 +225,18 @@ class Finger:
         """H_c2, shape (s, n), m, (10)."""
         return self.routing.strand_coupling
 
-    def rest_state(self, position: Array) -> Array:
-        """Return the packed state at rest at theta, shape (n,): stiction zero, passive tendons in the middle."""
+    def rest_state(self, position: Array, velocity: Array | None = None) -> Array:
+        """Return a packed state with relaxed bristles and the masses of passive tendons in the middle, taut.
+
+        Args:
+            position: theta, shape (n,), rad.
+            velocity: theta', shape (n,), rad/s, with which the masses go; at rest by default.
+        """
         x = np.zeros(self.layout.size)
-        state = self.layout.unpack(x)
+        state, middle = self.layout.unpack(x), self.tendons.rest_position
         state.position[:] = position
-        state.passive_position[:] = self.tendons.rest_position(state.position)
+        state.velocity[:] = 0.0 if velocity is None else velocity
+        state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         return x
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
@@ -225,10 +252,7 @@ class Finger:
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         joints = len(self.routing.joints)
-        halves, driven, passive, pins, limiter = (
-            found.rows[name]
-            for name in ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter")
-        )
+        halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
             return np.concatenate([of(driven), of(passive)], axis=-1)
@@ -256,12 +280,17 @@ class Finger:
             ),
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
+            spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
             tendon_torque=(driven.force @ driven.rows.arm + halves.force @ halves.rows.arm)[..., :joints],
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             rows=found.rows,
         )
+
+    def static_torque(self, position: Array) -> Array:
+        """Return what tendons have to exert at rest at theta, shape (n,): G and the springs' torque, N m."""
+        return self.rigid_body.gravity_torque(position) + self.springs.torque(position, np.zeros_like(position))
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n)."""

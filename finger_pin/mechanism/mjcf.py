@@ -1,8 +1,8 @@
 """MJCF of a finger, for MuJoCo: what of the model MuJoCo can express, as text. MuJoCo itself is not needed here.
 
-Exported are the rigid body, the routing, the passive tendons with their lumped mass, viscous friction, gravity and the
-shapes. MuJoCo has no counterpart of the stiction and Coulomb parts of law (9), of the stroke limiters (2) and of the
-cut at zero of a delivered tension (12); they are left out, and the file says so at its head.
+Exported are the rigid body, the routing, the passive tendons with their lumped mass, the springs of joints, viscous
+friction, gravity and the shapes. MuJoCo has no counterpart of the stiction and Coulomb parts of law (9), of the stroke
+limiters (2) and of the cut at zero of a delivered tension (12); they are left out, and the file says so at its head.
 """
 
 from __future__ import annotations
@@ -135,22 +135,26 @@ def _add_links(world: ET.Element, description: FingerDescription, links: dict[st
     body = ET.SubElement(world, "body", name=BASE_FRAME)
     if shapes:
         _add_shapes(body, palm_shapes(description, first, links[first]))
-    length, twist = 0.0, 0.0
+    place, twist = (0.0, 0.0, 0.0), 0.0
     for index, (name, link) in enumerate(links.items()):
-        place = {"name": f"{name}_link", "pos": _numbers(length, 0, 0), "euler": _numbers(twist, 0, 0)}
-        body = ET.SubElement(body, "body", place)
+        frame = {"name": f"{name}_link", "pos": _numbers(*place), "euler": _numbers(twist, 0, 0)}
+        body = ET.SubElement(body, "body", frame)
         axial, transverse = link.inertia
-        inertia = {"pos": _numbers(link.mass_centre, 0, 0), "mass": _numbers(link.mass)}
+        inertia = {"pos": _numbers(link.mass_centre, 0, link.offset), "mass": _numbers(link.mass)}
         ET.SubElement(body, "inertial", {**inertia, "diaginertia": _numbers(axial, transverse, transverse)})
         bounds = {"range": _numbers(*description.joints[name].range), "limited": "false"}
         hinge = {"name": name, "type": "hinge", "axis": _numbers(0, 0, 1), **bounds}
-        ET.SubElement(body, "joint", {**hinge, "damping": _numbers(damping[index])})
+        spring = description.joints[name].spring
+        if spring is not None:
+            hinge |= {"stiffness": _numbers(spring.stiffness), "springref": _numbers(spring.rest)}
+        drag = damping[index] + (spring.damping if spring else 0.0)
+        ET.SubElement(body, "joint", {**hinge, "damping": _numbers(drag)})
         if shapes:
             _add_shapes(body, drawn[name])
-        length, twist = link.length, link.twist
+        place, twist = (link.length, 0.0, link.offset), link.twist
     if shapes:
-        _add_shapes(body, pad_shapes(last), length)
-    ET.SubElement(body, "site", name=TIP_FRAME, pos=_numbers(length, 0, 0), euler=_numbers(twist, 0, 0))
+        _add_shapes(body, pad_shapes(last), place)
+    ET.SubElement(body, "site", name=TIP_FRAME, pos=_numbers(*place), euler=_numbers(twist, 0, 0))
 
 
 def _add_masses(world: ET.Element, description: FingerDescription, tendons: Tendons) -> None:
@@ -207,16 +211,16 @@ def _add_tendon(
             ET.SubElement(tendon, "joint", joint=coordinate, coef=_numbers(factor))
 
 
-def _add_shapes(body: ET.Element, shapes: Iterable[Shape], along: float = 0.0) -> None:
-    """Add shapes, moved along x, m; those that collide meet objects of MuJoCo's default type, but not each other."""
+def _add_shapes(body: ET.Element, shapes: Iterable[Shape], place: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    """Add shapes, moved to a place, m; those that collide meet objects of MuJoCo's default type, but not each other."""
     for shape in shapes:
-        x, y, z = shape.position
+        centre = [at + by for at, by in zip(shape.position, place, strict=True)]
         size = [0.5 * side for side in shape.size]
         if shape.kind != "box":
             size[0] = shape.size[0]
-        place = {"pos": _numbers(x + along, y, z), "euler": _numbers(*shape.rotation), "material": shape.material}
+        frame = {"pos": _numbers(*centre), "euler": _numbers(*shape.rotation), "material": shape.material}
         contact = {"mass": "0", "contype": "0", "conaffinity": str(int(shape.collides))}
-        ET.SubElement(body, "geom", {"type": shape.kind, "size": _numbers(*size), **place, **contact})
+        ET.SubElement(body, "geom", {"type": shape.kind, "size": _numbers(*size), **frame, **contact})
 
 
 def _numbers(*values: float) -> str:

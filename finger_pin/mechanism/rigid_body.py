@@ -148,7 +148,9 @@ class RigidBody:
     def jacobian(self, q: Array) -> Array:
         """Return J = dp/dtheta of (6), shape (3, n)."""
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        return np.array(pin.computeFrameJacobian(self.model, self._data, q, self.tip_frame, reference)[:3])
+        found = pin.computeFrameJacobian(self.model, self._data, q, self.tip_frame, reference)
+        # Of a single joint Pinocchio returns a vector.
+        return np.array(found).reshape(6, -1)[:3]
 
     def mass_matrix(self, q: Array) -> Array:
         """Return M(theta) by the composite rigid body algorithm, shape (n, n)."""

@@ -102,7 +102,7 @@ def _pad_radius(link: Link) -> float:
 
 
 def _phalanx(link: Link, start: float, end: float) -> Shape:
-    centre, length = (0.5 * (start + end), 0.0, 0.0), end - start
+    centre, length = (0.5 * (start + end), 0.0, link.offset), end - start
     if link.section == "square":
         return Shape("box", (length, link.width, link.width), centre, collides=True)
     return Shape("cylinder", (0.5 * link.width, length), centre, _ALONG_X, collides=True)

@@ -28,7 +28,8 @@ def to_urdf(description: FingerDescription) -> str:
     """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
 
     Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
-    and the link runs along x. Numbers are written so that reading them gives the same floats.
+    and the link runs along x, its ``offset`` along the axis away. Numbers are written so that reading them gives the
+    same floats.
 
     Raises:
         InputError: If a joint has no link, or a name that the URDF needs itself.
@@ -40,19 +41,19 @@ def to_urdf(description: FingerDescription) -> str:
     for material, colour in MATERIALS.items():
         ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=_numbers(*colour))
     _add_link(robot, BASE_FRAME, palm_shapes(description, first, links[first]))
-    parent, length, twist = BASE_FRAME, 0.0, 0.0
+    parent, place, twist = BASE_FRAME, (0.0, 0.0, 0.0), 0.0
     for name, link in links.items():
         child = f"{name}_link"
         _add_link(robot, child, shapes[name], inertia_of=link)
-        joint = _add_joint(robot, name, "revolute", parent, child, length, twist)
+        joint = _add_joint(robot, name, "revolute", parent, child, place, twist)
         ET.SubElement(joint, "axis", xyz=_numbers(0, 0, 1))
         lower, upper = description.joints[name].range
         limits = {"lower": lower, "upper": upper, "effort": effort_limit(description, name)}
         limits["velocity"] = VELOCITY_LIMIT
         ET.SubElement(joint, "limit", {key: _numbers(value) for key, value in limits.items()})
-        parent, length, twist = child, link.length, link.twist
+        parent, place, twist = child, (link.length, 0.0, link.offset), link.twist
     _add_link(robot, TIP_FRAME, pad_shapes(last))
-    _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, length, twist)
+    _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, place, twist)
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
 
@@ -87,7 +88,9 @@ def _add_link(robot: ET.Element, name: str, shapes: Iterable[Shape], inertia_of:
     if inertia_of is not None:
         axial, transverse = inertia_of.inertia
         inertial = ET.SubElement(element, "inertial")
-        ET.SubElement(inertial, "origin", xyz=_numbers(inertia_of.mass_centre, 0, 0), rpy=_numbers(0, 0, 0))
+        ET.SubElement(
+            inertial, "origin", xyz=_numbers(inertia_of.mass_centre, 0, inertia_of.offset), rpy=_numbers(0, 0, 0)
+        )
         ET.SubElement(inertial, "mass", value=_numbers(inertia_of.mass))
         moments = {"ixx": axial, "ixy": 0.0, "ixz": 0.0, "iyy": transverse, "iyz": 0.0, "izz": transverse}
         ET.SubElement(inertial, "inertia", {key: _numbers(value) for key, value in moments.items()})
@@ -112,12 +115,12 @@ def _add_shape(link: ET.Element, role: str, shape: Shape) -> ET.Element:
 
 
 def _add_joint(
-    robot: ET.Element, name: str, kind: str, parent: str, child: str, length: float, twist: float
+    robot: ET.Element, name: str, kind: str, parent: str, child: str, place: tuple[float, float, float], twist: float
 ) -> ET.Element:
     joint = ET.SubElement(robot, "joint", name=name, type=kind)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
-    ET.SubElement(joint, "origin", xyz=_numbers(length, 0, 0), rpy=_numbers(twist, 0, 0))
+    ET.SubElement(joint, "origin", xyz=_numbers(*place), rpy=_numbers(twist, 0, 0))
     return joint
 
 

@@ -9,15 +9,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
-from finger_pin.control.closed_loop import Reference
+from finger_pin.control.closed_loop import Samples
 from finger_pin.control.proportional import Controller
+from finger_pin.control.reference import Reference
 from finger_pin.core.textbook import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
-from finger_pin.exceptions import InputError, SelfLockingWarning
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.simulation.simulate import simulate
+from finger_pin.simulation.starting import own_parts
 
 FACTOR, LIMIT = 100.0, 1e-3
 
@@ -115,8 +118,10 @@ def check_convergence(
     *,
     factor: float = FACTOR,
     limit: float = LIMIT,
-    controller: Controller | None = None,
-    reference: Reference | None = None,
+    controller: Controller | Samples | None = None,
+    reference: Reference | Samples | None = None,
+    fingertip_force: Samples | None = None,
+    initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,
@@ -130,12 +135,15 @@ def check_convergence(
         limit: Joints that differ by more than this have parted, rad.
         controller: As for `simulate`.
         reference: As for `simulate`.
+        fingertip_force: As for `simulate`.
+        initial: As for `simulate`.
         control_period: As for `simulate`.
         progress: Called with the simulated time of each run, s.
         stop: Asked now and then; true ends the simulation that is running.
 
     Raises:
-        InputError: If the tolerances cannot be tightened, or the result is of another scenario.
+        InputError: If the tolerances cannot be tightened, or the result is of another scenario, or had a controller,
+            reference, force or initial state of its own that is not given here.
         IntegrationError: If an integrator cannot go on.
         Interrupted: If ``stop`` returned true.
     """
@@ -144,12 +152,17 @@ def check_convergence(
         raise InputError("limit", "must be above 0 and finite", limit)
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
+    own = own_parts(controller, reference, fingertip_force, initial)
+    if result is not None and result.attrs.get("own", "") != own:
+        raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")
 
     def run(each: Scenario) -> xr.Dataset:
         return simulate(
             each,
             controller=controller,
             reference=reference,
+            fingertip_force=fingertip_force,
+            initial=initial,
             control_period=control_period,
             progress=progress,
             stop=stop,
@@ -158,7 +171,7 @@ def check_convergence(
     first = run(scenario) if result is None else result
     with warnings.catch_warnings():
         # The first run has said it.
-        warnings.simplefilter("ignore", SelfLockingWarning)
+        warnings.simplefilter("ignore", ScenarioWarning)
         second = run(tighter)
     count = min(first.sizes["time"], second.sizes["time"])
     angles = [each["joint_position"].transpose("time", "joint").values[:count] for each in (first, second)]

@@ -15,6 +15,7 @@ from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
 from finger_pin.laws.limiter import limiter_energy, limiter_loss
 from finger_pin.laws.passive_tendon import half_energy
+from finger_pin.laws.spring import spring_energy, spring_loss
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Kinematics, Motion
 
@@ -27,6 +28,7 @@ class Energies:
     gravity: Array
     passive_tendon: Array
     limiter: Array
+    joint_springs: Array
     tendon_bristles: Array
     joint_bristles: Array
 
@@ -53,6 +55,7 @@ class Powers:
     joint_viscous: Array
     joint_micro_damping: Array
     limiter: Array
+    joint_springs: Array
     slack: Array
 
     @property
@@ -70,6 +73,7 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
         gravity=motion.potential_energy,
         passive_tendon=sum((np.sum(half_energy(s, tendons.half_stiffness), axis=-1) for s in halves), np.zeros(())),
         limiter=np.sum(limiter_energy(signals.limiter_depth, finger.stroke_limiter.stiffness), axis=-1),
+        joint_springs=np.sum(spring_energy(state.position, finger.springs.stiffness, finger.springs.rest), axis=-1),
         tendon_bristles=np.sum(friction.bristle_energy(state.tendon_stiction, tendons.stiffness), axis=-1),
         joint_bristles=np.sum(friction.bristle_energy(state.joint_stiction, joints.stiffness), axis=-1),
     )
@@ -98,6 +102,7 @@ def powers(finger: Finger, signals: FingerSignals) -> Powers:
         limiter=np.sum(
             limiter_loss(signals.limiter_torque, signals.limiter_depth, state.velocity, limiter.stiffness), axis=-1
         ),
+        joint_springs=np.sum(spring_loss(state.velocity, finger.springs.damping), axis=-1),
         # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
         slack=np.sum(np.where(delivered > 0.0, 0.0, (signals.command - loss) * pulled), axis=-1),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
@@ -20,7 +19,6 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
 from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.publishing import settle
 from finger_pin.simulation.account import Account, account
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
@@ -30,6 +28,7 @@ _STORED = {
     "gravity": "potential energy of gravity",
     "passive_tendon": "elastic energy of the passive tendons",
     "limiter": "elastic energy of the stroke limiters",
+    "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
 }
@@ -43,6 +42,7 @@ _EXCHANGED = {
     "joint_viscous": "lost in the joints' viscous friction",
     "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
+    "joint_springs": "lost in the joints' springs",
     "slack": "booked where a tension is cut at zero",
 }
 
@@ -76,19 +76,32 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a result to a netCDF4 file, whole or not at all."""
+    """Write a result to a netCDF4 file, whole or not at all.
+
+    Raises:
+        OSError: If it cannot be written, such as on a full disk.
+    """
     with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+        try:
+            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+        except RuntimeError as error:
+            # The netCDF library does not say why; as many plain bytes do where the disk is full.
+            with open(temporary, "ab") as file:
+                file.write(bytes(dataset.nbytes + 2**20))
+            raise OSError(f"{Path(path).name}: {error}") from error
 
 
 def load_result(path: str | Path) -> xr.Dataset:
     """Read a result that `save` wrote into memory.
 
-    In a folder of results whose run was killed while it moved them into place, the moves are finished before.
+    Args:
+        path: A netCDF file, or a folder of results, whose ``trajectory.nc`` is read.
+
+    Raises:
+        OSError: If there is no such file, or it cannot be read.
     """
-    with contextlib.suppress(OSError):
-        settle(Path(path).parent)
-    return xr.load_dataset(path, engine="netcdf4")
+    file = Path(path, "trajectory.nc") if Path(path).is_dir() else path
+    return xr.load_dataset(file, engine="netcdf4")
 
 
 def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:
@@ -97,6 +110,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     halves = tendons.strands[..., actuated:]
     tension = loop.finger.routing.tendon_tension(tendons.strands)
     error = signals.reference.position - state.position
+    force = np.broadcast_to(finger.fingertip_force, motion.tip.shape)
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
         "joint_velocity": _entry(_JOINT, state.velocity, "rad/s", "joint velocity"),
@@ -118,6 +132,8 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "joint_stiction": _entry(_JOINT, state.joint_stiction, "N m", "joint stiction torque", "9a"),
         "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
+        "fingertip_force": _entry(("time", "axis"), force, "N", "force on the fingertip", "6"),
+        "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
     if signals.control.shortfall is not None:

@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Reference
-from finger_pin.control.compiled import build_control
+from finger_pin.analysis.passivity import micro_damping_advice
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
+from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.proportional import Controller, ProportionalController
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.own import OwnController
+from finger_pin.control.proportional import Controller
+from finger_pin.control.reference import Reference
 from finger_pin.control.sampling import SampledController
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.inputs import Control, held_control
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
+from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
-from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.simulation.recording import record
+from finger_pin.simulation.starting import own_parts, packed_state
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -38,27 +44,37 @@ _CHUNK, _CHUNK_OBSERVED = 256, 4
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
-    controller: Controller | None = None,
-    reference: Reference | None = None,
+    controller: Controller | Samples | None = None,
+    reference: Reference | Samples | None = None,
+    fingertip_force: Samples | None = None,
+    initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
 ) -> xr.Dataset:
-    """Simulate a scenario from rest on its reference.
+    """Simulate a scenario, from rest on its reference unless something else is asked for.
 
-    The compiled methods run without Python inside as long as controller and reference are the paper's. A controller or
-    reference of one's own is Python, and so is what a scenario adds to the paper's controller: with a
+    The compiled methods run without Python inside as long as the controller is the paper's, references are sinusoids,
+    the fingertip force is constant and joints have no springs. The rest is Python, a controller of one's own as well as
+    what a scenario adds to the paper's: with a
     ``control_period``, or ``controller.sampling`` in the scenario, it is sampled and held, and the compiled core runs
     between the samples; without one it acts continuously, which calls it at every evaluation of scipy's Radau method:
     that takes seconds for a simulated second.
 
     Args:
-        scenario: What to simulate, from `load_scenario`.
-        controller: Replaces the scenario's controller.
-        reference: Replaces the scenario's reference.
+        scenario: What to simulate, from `load_scenario`, or what that takes: the name of one, or the path of a file.
+        controller: Replaces the scenario's controller: an object with ``command``, asked for one time at a time, or
+            tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N.
+        reference: Replaces the scenario's reference: an object with ``at``, asked for one time at a time, or times,
+            shape (m,), s, and angles, shape (m, k), rad, of the k joints that no passive tendon drives; the others
+            follow (20). Between samples the motion is a monotone cubic.
+        fingertip_force: Replaces what acts on the fingertip: times, shape (m,), s, and forces, shape (m, 3), N, base
+            frame.
+        initial: The packed state to start from, shape (size,), or a result to continue from its last saved state. Time
+            begins at zero again; ``simulation.start_time`` says what the clock of references shows then.
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
             without either it is continuous. Compiled methods only.
         progress: Called with the simulated time, s, now and then.
@@ -69,7 +85,8 @@ def simulate(
         Every signal of the model at the scenario's sample rate, and the energy account.
 
     Raises:
-        InputError: If the control period is not positive, the method cannot sample, or the controller must be sampled.
+        InputError: If the control period is not positive, the method cannot sample, the controller must be sampled, or
+            what is given as controller, reference, force or initial state has a wrong size or is not finite.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
 
@@ -77,21 +94,35 @@ def simulate(
         SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
             the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
             there is neither.
+        MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
+    if isinstance(scenario, str | Path):
+        scenario = load_scenario(scenario)
     method = scenario.simulation.method
-    loop = ClosedLoop.from_scenario(scenario, controller, reference)
+    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force)
+    if initial is not None:
+        loop = replace(loop, start=packed_state(initial, loop.finger))
+    own = own_parts(controller, reference, fingertip_force, initial)
     # The margin is that of the paper's controller on the scenario's reference.
-    own = controller is None and reference is None
-    margin = warn_of_self_locking(scenario) if own else None
+    judged = controller is None and reference is None and scenario.controller.kind == "proportional"
+    judged = judged and loop.finger.routing.force_closure().holds
+    margin = warn_of_self_locking(scenario) if judged else None
+    driving = micro_damping_advice(scenario.finger)
+    if driving:
+        warnings.warn(driving, MicroDampingWarning, stacklevel=2)
     sampling = _sampling(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
-    if sampling is None and method in TABLEAUS and _control(loop) is None:
+    if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
         loop = replace(loop, dynamics=CompiledFinger(loop.finger))
+    answers = loop.controller
     if sampling is not None:
         loop = replace(loop, controller=SampledController(loop, sampling))
+    elif own:
+        # What is wrong with an answer of one's own is told before anything is computed.
+        loop.evaluate(0.0, loop.initial_state())
 
     def watch(time: float, x: Array) -> None:
         if progress is not None:
@@ -107,8 +138,14 @@ def simulate(
         result = record(scenario, loop, trajectory, method)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
+    if driving:
+        result.attrs["micro_damping"] = driving
+    if own:
+        result.attrs["own"] = own
     result, excess = _finite_part(result)
     if trajectory.failure:
+        if isinstance(answers, OwnController) and answers.problem_time >= reached:
+            raise IntegrationError(reached, answers.problem, "another controller", result)
         tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT
         raise IntegrationError(reached, trajectory.failure, _ADVICE_TIGHT if tight else _ADVICE, result)
     if excess:
@@ -145,35 +182,33 @@ def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | No
     return (settings or SamplingSettings()).model_copy(update={"period": float(period)})
 
 
-def _control(loop: ClosedLoop) -> Control | None:
-    """Return the loop's controller and reference as arrays, or None if they are Python."""
-    controller, reference = loop.controller, loop.reference
-    if isinstance(controller, ProportionalController) and isinstance(reference, HarmonicReference):
-        return build_control(controller, reference, loop.finger.routing)
-    return None
-
-
 def _integrate(
     scenario: Scenario, loop: ClosedLoop, method: str, watch: Watch, chunk: int, stop: Stop | None
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
-        mechanism = loop.finger.mechanism
-        control = _control(loop) or held_control(mechanism.channels, mechanism.coordinates)
-        tableau = TABLEAUS[method]()
+        control, tableau = compiled_control(loop) or sampled_control(loop), TABLEAUS[method]()
         return integrate_compiled(
-            Stepper(mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force),
+            Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force),
             settings.duration,
             loop.finger.layout.names,
             held=controller if isinstance(controller, SampledController) else None,
+            knots=loop.knots(),
             watch=watch,
             chunk=chunk,
             stop=stop,
         )
     if method == "CVODE":
         return integrate_cvode(
-            loop.rhs, start, settings.duration, rtol=settings.rtol, atol=atol, watch=watch, stop=stop
+            loop.rhs,
+            start,
+            settings.duration,
+            rtol=settings.rtol,
+            atol=atol,
+            longest=loop.longest_step(),
+            watch=watch,
+            stop=stop,
         )
     return integrate(
         loop.rhs,
@@ -182,6 +217,7 @@ def _integrate(
         method=method,
         rtol=settings.rtol,
         atol=atol,
+        longest=loop.longest_step(),
         watch=watch,
         stop=stop,
     )

@@ -1,14 +1,21 @@
-"""Studies: many runs of a scenario, measured and kept; sweeps over its numbers, and searches for better ones."""
+"""Studies: many runs of a scenario, measured and kept; sweeps over its entries, and searches for better ones.
+
+From what is asked to what comes out: ``keys`` of a scenario; ``designs`` (and how a command line does the ``spelling``)
+or the ``problem`` of a ``search``; ``metrics``; ``runs``, and the ``fingerprint`` that they are found by; ``processes``
+or a ``cluster`` that do them; the ``folder`` that keeps them; the ``dataset`` of all. ``sweeping`` and ``optimising``
+put these together. ``many`` returns whole runs instead of metrics. ``comparison`` and ``conclusions`` are studies of
+their own.
+"""
 
 from __future__ import annotations
 
 from finger_pin.studies.cluster import ClusterError, DaskCluster
 from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
-from finger_pin.studies.local import LocalProcesses
 from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
+from finger_pin.studies.problem import Variable, radii
+from finger_pin.studies.processes import LocalProcesses
 from finger_pin.studies.sweeping import sweep
-from finger_pin.studies.variables import Variable, radii
 
 __all__ = [
     "DEFAULT_CONSTRAINTS",

@@ -1,7 +1,7 @@
 """Tasks on a Dask cluster.
 
-The workers need this package, of this version. The process that asks records every run as it finishes; a worker that
-dies costs the runs that it was at, which Dask gives to others.
+The workers need this package, of this very source. The process that asks records every run as it finishes; a worker
+that dies costs the runs that it was at, which Dask gives to others.
 """
 
 from __future__ import annotations

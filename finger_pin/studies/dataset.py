@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,14 @@ import xarray as xr
 
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import StudyError
 from finger_pin.studies.designs import SAMPLE, Design
+from finger_pin.studies.fingerprint import versions
 from finger_pin.studies.keys import describe
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.runs import Record
+from finger_pin.studies.runs import FAILED, Record
 
 MISSING = "missing"
-_PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 
 
 def assemble(
@@ -35,10 +35,12 @@ def assemble(
         The metrics, ``status`` (done, failed or missing) and ``reason``, over the dimensions of the design.
     """
     dims = design.dims
-    coordinates = {
-        key: ((SAMPLE if dims == (SAMPLE,) else key,), np.array(values), describe(key))
-        for key, values in design.values.items()
-    }
+    coordinates = {}
+    for key, values in design.values.items():
+        attributes = describe(key)
+        if not isinstance(values[0], float):
+            del attributes["units"]
+        coordinates[key] = ((SAMPLE if dims == (SAMPLE,) else key,), np.array(values), attributes)
     shape = (len(design.points()),) if dims == (SAMPLE,) else tuple(map(len, design.values.values()))
     rows = list(records)
 
@@ -57,10 +59,21 @@ def assemble(
     reason = over(["" if row is None else row.reason for row in rows])
     variables["status"] = (dims, status, {"long_name": "what came of the run: done, failed or missing"})
     variables["reason"] = (dims, reason, {"long_name": "why the run failed"})
-    return xr.Dataset(variables, coords=coordinates, attrs=attributes(scenario))
+    return xr.Dataset(variables, coords=coordinates, attrs=origin(scenario))
 
 
-def attributes(scenario: Scenario) -> Mapping[str, str]:
+def checked(result: xr.Dataset) -> xr.Dataset:
+    """Return a result, which is none if every run failed.
+
+    Raises:
+        StudyError: If so.
+    """
+    if (result["status"] == FAILED).all():
+        raise StudyError(str(result["reason"].values.flat[0]), result)
+    return result
+
+
+def origin(scenario: Scenario) -> Mapping[str, str]:
     """Return what a Dataset says about its origin: the scenario and the versions of packages."""
-    versions = {f"version_{name.replace('-', '_')}": metadata.version(name) for name in _PACKAGES}
-    return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **versions}
+    used = {f"version_{name.replace('-', '_')}": version for name, version in versions().items()}
+    return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **used}

@@ -16,19 +16,18 @@ import numpy as np
 from scipy.stats import qmc
 
 from finger_pin.exceptions import InputError
-from finger_pin.studies.keys import split
+from finger_pin.studies.keys import Point, Value, split
 
 SAMPLE = "sample"
 #: More points than this are a mistake.
 MOST_POINTS = 1_000_000
-Point = dict[str, float]
 
 
 class Design(Protocol):
     """Which points a sweep runs."""
 
     @property
-    def values(self) -> Mapping[str, tuple[float, ...]]:
+    def values(self) -> Mapping[str, tuple[Value, ...]]:
         """The values of every key: along its own dimension, or of every sample."""
 
     @property
@@ -50,9 +49,9 @@ class Grid:
         values: By key.
     """
 
-    values: Mapping[str, tuple[float, ...]]
+    values: Mapping[str, tuple[Value, ...]]
 
-    def __init__(self, values: Mapping[str, Sequence[float]]) -> None:
+    def __init__(self, values: Mapping[str, Sequence[Value]]) -> None:
         """Check and keep the values.
 
         Raises:
@@ -87,9 +86,9 @@ class Listing:
         values: By key, equally many for each.
     """
 
-    values: Mapping[str, tuple[float, ...]]
+    values: Mapping[str, tuple[Value, ...]]
 
-    def __init__(self, values: Mapping[str, Sequence[float]]) -> None:
+    def __init__(self, values: Mapping[str, Sequence[Value]]) -> None:
         """Check and keep the values.
 
         Raises:
@@ -189,7 +188,7 @@ class LatinHypercube:
         _check_count(self.samples)
 
     @property
-    def values(self) -> Mapping[str, tuple[float, ...]]:
+    def values(self) -> Mapping[str, tuple[Value, ...]]:
         """The values of every key at every sample."""
         shares = qmc.LatinHypercube(len(self.ranges), rng=np.random.default_rng(self.seed)).random(self.samples)
         return {
@@ -215,16 +214,20 @@ class LatinHypercube:
         return {"kind": "latin", "samples": self.samples, "seed": self.seed, "ranges": ranges}
 
 
-def _checked(values: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
+def _checked(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ...]]:
     if not values:
         raise InputError("over", "at least one key is needed")
-    checked = {key: tuple(float(value) for value in axis) for key, axis in values.items()}
-    for key, axis in checked.items():
+    checked: dict[str, tuple[Value, ...]] = {}
+    for key, given in values.items():
         split(key)
+        axis = np.asarray(list(given)).tolist()
         if not axis:
             raise InputError(key, "needs at least one value")
-        for value in axis:
-            if not math.isfinite(value):
+        if len({isinstance(value, str) for value in given}) > 1 or not isinstance(axis[0], str | bool | int | float):
+            raise InputError(key, "must be given numbers, or names, or true and false", list(given))
+        checked[key] = tuple(value if isinstance(value, str | bool) else float(value) for value in axis)
+        for value in checked[key]:
+            if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(key, "must be a finite number", value)
     return checked
 

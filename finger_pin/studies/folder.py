@@ -1,4 +1,9 @@
-"""The folder of a study: what was asked, a record of every finished run, and what was made of them."""
+"""The folder of a study: what was asked, a record of every finished run, and what was made of them.
+
+A record is a line of ``runs.jsonl``, written by one append and synced before its run counts as finished. Whoever is
+killed in the middle of one leaves a torn last line, which the next one to open the file cuts off; the run that it was
+to record is done again.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +11,92 @@ import contextlib
 import fcntl
 import os
 import tomllib
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import tomli_w
+import xarray as xr
 
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.studies.store import Store
+from finger_pin.simulation.recording import save
+from finger_pin.studies.fingerprint import UnknownDependency, code_digest, versions
+from finger_pin.studies.keys import Starting
+from finger_pin.studies.metrics import Metric
+from finger_pin.studies.runs import Record
 
 STUDY, RUNS = "study.toml", "runs.jsonl"
 _MARK = "# What the study in this folder asks for. The same again goes on where it stopped; runs.jsonl has every run.\n"
+
+
+class Store:
+    """Records by key; in a file, or in memory alone.
+
+    with Store("runs.jsonl") as store:
+        store.append(record)
+    """
+
+    def __init__(self, path: str | Path | None = None) -> None:
+        """Read what is there.
+
+        Args:
+            path: A file, made if need be, that no other process writes; by default nothing outlives this object.
+
+        Raises:
+            OSError: If it cannot be read or written.
+        """
+        self._records: dict[str, Record] = {}
+        self._file: int | None = None
+        if path is not None:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._read(Path(path))
+
+    @property
+    def records(self) -> Mapping[str, Record]:
+        """All records by key."""
+        return self._records
+
+    def append(self, record: Record) -> None:
+        """Keep a record; once this returns it outlives the process and the power.
+
+        Raises:
+            OSError: If it cannot be written, such as on a full disk.
+        """
+        if self._file is not None:
+            line = f"{record.to_json()}\n".encode()
+            while line:
+                line = line[os.write(self._file, line) :]
+            os.fsync(self._file)
+        self._records[record.key] = record
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def _read(self, path: Path) -> None:
+        assert self._file is not None
+        data = path.read_bytes()
+        whole = data.rfind(b"\n") + 1
+        if whole < len(data):
+            os.ftruncate(self._file, whole)
+        for line in data[:whole].splitlines():
+            try:
+                record = Record.from_json(line.decode())
+            except ValueError:
+                # Not a record, whatever it is: its run is done again.
+                continue
+            self._records[record.key] = record
 
 
 class StudyFolder:
@@ -108,6 +186,36 @@ class StudyFolder:
         for folder in made:
             with contextlib.suppress(OSError):
                 folder.rmdir()
+
+
+def describe_study(starting: Starting, metrics: Sequence[Metric], design: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a study asks for, for a TOML file.
+
+    Warns:
+        UserWarning: If what a metric depends on cannot be known, so that its runs cannot be reused.
+    """
+    for metric in metrics:
+        try:
+            code_digest(metric.measure)
+        except UnknownDependency as error:
+            what = f"the metric {metric.name} uses {error}, so its runs are done anew whenever they are asked for"
+            warnings.warn(what, stacklevel=3)
+    scenario = starting.scenario.model_dump(mode="json", exclude_none=True)
+    names = [metric.name for metric in metrics]
+    return {"finger_pin": versions()["finger-pin"], "metrics": names, **design, "scenario": scenario}
+
+
+def write(dataset: xr.Dataset, path: Path) -> None:
+    """Write a Dataset, whole or not at all.
+
+    Raises:
+        OSError: If it cannot be written, such as on a full disk.
+    """
+    try:
+        save(dataset, path)
+    except RuntimeError as error:
+        # What the netCDF library makes of a full disk.
+        raise OSError(f"{path.name}: {error}") from error
 
 
 def _difference(before: str, after: str) -> str:

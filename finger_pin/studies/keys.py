@@ -1,4 +1,4 @@
-"""Keys of a scenario that hold a number: where they lie, what they mean, and scenarios with other numbers there.
+"""Keys of a scenario: what they hold and mean, and scenarios with other numbers or names there.
 
 A key is dotted as in `load_scenario`, such as ``finger.joints.distal.link.length``. One number of a list has its index
 in brackets: ``environment.fingertip_force[2]``.
@@ -7,7 +7,7 @@ in brackets: ``environment.fingertip_force[2]``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
 
+#: What a key may be given: a number, or a name such as that of a method, or yes or no.
+Value = float | str | bool
+Point = Mapping[str, Value]
 _INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6})\]")
 
 
@@ -43,8 +46,8 @@ class Starting:
         """
         return cls(str(name), dict(overrides or {}), load_scenario(name, overrides))
 
-    def at(self, point: Mapping[str, float]) -> Scenario:
-        """Return the scenario with other numbers at some keys.
+    def at(self, point: Point) -> Scenario:
+        """Return the scenario with other numbers or names at some keys.
 
         What a file leaves to its default, such as a mass centre at half a link's length, follows the numbers.
 
@@ -54,32 +57,50 @@ class Starting:
         changed = dict(self.overrides)
         for key, value in point.items():
             name, index = split(key)
-            number = int(value) if value == int(value) and type(self._found(key)) is int else float(value)
+            if isinstance(value, float) and value.is_integer() and type(self._found(key)) is int:
+                value = int(value)
             if index is None:
-                changed[name] = number
+                changed[name] = value
             else:
                 changed[name] = [*self._list(key, name, index, changed)]
-                changed[name][index] = number
+                changed[name][index] = value
         return load_scenario(self.name, changed)
 
-    def check(self, key: str, values: Iterable[float]) -> None:
-        """Raise unless a key can hold a number; some value of it may still be wrong, or go ill with other keys.
+    def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
+        """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.
+
+        Args:
+            key: What is varied.
+            values: What it is given.
+            alone: Whether no other key is varied, which might make the values fit.
 
         Raises:
-            InputError: If there is no such key, it does not hold a number, or no value is allowed.
+            InputError: If there is no such key, it holds something else, or allows none of the values.
         """
+        found = self._found(key)
+        numbers = _is_number(values[0])
         # Of the finger nothing may come into being by a misspelt name, as an entry that is overridden otherwise may.
-        if key.startswith("finger.") and split(key)[1] is None and not _is_number(self._found(key)):
-            raise self._no_number(key)
+        if (
+            key.startswith("finger.")
+            and split(key)[1] is None
+            and not (_is_number(found) if numbers else found is not None)
+        ):
+            raise self._nothing(key, numbers)
         problem: InputError | None = None
         for value in values:
             try:
                 scenario = self.at({key: value})
             except InputError as error:
-                problem = problem or error
+                if error.entry.startswith(split(key)[0]):
+                    problem = problem or error
+                elif alone:
+                    problem = problem or InputError(key, f"no value of it can be simulated: {error}")
+                else:
+                    # The value is right as such.
+                    return
                 continue
-            if not _is_number(_look_up(scenario, key)):
-                raise self._no_number(key)
+            if numbers and not _is_number(_look_up(scenario, key)):
+                raise self._nothing(key, numbers)
             return
         if problem is not None:
             raise problem
@@ -92,17 +113,18 @@ class Starting:
         """
         held = self._found(key)
         if not _is_number(held):
-            raise self._no_number(key)
+            raise self._nothing(key, True)
         return float(held)
 
-    def _no_number(self, key: str) -> InputError:
-        near = nearest(key, _numbers(self.scenario.model_dump(mode="python"), ""))
-        return InputError(key, f"the scenario has no such number{f'; did you mean {near}?' if near else ''}")
+    def _nothing(self, key: str, numbers: bool) -> InputError:
+        near = nearest(key, _leaves(self.scenario.model_dump(mode="python"), "", numbers))
+        hint = f"; did you mean {near}?" if near else ""
+        return InputError(key, f"the scenario has no such {'number' if numbers else 'entry'}{hint}")
 
     def _found(self, key: str) -> Any:
         return _look_up(self.scenario, key)
 
-    def _list(self, key: str, name: str, index: int, changed: Mapping[str, Any]) -> list[float]:
+    def _list(self, key: str, name: str, index: int, changed: Mapping[str, Any]) -> list[Any]:
         held = changed.get(name, self._found(name))
         if isinstance(held, int | float):
             raise InputError(key, f"{name} is one number for all; give it a list first, or leave out the index")
@@ -142,16 +164,16 @@ def _is_number(held: Any) -> bool:
     return isinstance(held, int | float) and not isinstance(held, bool)
 
 
-def _numbers(held: Any, key: str) -> Iterator[str]:
-    """Give the keys below one that hold numbers."""
-    if _is_number(held):
-        yield key
-    elif isinstance(held, Mapping):
+def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
+    """Give the keys below one that hold numbers, or the ones that hold anything."""
+    if isinstance(held, Mapping):
         for name, below in held.items():
-            yield from _numbers(below, f"{key}.{name}" if key else name)
+            yield from _leaves(below, f"{key}.{name}" if key else name, numbers)
     elif isinstance(held, list | tuple):
         for index, below in enumerate(held):
-            yield from _numbers(below, f"{key}[{index}]")
+            yield from _leaves(below, f"{key}[{index}]", numbers)
+    elif _is_number(held) or not numbers:
+        yield key
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:

@@ -11,15 +11,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+import cloudpickle
 import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
-from finger_pin.exceptions import InputError, SelfLockingWarning
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
 
@@ -43,7 +44,7 @@ class Run:
         """What `simulate` returns."""
         with warnings.catch_warnings():
             # Studies look at many designs, and at the margin by its metric.
-            warnings.simplefilter("ignore", SelfLockingWarning)
+            warnings.simplefilter("ignore", ScenarioWarning)
             return simulate(self.scenario)
 
 
@@ -55,7 +56,7 @@ class Metric:
         name: How it is asked for.
         unit: SI unit.
         long_name: What it is.
-        measure: Takes a run and returns the number. Other processes import it: a function of a module.
+        measure: Takes a run and returns the number. Other processes call it.
     """
 
     name: str
@@ -68,7 +69,7 @@ def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
     """Return metrics by name; those given as such are kept.
 
     Raises:
-        InputError: If there are none, one is unknown, or one comes twice.
+        InputError: If there are none, one is unknown or comes twice, or cannot be sent to other processes.
     """
     chosen: dict[str, Metric] = {}
     for each in names:
@@ -77,6 +78,11 @@ def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
             hint = f"; did you mean {near}?" if near else ""
             raise InputError("metric", f"there is no such metric; there are {', '.join(METRICS)}{hint}", each)
         metric = METRICS[each] if isinstance(each, str) else each
+        try:
+            cloudpickle.dumps(metric)
+        except Exception as error:
+            what = f"cannot be sent to other processes: {type(error).__name__}: {error}"
+            raise InputError("metric", what, metric.name) from None
         if metric.name in chosen:
             raise InputError("metric", "must not come twice", metric.name)
         chosen[metric.name] = metric
@@ -106,8 +112,9 @@ def tension_mean(run: Run) -> float:
 
 
 def losses(run: Run) -> float:
-    """Return what friction and limiters took, J."""
-    return losses_tendons(run) + losses_joints(run) + _final(run.result, "limiter")
+    """Return what friction, limiters and springs took, J."""
+    rest = _final(run.result, "limiter") + _final(run.result, "joint_springs")
+    return losses_tendons(run) + losses_joints(run) + rest
 
 
 def losses_tendons(run: Run) -> float:
@@ -142,7 +149,7 @@ def fingertip_force(run: Run) -> float:
     """
     finger = Finger(run.scenario.finger)
     times = run.scenario.simulation.duration * (np.arange(500) + 0.5) / 500
-    posture = np.mean(HarmonicReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
+    posture = np.mean(SignalReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
     offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
     return float(np.min(offsets)) if offsets.size else 0.0
 

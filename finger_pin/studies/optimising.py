@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -11,22 +12,30 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.studies.dataset import assemble
-from finger_pin.studies.designs import Listing, Point
-from finger_pin.studies.evaluation import Progress, describe_study, evaluate, write
-from finger_pin.studies.folder import StudyFolder
-from finger_pin.studies.front import PRODUCTS, write_front
-from finger_pin.studies.goals import Constraint, Goals
-from finger_pin.studies.keys import Starting
-from finger_pin.studies.local import LocalProcesses
+from finger_pin.files import replacing
+from finger_pin.studies.dataset import assemble, checked
+from finger_pin.studies.designs import Listing
+from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
+from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.runs import DONE, Executor, Record, Stop, Workers
+from finger_pin.studies.problem import (
+    Constraint,
+    Goals,
+    Variable,
+    check_variables,
+    parse_variable,
+    point_at,
+    radii,
+    start_of,
+)
+from finger_pin.studies.processes import LocalProcesses
+from finger_pin.studies.runs import DONE, Executor, Progress, Record, Stop, Workers, evaluate
 from finger_pin.studies.search import HOPELESS, Search, nondominated
-from finger_pin.studies.store import Store
-from finger_pin.studies.variables import Variable, check_variables, parse_variable, point_at, radii, start_of
 
+PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
 DEFAULT_OBJECTIVES = ("tracking_rms", "tension_peak")
 DEFAULT_CONSTRAINTS = ("self_locking_margin>=1.5", "fingertip_force>=0.8")
 
@@ -99,6 +108,7 @@ def optimise(
 
     Raises:
         InputError: Naming the argument, key or value that is wrong; nothing is written then.
+        StudyError: If every run failed.
         OSError: If a record cannot be written.
     """
     effort = effort or Effort()
@@ -122,11 +132,11 @@ def optimise(
             folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
             store = stack.enter_context(folder).store
         course = _Course(starting, goals, variables, store, workers, effort, progress, stop)
-        result = _assembled(starting, goals, *course.follow(dict(own), search))
+        result = _assembled(starting, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")
-            write_front(result, starting, Path(output))
-    return result
+            _write_front(result, starting, Path(output))
+    return checked(result)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,3 +223,29 @@ def _assembled(starting: Starting, goals: Goals, points: list[Point], records: l
     result["feasible"] = ("sample", feasible, {"long_name": "whether the design keeps all constraints"})
     result["front"] = ("sample", front, {"long_name": "number of the design on the front, from 1; 0 for the others"})
     return result.assign_attrs({name: ", ".join(listed) for name, listed in goals.describe().items()})
+
+
+def _write_front(result: xr.Dataset, starting: Starting, folder: Path) -> None:
+    """Write ``front.csv`` and a scenario per design, ``front/01.toml`` and so on in the order of the table.
+
+    Raises:
+        OSError: If they cannot be written.
+    """
+    keys = [str(key) for key in result.coords]
+    columns = [*(str(name) for name in result.data_vars if "units" in result[name].attrs), *keys]
+    scenarios = folder / "front"
+    scenarios.mkdir(exist_ok=True)
+    for old in scenarios.glob("*.toml"):
+        old.unlink()
+    with replacing(folder / "front.csv") as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(["design", *(f"{name} ({result[name].attrs['units']})" for name in columns)])
+        for number in range(1, 1 + int(result["front"].max())):
+            row = result.isel(sample=int(np.flatnonzero(result["front"].values == number)[0]))
+            name = f"{number:02d}"
+            table.writerow([name, *(repr(float(row[column])) for column in columns)])
+            scenario = starting.at({key: float(row[key]) for key in keys})
+            title = f"design {name} of the front of a search on {scenario.name}"
+            changed = scenario.model_copy(update={"name": f"{scenario.name[:50]}_front_{name}", "title": title})
+            with replacing(scenarios / f"{name}.toml") as text:
+                Path(text).write_text(to_toml(changed), encoding="utf-8", newline="\n")

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+from multiprocessing import spawn
 
 from finger_pin.core.compilation import is_cached
 from finger_pin.description.loading import load_scenario
 from finger_pin.simulation.simulate import simulate
+from finger_pin.studies import runs as runs
+from finger_pin.studies.fingerprint import source_digest
 
+# Processes would begin by importing the script that asks, and so run it again where it has no guard. They need nothing
+# of it: what it has defined itself is sent to them by value.
+spawn._fixup_main_from_path = spawn._fixup_main_from_name = lambda name: None  # type: ignore[attr-defined]
+
+# Of the code that is loaded here and now.
+source_digest()
 if is_cached():
     # Should anything be wrong, the processes say so themselves.
     with contextlib.suppress(Exception):

@@ -1,24 +1,32 @@
-"""One run of a study: what is to be done, doing it in whatever process, and what is kept of it."""
+"""Runs of a study: what is to be done, doing it in whatever process, and what is kept of it.
+
+What is recorded is not done again, and what is done is recorded at once. A record is found by a digest of all that its
+run depends on: the scenario, the code of the metrics, and the source of this package.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import time
+import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from importlib import metadata
+from itertools import takewhile
 from typing import Any, Protocol, Self
 
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
-from finger_pin.studies.keys import Starting
+from finger_pin.studies.fingerprint import UnknownDependency, code_digest, source_digest, versions
+from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric, Run
 
 DONE, FAILED = "done", "failed"
 Stop = Callable[[], bool]
+#: Called with the numbers of finished, failed and all runs.
+Progress = Callable[[int, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -27,7 +35,7 @@ class Record:
 
     Attributes:
         key: Digest of everything that determines the run.
-        point: The numbers that were varied.
+        point: What was varied.
         status: `DONE` or `FAILED`.
         reason: Why it failed; empty if it did not.
         metrics: By name; none if it failed.
@@ -35,7 +43,7 @@ class Record:
     """
 
     key: str
-    point: Mapping[str, float]
+    point: Point
     status: str
     reason: str
     metrics: Mapping[str, float]
@@ -64,17 +72,17 @@ class Task:
 
     Attributes:
         key: Digest of everything that determines it.
-        point: The numbers that were varied.
-        scenario: With these numbers.
+        point: What was varied.
+        scenario: At this point.
         metrics: To be measured.
-        version: Of the package that asks.
+        source: Digest of the package that asks.
     """
 
     key: str
-    point: Mapping[str, float]
+    point: Point
     scenario: Scenario
     metrics: tuple[Metric, ...]
-    version: str
+    source: str
 
     def failed(self, reason: str, seconds: float = 0.0) -> Record:
         """Return the record of a run that failed."""
@@ -95,24 +103,66 @@ class Executor(Protocol):
         """Return workers for the time of a ``with`` statement."""
 
 
+class Archive(Protocol):
+    """Where records are found and kept."""
+
+    @property
+    def records(self) -> Mapping[str, Record]:
+        """All records by key."""
+
+    def append(self, record: Record) -> None:
+        """Keep a record."""
+
+
 class VersionError(FingerPinError):
     """A worker has another version of the package than the process that asks."""
 
 
-def version() -> str:
-    """Return the version of this package."""
-    return metadata.version("finger-pin")
+def evaluate(
+    starting: Starting,
+    points: Sequence[Point],
+    metrics: tuple[Metric, ...],
+    archive: Archive,
+    workers: Workers,
+    *,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+    retry_failed: bool = False,
+) -> list[Record | None]:
+    """Do the runs that are not in an archive, keep each as it finishes, and return all in the order of the points.
 
+    Args:
+        starting: The scenario that is varied.
+        points: Where.
+        metrics: What is measured.
+        archive: Where records are found and kept.
+        workers: Who does the runs.
+        progress: Called with the numbers of finished, failed and all runs, first with those found.
+        stop: When it returns true, runs that have not been done are None.
+        retry_failed: Whether runs that failed before count as not done.
+    """
+    asked_to_stop = stop or (lambda: False)
+    measured = [_identity(metric) for metric in metrics]
+    plans = [_plan(starting, point, metrics, measured) for point in takewhile(lambda _: not asked_to_stop(), points)]
+    found = {key: r for key, r in archive.records.items() if not (retry_failed and r.status == FAILED)}
+    records = {each.key: found[each.key] for each in plans if each.key in found}
+    tasks = {each.key: each for each in plans if isinstance(each, Task) and each.key not in records}
 
-def plan(starting: Starting, point: Mapping[str, float], metrics: tuple[Metric, ...]) -> Task | Record:
-    """Return the task at a point, or the record of its failure if there is no such scenario."""
-    measured = [[m.name, m.unit, m.long_name, m.measure.__module__, m.measure.__qualname__] for m in metrics]
-    try:
-        scenario = starting.at(point)
-    except InputError as error:
-        key = _digest(to_toml(starting.scenario), dict(point), measured)
-        return Record(key, dict(point), FAILED, str(error), {}, 0.0)
-    return Task(_digest(to_toml(scenario), measured), dict(point), scenario, metrics, version())
+    def report() -> None:
+        if progress is not None:
+            done = [records[each.key] for each in plans if each.key in records]
+            progress(len(done), sum(record.status == FAILED for record in done), len(points))
+
+    for each in plans:
+        if isinstance(each, Record) and each.key not in records:
+            records[each.key] = each
+            archive.append(each)
+    report()
+    for record in workers.run(list(tasks.values()), asked_to_stop):
+        archive.append(record)
+        records[record.key] = record
+        report()
+    return [records.get(each.key) for each in plans] + [None] * (len(points) - len(plans))
 
 
 def execute(task: Task) -> Record:
@@ -121,8 +171,9 @@ def execute(task: Task) -> Record:
     Raises:
         VersionError: If this package is not the one that asked.
     """
-    if task.version != version():
-        raise VersionError(f"a worker has finger_pin {version()}, not {task.version}")
+    if task.source != source_digest():
+        own = f"{versions()['finger-pin']}, source {source_digest()}"
+        raise VersionError(f"a worker has another finger_pin ({own}), not that of source {task.source}")
     begin = time.perf_counter()
     run = Run(task.scenario)
     try:
@@ -134,5 +185,24 @@ def execute(task: Task) -> Record:
     return Record(task.key, dict(task.point), DONE, "", values, time.perf_counter() - begin)
 
 
+def _identity(metric: Metric) -> list[str]:
+    """Return what tells a metric from others; from all others, if what its code depends on cannot be known."""
+    try:
+        code = code_digest(metric.measure)
+    except UnknownDependency:
+        code = uuid.uuid4().hex
+    return [metric.name, metric.unit, metric.long_name, code]
+
+
+def _plan(starting: Starting, point: Point, metrics: tuple[Metric, ...], measured: list[list[str]]) -> Task | Record:
+    """Return the task at a point, or the record of its failure if there is no such scenario."""
+    try:
+        scenario = starting.at(point)
+    except InputError as error:
+        key = _digest(to_toml(starting.scenario), dict(point), measured)
+        return Record(key, dict(point), FAILED, str(error), {}, 0.0)
+    return Task(_digest(to_toml(scenario), measured), dict(point), scenario, metrics, source_digest())
+
+
 def _digest(*parts: Any) -> str:
-    return hashlib.sha256(json.dumps([*parts, version()], sort_keys=True).encode()).hexdigest()[:32]
+    return hashlib.sha256(json.dumps([*parts, source_digest()], sort_keys=True).encode()).hexdigest()[:32]

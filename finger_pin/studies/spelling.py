@@ -8,22 +8,27 @@ import numpy as np
 
 from finger_pin.exceptions import InputError
 from finger_pin.studies.designs import MOST_POINTS, Range
+from finger_pin.studies.keys import Value
 
 _VALUES = "must be KEY=START:STOP:N, KEY=START:STOP:N:log or KEY=A,B,C"
+_SWITCH = {"true": True, "false": False}
 _RANGE = "must be KEY=LOW:HIGH or KEY=LOW:HIGH:log"
 
 
-def parse_values(text: str) -> tuple[str, tuple[float, ...]]:
+def parse_values(text: str) -> tuple[str, tuple[Value, ...]]:
     """Return the key and the values of ``KEY=START:STOP:N``, ``KEY=START:STOP:N:log`` or ``KEY=A,B,C``.
 
-    START and STOP are among the N values.
+    START and STOP are among the N values. A, B and C are numbers, or names, or true and false.
 
     Raises:
         InputError: If it is neither.
     """
     key, spelt = _split(text, _VALUES)
     if ":" not in spelt:
-        return key, tuple(_number(text, each, _VALUES) for each in spelt.split(","))
+        words = [each.strip() for each in spelt.split(",")]
+        if not all(words) or any(_is_number(each) for each in words):
+            return key, tuple(_number(text, each, _VALUES) for each in words)
+        return key, tuple(_SWITCH.get(each, each) for each in words)
     parts, logarithmic = _parts(spelt)
     if len(parts) != 3 or not parts[2].strip().isdecimal():
         raise InputError("over", _VALUES, text)
@@ -66,11 +71,18 @@ def _parts(spelt: str) -> tuple[list[str], bool]:
     return (parts[:-1] if logarithmic else parts), logarithmic
 
 
-def _number(text: str, spelt: str, allowed: str) -> float:
+def _is_number(spelt: str) -> bool:
     try:
-        number = float(spelt)
+        float(spelt)
     except ValueError:
-        raise InputError("over", f"{allowed}; {spelt.strip() or 'nothing'} is not a number", text) from None
+        return False
+    return True
+
+
+def _number(text: str, spelt: str, allowed: str) -> float:
+    if not _is_number(spelt):
+        raise InputError("over", f"{allowed}; {spelt.strip() or 'nothing'} is not a number", text)
+    number = float(spelt)
     if not math.isfinite(number):
         raise InputError("over", f"{allowed}; numbers must be finite", text)
     return number

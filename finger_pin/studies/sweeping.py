@@ -1,4 +1,4 @@
-"""Sweeps: metrics of a scenario over some of its numbers."""
+"""Sweeps: metrics of a scenario over some of its numbers and names."""
 
 from __future__ import annotations
 
@@ -9,22 +9,20 @@ from typing import Any
 
 import xarray as xr
 
-from finger_pin.studies.dataset import assemble
+from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
-from finger_pin.studies.evaluation import Progress, describe_study, evaluate, write
-from finger_pin.studies.folder import StudyFolder
-from finger_pin.studies.keys import Starting
-from finger_pin.studies.local import LocalProcesses
+from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
+from finger_pin.studies.keys import Starting, Value
 from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, choose
-from finger_pin.studies.runs import Executor, Stop
-from finger_pin.studies.store import Store
+from finger_pin.studies.processes import LocalProcesses
+from finger_pin.studies.runs import Executor, Progress, Stop, evaluate
 
 PRODUCTS = ["sweep.nc", "figures/sweep.png"]
 
 
 def sweep(
     scenario: str | Path,
-    over: Design | Mapping[str, Sequence[float]],
+    over: Design | Mapping[str, Sequence[Value]],
     *,
     metrics: Iterable[str | Metric] = DEFAULT_METRICS,
     overrides: Mapping[str, Any] | None = None,
@@ -38,9 +36,11 @@ def sweep(
     """Run a scenario at many points and measure every run.
 
         fp.sweep("fig6", {"controller.gain": [0.5, 1.0, 2.0]}, metrics=["tracking_rms"])
+        fp.sweep("fig6", {"simulation.method": ["Rodas4", "Rodas5P"], "simulation.rtol": [1e-4, 1e-6]})
 
     With an ``output`` every finished run is on disk at once: whoever is killed and asks for the same again goes on
-    where it ended. A run that fails, or a point at which there is no valid scenario, is NaN, with its reason.
+    where it ended; runs that depend on code that has changed since, such as that of a metric, are done anew. A run that
+    fails, or a point at which there is no valid scenario, is NaN, with its reason.
 
     Args:
         scenario: Name or path, as `load_scenario` takes it.
@@ -61,13 +61,14 @@ def sweep(
 
     Raises:
         InputError: Naming the argument, key or value that is wrong; nothing is written then.
+        StudyError: If every run failed.
         OSError: If a record cannot be written.
     """
     design = Grid(over) if isinstance(over, Mapping) else over
     chosen = choose(metrics)
     starting = Starting.load(scenario, overrides)
     for key, values in design.values.items():
-        starting.check(key, values)
+        starting.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:
         workers = stack.enter_context((executor or LocalProcesses()).start())
         if output is None:
@@ -81,4 +82,4 @@ def sweep(
         result = assemble(starting.scenario, design, chosen, records)
         if output is not None:
             write(result, Path(output) / "sweep.nc")
-    return result
+    return checked(result)

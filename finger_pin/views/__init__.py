@@ -1,1 +1,5 @@
-"""The room views."""
+"""What results and analyses look like: figures (`plots`), the viewer, the summary. All of it only reads."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

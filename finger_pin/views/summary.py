@@ -8,8 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.analysis import (
+    critical_friction,
+    locking_advice,
+    self_locking_map,
+    self_locking_margin,
+)
 from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import expand
+from finger_pin.mechanism.finger import Finger
 
 _SETTLING = 1.0
 _LONG = 2.0
@@ -22,9 +30,63 @@ def summarize(result: xr.Dataset) -> str:
     Args:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
-    head = [*_head(result), *_locking(result)]
+    head = [*_head(result), *_own(result), *_warnings(result)]
     blocks = [head, _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def summarize_locking(scenario: Scenario) -> str:
+    """Return when a scenario's finger locks itself, as plain text: with or without tendon friction, at which posture.
+
+    Args:
+        scenario: Of a finger with force closure.
+
+    Raises:
+        InputError: If there is no force closure.
+    """
+    finger = scenario.finger
+    static = expand(finger.joint_friction.stiction, len(finger.joints))
+    alone = [(name, critical_friction(finger, joints=[name]).coefficient) for name in finger.joints]
+    together = critical_friction(finger).coefficient
+    rows = [(name, _millimetres(value), f"{1e3 * own:.3f}") for (name, value), own in zip(alone, static, strict=True)]
+    rows.append(("all joints", _millimetres(together), f"{1e3 * max(static):.3f}"))
+    blocks = [
+        [
+            "Joint friction at which the finger locks in its worst direction, mm,",
+            "without tendon friction, so at any posture alike; and M^c, what it has",
+            *_table(("moving", "locks at", "has"), rows),
+        ]
+    ]
+    found = self_locking_map(Finger(finger))
+    least = np.unravel_index(int(np.argmin(found.coefficient)), found.coefficient.shape)
+    angles = zip(found.joints, (axis[index] for axis, index in zip(found.angles, least, strict=True)), strict=True)
+    where = ", ".join(f"{name} {np.rad2deg(angle):.3g} deg" for name, angle in angles)
+    if found.uniform:
+        where = f"every posture of {' and '.join(found.joints)}"
+    blocks.append(
+        [
+            "With the friction of the tendons, all joints moving in their worst directions, mm:",
+            f"  locks at {_millimetres(float(found.coefficient.min()))}, at {where}",
+            f"  {_verdict(found.actual / float(found.coefficient.min()))}",
+        ]
+    )
+    margin = self_locking_margin(scenario)
+    posture = ", ".join(f"{each:.3g}" for each in np.rad2deg(margin.position))
+    line = "  nothing moves, or nothing locks it"
+    if np.isfinite(margin.margin):
+        line = f"  {_verdict(1.0 / margin.margin)}, at {margin.time:.3g} s and ({posture}) deg"
+    blocks.append([f"With the friction of the tendons, in the motion of {scenario.name} where it is closest:", line])
+    return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _verdict(share: float) -> str:
+    """Return what a share of the critical friction means."""
+    what = "it locks" if share >= 1.0 else "it does not lock"
+    return f"{what}: its friction is {share:.3g} times what locks it"
+
+
+def _millimetres(length: float) -> str:
+    return f"{1e3 * length:.3f}" if np.isfinite(length) else "never"
 
 
 def _head(result: xr.Dataset) -> list[str]:
@@ -34,9 +96,15 @@ def _head(result: xr.Dataset) -> list[str]:
     return [title, f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"]
 
 
-def _locking(result: xr.Dataset) -> list[str]:
+def _own(result: xr.Dataset) -> list[str]:
+    own = result.attrs.get("own")
+    return [f"Not what the scenario alone gives: {own} of one's own"] if own else []
+
+
+def _warnings(result: xr.Dataset) -> list[str]:
     advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
-    return [f"Warning: {advice}"] if advice else []
+    driving = str(result.attrs.get("micro_damping", ""))
+    return [line for each in (advice, driving) if each for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:

@@ -14,14 +14,14 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from validation.mujoco_motion import EXPRESSIBLE
 
 import finger_pin as fp
 from benchmarks.runs import Job, Point, compiled, point, rms, truth
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
+from finger_pin.commands.validation.mujoco_motion import EXPRESSIBLE
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mjcf import to_mjcf
 
@@ -68,7 +68,7 @@ class Loop:
         self._feedback = controller.inverse * controller.gain
         self._minimum, self._internal = controller.minimum, controller.internal
         times = step * np.arange(round(scenario.simulation.duration / step))
-        self._feedforward = HarmonicReference.from_scenario(scenario, routing).at(times).position @ self._feedback.T
+        self._feedforward = SignalReference.from_scenario(scenario, routing).at(times).position @ self._feedback.T
         self._every = max(1, round(_PERIOD / step))
         self._stride = max(1, round(step / _PERIOD))
         self.controls = np.zeros((len(times), self._actuated))

@@ -11,7 +11,7 @@ import finger_pin as fp
 from benchmarks.runs import rms, settled
 from benchmarks.store import Store
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import HarmonicReference, ReferenceSignals
+from finger_pin.control.reference import ReferenceSignals, SignalReference
 
 PERIOD = 1e-3
 _ROUNDS = 3
@@ -47,7 +47,7 @@ def _run(scenario: fp.Scenario) -> tuple[float, float, Any]:
     finger = fp.Finger(scenario.finger)
     controller, reference = (
         ProportionalController.from_scenario(scenario, finger.routing),
-        HarmonicReference.from_scenario(scenario, finger.routing),
+        SignalReference.from_scenario(scenario, finger.routing),
     )
     desired = reference.at(scenario.sample_times())
     simulator = fp.Simulator(finger, desired.position[0])

@@ -1,5 +1,7 @@
 """Figures of the analyses show the numbers that the analyses return."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,11 +20,21 @@ def test_bars_are_the_critical_coefficients(ub):
     assert [label.get_text() for label in axes.get_yticklabels()] == [*ub.joints, "all joints"]
 
 
-@pytest.mark.parametrize("coefficient, said", [(3.5e-4, "at every posture"), (7.6e-4, "locked everywhere")])
-def test_map_says_where_nothing_varies(coefficient, said):
+@pytest.mark.parametrize("coefficient, panels", [(3.5e-4, 2), (7.6e-4, 1)])
+def test_map_says_in_a_line_what_is_the_same_at_every_posture_and_where_it_is_locked(coefficient, panels):
     overrides = {f"finger.joint_friction.{name}": coefficient for name in ("coulomb", "stiction")}
-    figure = plot_self_locking_map(self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=3))
-    assert any(said in text.get_text() for axes in figure.axes for text in axes.texts)
+    found = self_locking_map(fp.Finger(fp.load_finger("ub", overrides)), samples=3)
+    figure = plot_self_locking_map(found)
+    said = f"critical coefficient {1e3 * found.coefficient[0, 0]:.3g} mm at every posture"
+    assert figure.get_suptitle() == f"{said}; the finger has {1e3 * coefficient:.3g} mm"
+    # The tension has its map and its colour bar, or a word instead of both; there is no panel without content.
+    assert len(figure.axes) == panels
+    assert (panels == 1) == any("locked everywhere" in text.get_text() for text in figure.axes[0].texts)
+
+
+def test_a_map_of_a_finger_that_nothing_locks_says_so(finger):
+    found = replace(self_locking_map(finger, samples=3), coefficient=np.full((3, 3), np.inf))
+    assert plot_self_locking_map(found).get_suptitle().startswith("no joint friction locks it; the finger has 0.35 mm")
 
 
 def test_runs_are_drawn_with_their_largest_tension():
@@ -51,3 +63,14 @@ def test_sensitivity_bars_are_the_derivatives_per_millimetre(finger):
     force = [0.3, 0.2, 0.8]
     bars = [bar.get_width() for bar in plot_radius_sensitivity(finger, POSTURE, force).axes[0].patches]
     assert bars[0] == pytest.approx(1e-3 * tension_for_force(finger, POSTURE, force).by_radius[0, 0])
+    assert "(0.3, 0.2, 0.8) N" in plot_radius_sensitivity(finger, POSTURE, force).axes[0].get_title("left")
+
+
+def test_a_map_over_one_joint_is_a_curve_and_a_row_of_the_map_over_two(finger):
+    both = self_locking_map(finger, ("proximal", "medial"), samples=3)
+    alone = self_locking_map(finger, ("medial",), samples=3)
+    np.testing.assert_allclose(alone.tension, both.tension[0])
+    axes = plot_self_locking_map(alone).axes[0]
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), alone.tension)
+    with pytest.raises(fp.InputError, match="two different"):
+        self_locking_map(finger, ("medial", "medial"))

@@ -170,6 +170,21 @@ def test_a_flat_set_is_covered_once_and_outlined():
     assert abs(areas.sum()) == pytest.approx(scipy.spatial.ConvexHull(found.vertices[:, :2]).volume, rel=1e-9)
 
 
+@pytest.mark.parametrize("joint", [1, 2, 3])
+def test_a_push_at_a_joint_s_axis_is_no_stronger_than_those_that_pass_it_on_either_side(finger, joint):
+    """There the joint may slip either way, so that the push must do with the worse one."""
+    theta = np.array([0.0, 0.5, 0.6, 0.42])
+    lever = finger.rigid_body.jacobian(theta)[:, joint]
+    for side in (1.0, -1.0):
+        towards = side * np.array([-lever[2], 0.0, lever[0]]) / np.linalg.norm(lever)
+        at, *beside = (
+            largest_force(finger, theta, towards + 0.01 * shift * lever / np.linalg.norm(lever), 20.0,
+                          friction=Friction.HINDERING)
+            for shift in (0.0, 1.0, -1.0)
+        )  # fmt: skip
+        assert at == pytest.approx(min(beside), rel=0.05)
+
+
 def test_wrong_arguments_are_named(finger):
     with pytest.raises(fp.InputError, match="limit"):
         force_polytope(finger, POSTURE, 1.0, minimum=2.0)

@@ -1,8 +1,6 @@
 """The pins' whole reaction: against a pendulum by hand, the moment balance, and momentum by differences; and (17)."""
 
 import csv
-import importlib.util
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -10,10 +8,10 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.analysis import fingertip_loads, joint_reactions, pin_wrench
+from finger_pin.commands.application import run as run_command
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
 from finger_pin.views.plots.reaction import plot_reaction
 
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reaction.py"
 FORCE = np.array([0.4, -0.7, 0.5])
 MASS, LENGTH, CENTRE, INERTIA, WEIGHT = 0.02, 0.05, 0.03, 6e-6, 9.81
 RADII = np.array([0.006, 0.004, -0.005])
@@ -180,17 +178,9 @@ def test_the_figure_draws_the_reactions_and_their_differences(along_fig6):
         np.testing.assert_allclose(figure.axes[5].lines[1].get_ydata(), share)
 
 
-@pytest.fixture
-def script():
-    spec = importlib.util.spec_from_file_location("reaction", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_script_writes_a_row_per_joint_and_force_and_a_figure(script, tmp_path, capsys):
+def test_the_command_writes_a_row_per_joint_and_force_and_a_figure(tmp_path, capsys):
     settings = ["--set", "simulation.duration=0.02", "--forces", "1", "--output", str(tmp_path)]
-    assert script.main(settings) == 0
+    assert run_command("reaction", settings) == 0
     assert {each.name for each in tmp_path.iterdir()} == {"reaction.csv", "reaction.png"}
     with open(tmp_path / "reaction.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -202,10 +192,10 @@ def test_the_script_writes_a_row_per_joint_and_force_and_a_figure(script, tmp_pa
     assert "worst of 6" in " ".join(capsys.readouterr().out.split())
 
 
-def test_the_script_tells_wrong_input_in_one_line_and_writes_nothing(script, tmp_path, capsys):
+def test_the_command_tells_wrong_input_in_one_line_and_writes_nothing(tmp_path, capsys):
     target = tmp_path / "out"
-    assert script.main(["fig7", "--output", str(target)]) == 2
-    assert script.main(["--set", "controller.gian=2", "--output", str(target)]) == 2
+    assert run_command("reaction", ["fig7", "--output", str(target)]) == 2
+    assert run_command("reaction", ["--set", "controller.gian=2", "--output", str(target)]) == 2
     error = capsys.readouterr().err.splitlines()
     assert len(error) == 2 and "fig6" in error[0] and "controller.gain" in error[1]
     assert not target.exists()

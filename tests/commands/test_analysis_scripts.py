@@ -1,9 +1,10 @@
 """The scripts of the design questions and of the conclusions: what they write, and one clear line where they refuse."""
 
 import csv
-import importlib
 
 import pytest
+
+from finger_pin.commands import application
 
 SCRIPTS = ("conclusions", "self_locking", "force_capability")
 
@@ -14,10 +15,7 @@ def run(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def run(name, *arguments):
-        try:
-            code = importlib.import_module(name).main([str(each) for each in arguments])
-        except SystemExit as end:
-            code = end.code
+        code = application.run(name, [str(each) for each in arguments])
         printed = capsys.readouterr()
         return code, printed.out, printed.err.splitlines()
 
@@ -35,13 +33,13 @@ def refused(answer, folder, *says):
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_a_misspelt_option_is_told_the_nearest_one(run, tmp_path, name):
-    refused(run(name, "--ouput", "x"), tmp_path, f"{name}.py: --ouput: no such argument", "did you mean --output?")
+    refused(run(name, "--ouput", "x"), tmp_path, f"{name}.py: --ouput: no such option", "did you mean --output?")
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_an_option_without_its_value_and_a_second_name_are_refused(run, tmp_path, name):
-    refused(run(name, "--output"), tmp_path, "--output", "expected one argument")
-    refused(run(name, "ub", "fig6"), tmp_path, "fig6: no such argument; there are one")
+    refused(run(name, "--output"), tmp_path, "--output", "requires an argument")
+    refused(run(name, "ub", "fig6"), tmp_path, "unexpected extra argument", "fig6")
 
 
 @pytest.mark.parametrize(
@@ -57,10 +55,10 @@ def test_an_unknown_name_is_told_in_one_line(run, tmp_path, name, given):
         (("--limit", "many"), "--limit"),
         (("--limit", "-3"), "must be above 0"),
         (("--limit", "nan"), "must be a finite number"),
-        (("--force", "1", "2"), "--force"),
-        (("--force", "1", "2", "inf"), "must be a finite number"),
-        (("--posture", "1", "x"), "--posture"),
-        (("--posture", "10", "20"), "posture"),
+        (("--force", "1,2"), "--force = [1.0, 2.0]: must be 3 finite numbers"),
+        (("--force", "1,2,inf"), "must be a finite number"),
+        (("--posture", "1,x"), "--posture: x: must be a finite number"),
+        (("--posture", "10,20"), "must be 4 angles with commas between"),
     ],
 )
 def test_wrong_numbers_of_the_force_script_are_named(run, tmp_path, arguments, says):
@@ -97,9 +95,9 @@ def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
     ("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ()), ("self_locking", ())]
 )
 def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, monkeypatch, name, arguments):
-    monkeypatch.setattr(importlib.import_module("self_locking"), "SHARES", (0.5,))
+    monkeypatch.setattr("finger_pin.commands.self_locking.SHARES", (0.5,))
     (tmp_path / "file").write_text("")
     scenario = tmp_path / "short.toml"
     scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')
     code, _, lines = run(name, "ub" if name == "force_capability" else scenario, *arguments, "--output", "file/out")
-    assert code == 1 and len(lines) == 1 and "--output = file" in lines[0]
+    assert code == 1 and len(lines) == 1 and "cannot be written: file/out" in lines[0]

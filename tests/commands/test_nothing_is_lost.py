@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from test_loading import PLANAR
+from wrong_inputs import PLANAR
 
 import finger_pin as fp
 

@@ -1,25 +1,15 @@
 """The script that draws the paper's figures, with a short simulation in place of the long one."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
 
 import finger_pin as fp
+from finger_pin.commands.application import run
+from finger_pin.commands.reproduce import comparison
 from finger_pin.exceptions import IntegrationError
 
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reproduce.py"
 FIGURES = {"fig2.png", "fig3.png", "fig6.png", "losses.png", "energy.png"}
-
-
-@pytest.fixture
-def script():
-    spec = importlib.util.spec_from_file_location("reproduce", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")
@@ -27,15 +17,15 @@ def short():
     return fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
 
 
-def test_all_figures_of_the_paper_land_in_one_folder(script, short, monkeypatch, tmp_path, capsys):
+def test_all_figures_of_the_paper_land_in_one_folder(short, monkeypatch, tmp_path, capsys):
     asked = []
 
     def simulate(scenario, progress):
         asked.append(scenario)
         return short
 
-    monkeypatch.setattr(script, "simulate", simulate)
-    assert script.main(["--output", str(tmp_path / "paper")]) == 0
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", simulate)
+    assert run("reproduce", ["--output", str(tmp_path / "paper")]) == 0
     assert {path.name for path in (tmp_path / "paper").iterdir()} == FIGURES
     assert asked == [fp.load_scenario("fig6")]
     output = capsys.readouterr().out
@@ -43,7 +33,7 @@ def test_all_figures_of_the_paper_land_in_one_folder(script, short, monkeypatch,
         assert str(tmp_path / "paper" / name) in output
 
 
-def test_the_comparison_gives_the_largest_errors_and_tensions_after_the_first_second(script):
+def test_the_comparison_gives_the_largest_errors_and_tensions_after_the_first_second():
     time = np.array([0.0, 0.9, 1.0, 2.0])
     error = np.deg2rad([[9.0, 9.0], [9.0, 9.0], [0.5, -1.25], [-0.75, 0.5]])
     tension = [[90.0, 90.0], [90.0, 90.0], [1.5, 2.0], [8.5, 3.0]]
@@ -51,7 +41,7 @@ def test_the_comparison_gives_the_largest_errors_and_tensions_after_the_first_se
         {"tracking_error": (("time", "joint"), error), "tendon_tension": (("time", "tendon"), tension)},
         {"time": time, "joint": ["abduction", "other"], "tendon": ["T3", "T9"]},
     )
-    header, *rows = [line.split() for line in script.comparison(result)]
+    header, *rows = [line.split() for line in comparison(result)]
     assert header == ["After", "the", "first", "1", "s", "simulated", "expected"]
     assert rows[0] == ["largest", "error,", "abduction", "(°)", "0.75", "near", "0.5"]
     assert rows[1] == ["largest", "error,", "other", "(°)", "1.25"]
@@ -59,24 +49,23 @@ def test_the_comparison_gives_the_largest_errors_and_tensions_after_the_first_se
     assert rows[3] == ["tension,", "T9", "(N)", "2.0", "to", "3.0"]
 
 
-def test_a_run_shorter_than_a_second_says_that_there_is_nothing_to_compare(script, short):
-    (line,) = script.comparison(short)
+def test_a_run_shorter_than_a_second_says_that_there_is_nothing_to_compare(short):
+    (line,) = comparison(short)
     assert "nothing to compare" in line
 
 
-def test_a_folder_that_cannot_be_made_is_told_in_one_line(script, tmp_path, capsys):
+def test_a_folder_that_cannot_be_made_is_told_in_one_line(tmp_path, capsys):
     blocked = tmp_path / "file"
     blocked.write_text("")
-    assert script.main(["--output", str(blocked)]) == 2
+    assert run("reproduce", ["--output", str(blocked)]) == 1
     error = capsys.readouterr().err
     assert str(blocked) in error and error.count("\n") == 1
 
 
-def test_a_failed_integration_has_its_own_exit_code(script, monkeypatch, tmp_path, capsys):
+def test_a_failed_integration_has_its_own_exit_code(monkeypatch, tmp_path, capsys):
     def simulate(scenario, progress):
         raise IntegrationError(0.5, "step size too small", "a smaller simulation.rtol")
 
-    monkeypatch.setattr(script, "simulate", simulate)
-    monkeypatch.setattr(script, "plot_workspace", lambda finger: script.plot_friction_law())
-    assert script.main(["--output", str(tmp_path)]) == 3
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", simulate)
+    assert run("reproduce", ["--output", str(tmp_path)]) == 3
     assert "0.5 s" in capsys.readouterr().err

@@ -1,18 +1,16 @@
 """The comparison of controllers: its figures from their definitions, and the claim that it makes."""
 
 import csv
-import importlib.util
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import finger_pin as fp
+from finger_pin.commands.application import run
 from finger_pin.studies.comparison import CASES, compare, to_csv
 from finger_pin.views.plots.controllers import plot_controllers
-
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "controllers.py"
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +31,7 @@ def rows(runs, coupling):
 
 def test_every_case_is_a_scenario():
     for overrides in CASES.values():
-        fp.build_controller(fp.load_scenario("fig6", overrides))
+        fp.control.build_controller(fp.load_scenario("fig6", overrides))
 
 
 def test_friction_compensation_cuts_the_error_by_three_at_no_more_than_1_3_times_the_peak_tension(rows):
@@ -83,16 +81,15 @@ def test_the_figure_shows_the_errors_and_the_bars(runs, rows):
 
 @pytest.fixture
 def script(monkeypatch):
-    spec = importlib.util.spec_from_file_location("controllers_script", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     short = {"controller.sampling.period": 1e-3, "simulation.duration": 1.02}
-    monkeypatch.setattr(module, "CASES", {"paper": short, "all friction": {**short, **CASES["all friction"]}})
-    return module
+    monkeypatch.setattr(
+        "finger_pin.studies.comparison.CASES", {"paper": short, "all friction": {**short, **CASES["all friction"]}}
+    )
+    return partial(run, "controllers")
 
 
 def test_the_script_shows_the_table_and_writes_it_with_the_figure(script, tmp_path, capsys):
-    assert script.main(["--output", str(tmp_path / "made")]) == 0
+    assert script(["--output", str(tmp_path / "made")]) == 0
     assert sorted(each.name for each in (tmp_path / "made").iterdir()) == ["controllers.csv", "controllers.png"]
     shown = capsys.readouterr()
     assert "paper" in shown.out and str(tmp_path) in shown.out.replace("\n", "")
@@ -101,12 +98,12 @@ def test_the_script_shows_the_table_and_writes_it_with_the_figure(script, tmp_pa
 
 def test_the_script_says_in_one_line_that_it_cannot_write(script, tmp_path, capsys):
     (tmp_path / "taken").write_text("")
-    assert script.main(["--output", str(tmp_path / "taken")]) == 1
+    assert script(["--output", str(tmp_path / "taken")]) == 1
     assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_the_script_keeps_the_rows_that_it_has_when_interrupted(script, tmp_path, monkeypatch, capsys):
-    whole, done = script.simulate, []
+    whole, done = fp.simulate, []
 
     def second_is_interrupted(scenario, **options):
         done.append(scenario)
@@ -114,7 +111,7 @@ def test_the_script_keeps_the_rows_that_it_has_when_interrupted(script, tmp_path
             raise KeyboardInterrupt
         return whole(scenario, **options)
 
-    monkeypatch.setattr(script, "simulate", second_is_interrupted)
-    assert script.main(["--output", str(tmp_path)]) == 130
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", second_is_interrupted)
+    assert script(["--output", str(tmp_path)]) == 130
     assert len((tmp_path / "controllers.csv").read_text().splitlines()) == 2
     assert "interrupted" in capsys.readouterr().err

@@ -63,7 +63,7 @@ def test_gravity_compensation_holds_a_frictionless_finger_exactly_at_its_referen
     for settings in ({}, {"controller.gravity_compensation": False}):
         scenario = fig6(CONSISTENT, FRICTIONLESS, settings)
         finger = fp.Finger(scenario.finger)
-        controller = fp.build_controller(scenario, finger)
+        controller = fp.control.build_controller(scenario, finger)
         for position in postures(5, 1)[0]:
             command = controller.command(0.0, still(position), position, np.zeros(4)).tension[:4]
             found = finger.evaluate(finger.rest_state(position), command).acceleration
@@ -83,7 +83,7 @@ def test_a_frictionless_finger_settles_on_its_reference_without_a_steady_error()
     scenario = fig6(CONSISTENT, FRICTIONLESS, viscous, still_reference, offset)
 
     class Late:
-        controller = fp.build_controller(scenario)
+        controller = fp.control.build_controller(scenario)
 
         def command(self, time, reference, position, velocity):
             slack = 0.5 if time < 0.1 else 1.0
@@ -97,7 +97,7 @@ def test_a_frictionless_finger_settles_on_its_reference_without_a_steady_error()
 
 def test_damping_is_a_torque_against_the_error_of_velocity():
     scenario = fig6({"controller.damping": [0.1, 0.2, 0.3, 0.4], "controller.gain": 2.0})
-    controller = fp.build_controller(scenario)
+    controller = fp.control.build_controller(scenario)
     reference = ReferenceSignals(np.array([0.1, 0.5, 0.5, 0.3]), np.array([1.0, 0.0, -1.0, 0.5]))
     signals = controller.command(0.0, reference, np.array([0.0, 0.5, 0.6, 0.3]), np.array([0.5, 0.5, -1.0, 1.5]))
     np.testing.assert_allclose(signals.torque, [0.2 + 0.05, -0.1, -0.2, -0.4], rtol=1e-12)
@@ -105,10 +105,10 @@ def test_damping_is_a_torque_against_the_error_of_velocity():
 
 def test_without_any_addition_it_is_the_paper_s_controller_and_with_all_shares_zero_it_says_the_same():
     scenario = fig6()
-    paper = fp.build_controller(scenario)
+    paper = fp.control.build_controller(scenario)
     assert type(paper) is ProportionalController
     shares = {"controller.tendon_friction_feedforward.share": 0.0, "controller.joint_friction_compensation.share": 0.0}
-    nothing = fp.build_controller(fig6(shares))
+    nothing = fp.control.build_controller(fig6(shares))
     position, velocity = postures(20, 2)
     reference = ReferenceSignals(position + 0.03, velocity)
     given, expected = (each.command(0.0, reference, position, velocity) for each in (nothing, paper))
@@ -120,7 +120,7 @@ def test_without_any_addition_it_is_the_paper_s_controller_and_with_all_shares_z
 def test_tendon_feedforward_without_stribeck_and_viscous_parts_is_the_capstan_law_upside_down(sign):
     """f^a = f exp(mu_e phi) when pulling, f exp(-mu_e phi) when releasing; phi of T1 is 1.0 + |theta1|."""
     plain = {"finger.tendon_friction.stiction_ratio": 1.0, "finger.tendon_friction.viscous": 0.0}
-    controller = fp.build_controller(fig6(FEEDFORWARD, SHARP, plain))
+    controller = fp.control.build_controller(fig6(FEEDFORWARD, SHARP, plain))
     position = np.array([0.1, 0.5, 0.6, 0.4])
     velocity = sign * np.array([0.0, 1.0, 0.0, 0.0])
     planned = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
@@ -137,7 +137,7 @@ def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     """The finger's own law (9), integrated at constant velocity until its bristles have settled, is the judge."""
     scenario = fig6(FEEDFORWARD, SHARP)
     finger = fp.Finger(scenario.finger)
-    feedforward = fp.build_controller(scenario, finger).tendons
+    feedforward = fp.control.build_controller(scenario, finger).tendons
     planned = np.array([1.0, 2.5, 3.0, 4.0, 5.0])
     for position, velocity in zip(*postures(4, 3), strict=True):
         command = feedforward.command(planned, position, velocity)
@@ -171,7 +171,7 @@ def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction(
     """On the reference at the desired velocity, with every bristle settled: theta'' = - M^-1 C theta', and p5'' = 0."""
     scenario = fig6(CONSISTENT, FEEDFORWARD, JOINTS, SHARP)
     finger = fp.Finger(scenario.finger)
-    controller = fp.build_controller(scenario, finger)
+    controller = fp.control.build_controller(scenario, finger)
     for position, velocity in zip(*postures(3, 4), strict=True):
         command = controller.command(0.0, ReferenceSignals(position, velocity), position, velocity).tension
         assert command[4] == pytest.approx(WISH, rel=1e-9)
@@ -189,8 +189,8 @@ def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction(
 
 
 def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
-    actual = fp.build_controller(fig6(FEEDFORWARD, JOINTS))
-    believed = fp.build_controller(
+    actual = fp.control.build_controller(fig6(FEEDFORWARD, JOINTS))
+    believed = fp.control.build_controller(
         fig6(
             {"controller.tendon_friction_feedforward.coulomb": 0.2},
             {"controller.joint_friction_compensation.coulomb": [1e-4, 2e-4, 3e-4, 4e-4]},
@@ -205,14 +205,14 @@ def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
 
 def test_the_loop_of_friction_and_tension_closes_up_to_the_critical_coefficient():
     """At 97 % of it, tensions of many times those without friction still satisfy their balance, by (17) by hand."""
-    critical = fp.critical_friction(fp.load_finger("ub")).coefficient
+    critical = fp.analysis.critical_friction(fp.load_finger("ub")).coefficient
     coefficient = 0.97 * critical
     key = "controller.joint_friction_compensation"
     scenario = fig6(
         {f"{key}.coulomb": coefficient, f"{key}.stiction": coefficient, f"{key}.viscous": 0.0},
         {f"{key}.reversal_speed": 1e-4},
     )
-    controller = fp.build_controller(scenario)
+    controller = fp.control.build_controller(scenario)
     position = np.array([0.05, 0.5, 0.6, 0.4])
     worst = 0.0
     for signs in np.array(np.meshgrid(*4 * [[-1.0, 1.0]])).reshape(4, -1).T:
@@ -230,7 +230,7 @@ def test_the_loop_of_friction_and_tension_closes_up_to_the_critical_coefficient(
 def test_compensating_more_joint_friction_than_locks_the_finger_is_refused(entry):
     value = {"stiction": 8e-4, "share": 2.0}[entry]
     with pytest.raises(InputError, match="self-locking") as caught:
-        fp.build_controller(
+        fp.control.build_controller(
             fig6({f"controller.joint_friction_compensation.{entry}": value, "finger.joint_friction.stiction": 4e-4})
         )
     assert caught.value.entry == "controller.joint_friction_compensation"
@@ -253,7 +253,9 @@ def test_commands_do_not_chatter_at_a_reversal_whatever_the_measured_velocity_sa
     2 (2 M^c - |x_end|). f^a = f (1 + x) / (1 - x) varies by at most 2 f / (1 - M^c)^2 times that, b v by its own sweep.
     A law on the measured velocity would switch at every one of its 2000 changes of sign.
     """
-    controller = fp.build_controller(fig6(FEEDFORWARD, {"controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH]}))
+    controller = fp.control.build_controller(
+        fig6(FEEDFORWARD, {"controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH]})
+    )
     position = np.array([0.0, 0.5, 0.5, 0.3])
     sweep = np.linspace(-0.5, 0.5, 2001)[:, None] * np.array([0.0, 1.0, 0.0, 0.0])
     noise = np.random.default_rng(5).normal(0.0, 1.0, sweep.shape)
@@ -280,7 +282,7 @@ def test_commands_of_a_batch_are_those_of_each_row_for_other_fingers_too(finger,
         "[controller.distribution]\nmaximum_tension = 50.0\n"
     )
     scenario = fp.load_scenario(path)
-    controller = fp.build_controller(scenario)
+    controller = fp.control.build_controller(scenario)
     random, size = np.random.default_rng(6), len(scenario.finger.joints)
     position, velocity, error = random.uniform(0.1, 0.4, (3, 7, size))
     batch = controller.command(0.0, ReferenceSignals(position + 0.1 * error, velocity), position, -velocity)
@@ -306,4 +308,4 @@ def test_a_continuous_compensated_controller_is_what_a_finely_sampled_one_conver
 
 def test_the_closed_loop_uses_the_scenario_s_whole_controller():
     loop = ClosedLoop.from_scenario(fig6(FEEDFORWARD))
-    assert isinstance(loop.controller, fp.CompensatedController) and loop.controller.tendons is not None
+    assert isinstance(loop.controller, fp.control.CompensatedController) and loop.controller.tendons is not None

@@ -55,7 +55,7 @@ def test_a_loop_around_a_passive_tendon_needs_one(tmp_path):
 
 def test_an_empty_table_asks_for_a_part_with_its_defaults():
     scenario = fp.load_scenario("fig6", {"controller.tendon_friction_feedforward": {}})
-    controller = fp.build_controller(scenario)
+    controller = fp.control.build_controller(scenario)
     assert controller.tendons is not None and controller.tendons.share == 1.0 and controller.joints is None
 
 
@@ -74,4 +74,4 @@ def test_what_is_not_asked_for_is_not_in_the_controller_nor_in_the_written_scena
 def test_every_part_alone_makes_another_controller_than_the_paper_s(key):
     value = {"damping": [0.0, 0.0, 0.1, 0.0], "gravity_compensation": True, "distribution": {"maximum_tension": 9.0}}
     scenario = fp.load_scenario("fig6", {f"controller.{key}": value.get(key, {})})
-    assert isinstance(fp.build_controller(scenario), fp.CompensatedController)
+    assert isinstance(fp.control.build_controller(scenario), fp.control.CompensatedController)

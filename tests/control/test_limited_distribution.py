@@ -5,6 +5,7 @@ import pytest
 import scipy.optimize
 
 import finger_pin as fp
+from finger_pin.control.limited_distribution import LimitedDistribution
 from finger_pin.description.routing import Routing
 
 
@@ -21,8 +22,8 @@ def torques(count, size, scale, seed):
 
 def test_with_one_internal_direction_and_no_limit_in_the_way_it_is_the_closed_form(routing):
     wanted, minimum = torques(200, 4, 0.05, 1), np.array([1.0, 0.5, 1.0, 2.0, 1.0])
-    limited = fp.LimitedDistribution(routing, np.full(5, 1e4)).plan(wanted, minimum)
-    paper = fp.PseudoInverse.from_routing(routing).plan(wanted, minimum)
+    limited = LimitedDistribution(routing, np.full(5, 1e4)).plan(wanted, minimum)
+    paper = fp.control.PseudoInverse.from_routing(routing).plan(wanted, minimum)
     np.testing.assert_allclose(limited.tension, paper.tension, atol=1e-6)
     np.testing.assert_array_equal(limited.shortfall, 0.0)
 
@@ -31,8 +32,8 @@ def test_with_several_internal_directions_it_needs_the_least_tension_of_all(redu
     """SLSQP on the same programme finds the same tensions; one internal direction alone needs more."""
     minimum, maximum = np.full(5, 0.5), np.full(5, 12.0)
     wanted = torques(25, 2, 0.02, 2)
-    plan = fp.LimitedDistribution(redundant, maximum).plan(wanted, minimum)
-    paper = fp.PseudoInverse.from_routing(redundant).plan(wanted, minimum)
+    plan = LimitedDistribution(redundant, maximum).plan(wanted, minimum)
+    paper = fp.control.PseudoInverse.from_routing(redundant).plan(wanted, minimum)
     matrix = redundant.coupling.T
     for torque, tension in zip(wanted, plan.tension, strict=True):
         found = scipy.optimize.minimize(
@@ -59,7 +60,7 @@ def test_it_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_to
     """Whether there are any is asked of a linear programme."""
     minimum, maximum = np.full(5, 1.0), np.full(5, 6.0)
     wanted = torques(150, 2, 0.03, 3)
-    plan = fp.LimitedDistribution(redundant, maximum).plan(wanted, minimum)
+    plan = LimitedDistribution(redundant, maximum).plan(wanted, minimum)
     matrix, counts = redundant.coupling.T, [0, 0]
     for torque, tension, shortfall in zip(wanted, plan.tension, plan.shortfall, strict=True):
         feasible = scipy.optimize.linprog(
@@ -75,7 +76,7 @@ def test_it_falls_short_exactly_where_no_tensions_within_the_limits_exert_the_to
 def test_where_it_falls_short_it_exerts_the_nearest_torque(redundant):
     """Conditions of optimality: no tension that may still change would bring the torque nearer."""
     minimum, maximum = np.full(5, 1.0), np.array([6.0, 5.0, 4.0, 7.0, 6.0])
-    plan = fp.LimitedDistribution(redundant, maximum).plan(torques(100, 2, 0.2, 4), minimum)
+    plan = LimitedDistribution(redundant, maximum).plan(torques(100, 2, 0.2, 4), minimum)
     short = np.linalg.norm(plan.shortfall, axis=1) > 1e-6
     assert short.sum() > 50
     gain = plan.shortfall[short] @ redundant.coupling.T
@@ -86,13 +87,13 @@ def test_where_it_falls_short_it_exerts_the_nearest_torque(redundant):
 
 def test_a_tendon_whose_limits_coincide_is_held_there(redundant):
     minimum, maximum = np.full(5, 2.0), np.array([2.0, 6.0, 6.0, 6.0, 6.0])
-    plan = fp.LimitedDistribution(redundant, maximum).plan(torques(30, 2, 0.05, 5), minimum)
+    plan = LimitedDistribution(redundant, maximum).plan(torques(30, 2, 0.05, 5), minimum)
     np.testing.assert_allclose(plan.tension[:, 0], 2.0, atol=1e-9)
 
 
 def test_a_plan_depends_on_nothing_but_its_arguments(redundant):
     wanted, minimum = torques(40, 2, 0.05, 6), np.full(5, 1.0)
-    distribution = fp.LimitedDistribution(redundant, np.full(5, 6.0))
+    distribution = LimitedDistribution(redundant, np.full(5, 6.0))
     forth = distribution.plan(wanted, minimum)
     back = distribution.plan(wanted[::-1], minimum)
     np.testing.assert_array_equal(forth.tension, back.tension[::-1])

@@ -12,7 +12,7 @@ LOOP = {"controller.passive_tension_loop.integral": 10.0, "controller.sampling.p
 
 def loop(**settings):
     overrides = {f"controller.passive_tension_loop.{key}": value for key, value in settings.items()}
-    return fp.build_controller(
+    return fp.control.build_controller(
         fp.load_scenario("fig6", {"controller.passive_tension": 5.0, "controller.sampling.period": 0.01} | overrides)
     )
 
@@ -63,7 +63,7 @@ def test_the_wish_and_its_correction_are_what_is_planned_for_the_passive_tendon(
 
 
 def test_the_minimum_of_the_other_tendons_is_kept_where_the_wish_is_less():
-    controller = fp.build_controller(fp.load_scenario("fig6", LOOP | {"controller.passive_tension": 0.5}))
+    controller = fp.control.build_controller(fp.load_scenario("fig6", LOOP | {"controller.passive_tension": 0.5}))
     for _ in range(100):
         controller.sense(measured(3.0), 0.1)
     assert planned(controller).min() == pytest.approx(1.0, rel=1e-12)
@@ -86,7 +86,7 @@ def test_it_serves_a_loop_of_one_s_own():
     scenario = fp.load_scenario("fig6", LOOP | {"controller.passive_tension": 4.0})
     finger = fp.Finger(scenario.finger)
     reference = ReferenceSignals(np.array([0.0, 0.5, 0.6, (3.5e-3 * 0.6 - 4.0 / 5e4) / 5e-3]), np.zeros(4))
-    controller = fp.build_controller(scenario, finger)
+    controller = fp.control.build_controller(scenario, finger)
     sim = fp.Simulator(finger, reference.position)
     state = sim.state
     for step in range(1000):

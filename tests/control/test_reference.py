@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
+from finger_pin.control.signal import Signal
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
@@ -14,12 +15,13 @@ from finger_pin.exceptions import InputError
 
 @pytest.fixture(scope="module")
 def fig6(routing):
-    return HarmonicReference.from_scenario(fp.load_scenario("fig6"), routing)
+    return SignalReference.from_scenario(fp.load_scenario("fig6"), routing)
 
 
 def sinusoids(coupling, size, seed=12):
     draw = np.random.default_rng(seed)
-    return HarmonicReference(*draw.uniform(0.1, 1.0, (4, size)), coupling)
+    signal = Signal(draw.uniform(0.1, 1.0, (4, size)).T, np.array([0.0, 1.0]), np.zeros((6, 1, size)))
+    return SignalReference(signal, coupling)
 
 
 @pytest.mark.parametrize("time", [0.0, 0.25, 0.5, 1.0, 2.0, 2.75, 7.9])
@@ -34,7 +36,7 @@ def test_fig6_is_the_motion_of_the_model_page(fig6, time):
 
 def test_stick_slip_is_the_motion_of_the_model_page():
     scenario = fp.load_scenario("stick_slip")
-    reference = HarmonicReference.from_scenario(scenario, Routing.from_description(scenario.finger))
+    reference = SignalReference.from_scenario(scenario, Routing.from_description(scenario.finger))
     for time in (0.0, 0.3, 1.0, 1.7):
         bend = 0.5 - 0.4 * math.cos(math.pi * time)
         expected = [0.1 * math.sin(math.pi * time), bend, bend, bend - 3.0 / (3e4 * 4.5e-3)]
@@ -43,7 +45,7 @@ def test_stick_slip_is_the_motion_of_the_model_page():
 
 @pytest.mark.parametrize("desired", [0.0, 1.0, 2.5])
 def test_at_the_reference_the_passive_tendon_carries_its_desired_tension(desired, routing):
-    reference = HarmonicReference.from_scenario(
+    reference = SignalReference.from_scenario(
         fp.load_scenario("fig6", {"controller.passive_tension": desired}), routing
     )
     theta = reference.at(np.linspace(0.0, 8.0, 50)).position
@@ -82,9 +84,8 @@ def test_followers_may_follow_followers_whichever_is_written_first(network, orde
     assert sorted(coupling.followers) == [1, 2]
     reference = sinusoids(coupling, 3)
     a, b, c = reference.at(0.7).position
-    own = reference.offset[0] + reference.amplitude[0] * math.sin(
-        2.0 * math.pi * reference.frequency[0] * 0.7 + reference.phase[0]
-    )
+    offset, amplitude, frequency, phase = reference.signal.harmonics[0]
+    own = offset + amplitude * math.sin(2.0 * math.pi * frequency * 0.7 + phase)
     assert a == pytest.approx(own, rel=1e-14)
     assert b == pytest.approx((3e-3 * a - 2.0 / 1e4) / 4e-3, rel=1e-12)
     assert c == pytest.approx((2e-3 * b - 3.0 / 4e4) / 3e-3, rel=1e-12)
@@ -121,6 +122,6 @@ def test_two_passive_tendons_on_one_follower_are_refused_by_name(network):
 
 def test_a_joint_without_reference_is_held_at_zero(routing):
     scenario = fp.Scenario.model_validate(fp.load_scenario("fig6").model_dump() | {"reference": {"joints": {}}})
-    theta = HarmonicReference.from_scenario(scenario, routing).at(np.array([0.0, 1.0])).position
+    theta = SignalReference.from_scenario(scenario, routing).at(np.array([0.0, 1.0])).position
     np.testing.assert_array_equal(theta[:, :3], 0.0)
     np.testing.assert_allclose(theta[:, 3], -1.0 / (5e4 * 5.0e-3), rtol=1e-12)

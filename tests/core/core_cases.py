@@ -6,6 +6,7 @@ from typing import Any
 import kernels
 import numpy as np
 import pinocchio as pin
+from finger_pin.core.plant import build_work
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -101,10 +102,10 @@ def lugre():
     """`two_passive` with micro-damping and Stribeck exponents of its own for every tendon and joint."""
     table = two_passive().model_dump()
     table["finger"]["tendon_friction"] |= {
-        "micro_damping": [3.0, 0.0, 1.0, 5.0, 0.5, 2.0],
+        "micro_damping": [2.0, 0.0, 1.0, 1.5, 0.5, 2.0],
         "stribeck_exponent": [2, 1, 2, 1, 2, 1],
     }
-    table["finger"]["joint_friction"] |= {"micro_damping": [2e-3, 1e-3, 0.0, 3e-3], "stribeck_exponent": [1, 2, 2, 1]}
+    table["finger"]["joint_friction"] |= {"micro_damping": [2e-3, 1e-3, 0.0, 2.5e-3], "stribeck_exponent": [1, 2, 2, 1]}
     return fp.Scenario.model_validate(table)
 
 

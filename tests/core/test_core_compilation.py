@@ -1,6 +1,7 @@
 """The compiler's cache: where it is, when it is thrown away, and that nothing is compiled before it is needed."""
 
 import importlib
+import logging
 import os
 import shutil
 import subprocess
@@ -8,6 +9,7 @@ import sys
 from pathlib import Path
 from types import FunctionType
 
+import numba
 import pytest
 from law_cases import every_law
 
@@ -116,3 +118,63 @@ def test_importing_the_package_compiles_nothing_and_opens_no_cache_file(tmp_path
     )
     assert done.stdout.split() == ["0"]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def doubled():
+    """Return a function of the package, so to say, that is compiled on first use."""
+
+    def double(number):
+        return 2.0 * number
+
+    double.__module__ = "finger_pin.core.double"
+    return compilation.entry(double)
+
+
+@pytest.fixture
+def said(caplog):
+    # A command that was run without a terminal has silenced it.
+    caplog.set_level(logging.WARNING, logger="finger_pin")
+    compilation._say.cache_clear()
+    yield lambda: [record.getMessage() for record in caplog.records]
+    compilation._say.cache_clear()
+
+
+def test_the_first_compilation_is_announced_once(said, monkeypatch):
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", "somewhere")
+    double = doubled()
+    assert said() == []
+    double(1.0)
+    double(1)
+    assert said() == ["Compiling the model, once for this version: about half a minute ..."]
+
+
+def test_where_nothing_can_be_cached_it_is_said_once_that_every_run_compiles(said, monkeypatch):
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", None)
+    monkeypatch.setenv("FINGER_PIN_CACHE_DIR", "/proc/nowhere")
+    doubled()(1.0)
+    doubled()(1.0)
+    (line,) = said()
+    assert "in every run, as /proc/nowhere cannot be written" in line and "FINGER_PIN_CACHE_DIR" in line
+
+
+def test_a_cache_on_a_full_disk_is_named_and_costs_nothing_else(said, monkeypatch, tmp_path):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", str(tmp_path))
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._open_for_write", full)
+    assert doubled()(21.0) == 42.0
+    (told,) = said()[1:]
+    assert told.startswith(f"the compile cache {tmp_path} cannot be written: No space left on device; ")
+
+
+def test_code_that_is_not_of_the_package_is_compiled_without_a_word(said, monkeypatch):
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", "somewhere")
+    numba.njit(lambda number: number)(1.0)
+    assert said() == []
+
+
+def test_python_says_on_standard_error_that_it_compiles():
+    code = "from finger_pin.core import compilation; compilation._say('Compiling'); compilation._say('Compiling')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "Compiling\n"

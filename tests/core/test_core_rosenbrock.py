@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from core_cases import Case
 from test_core_linearisation import pieces
-from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
+from finger_pin.commands.validation.order import END, mean_order, smooth_motion, step_errors
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import _Recorder

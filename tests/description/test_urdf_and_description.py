@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 
+from finger_pin.commands.validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 from finger_pin.description.loading import list_fingers, load_finger
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.shapes import MATERIALS
@@ -85,6 +85,43 @@ def test_a_twist_of_the_last_link_turns_the_fingertip_frame_and_does_not_move_it
     pose = robot.get_transform("fingertip", "base")
     np.testing.assert_allclose(pose[:3, 3], [0.077, 0.0, 0.0], rtol=0, atol=1e-15)
     np.testing.assert_allclose(pose[1:3, 1], [np.cos(0.5), np.sin(0.5)], rtol=0, atol=1e-15)
+
+
+def denavit_hartenberg(angle, link):
+    """Rz(theta) Tz(d) Tx(a) Rx(alpha), written out."""
+    c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(link.twist), np.sin(link.twist)
+    return np.array(
+        [
+            [c, -s * ca, s * sa, link.length * c],
+            [s, c * ca, -c * sa, link.length * s],
+            [0.0, sa, ca, link.offset],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def test_joint_offsets_place_the_fingertip_where_the_denavit_hartenberg_table_does():
+    offsets = {
+        f"finger.joints.{name}.link.offset": d for name, d in zip(JOINTS, (4e-3, -7e-3, 2e-3, 9e-3), strict=True)
+    }
+    finger = load_finger("ub", offsets | {"finger.joints.medial.link.twist": 0.6})
+    body, robot = build_rigid_body(finger), read_by_yourdfpy(to_urdf(finger))
+    for q in np.random.default_rng(6).uniform(-2.0, 2.0, (10, 4)):
+        frame = np.eye(4)
+        for angle, link in zip(q, links_of(finger), strict=True):
+            frame = frame @ denavit_hartenberg(angle, link)
+        np.testing.assert_allclose(body.tip_position(q), frame[:3, 3], atol=1e-15)
+        robot.update_cfg(q)
+        np.testing.assert_allclose(robot.get_transform("fingertip", "base"), frame, atol=1e-14)
+
+
+def test_a_link_with_an_offset_has_its_mass_and_its_shape_there():
+    finger = load_finger("ub", {"finger.joints.medial.link.offset": 7e-3})
+    urdf = to_urdf(finger)
+    model, robot = build_rigid_body(finger).model, read_by_yourdfpy(urdf)
+    np.testing.assert_allclose(model.inertias[3].lever, [0.5 * 0.0299, 0.0, 7e-3], rtol=1e-12)
+    shell = next(each for each in robot.robot.links if each.name == "medial_link").visuals[0]
+    assert shell.origin[2, 3] == 7e-3
 
 
 def test_masses_centres_and_inertias_survive_the_round_trip_in_pinocchio(finger):

@@ -12,6 +12,8 @@ OPTIONS = {
     "finger.tendon_friction.micro_damping": [3.0, 0.0, 1.0, 5.0, 0.5],
     "finger.joint_friction.micro_damping": [2e-3, 1e-3, 0.0, 3e-3],
 }
+# Far beyond what viscous friction covers, to see the options.
+pytestmark = pytest.mark.filterwarnings("ignore::finger_pin.exceptions.MicroDampingWarning")
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from validation import mujoco_motion
 
 import finger_pin as fp
+from finger_pin.commands.validation import mujoco_motion
 from finger_pin.description.loading import list_fingers
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mjcf import to_mjcf
@@ -18,10 +18,15 @@ from finger_pin.mechanism.urdf import to_urdf
 mujoco = pytest.importorskip("mujoco")
 
 TWO_PASSIVE = {
-    "finger.tendons.T6": {
-        "kind": "passive",
-        "mass_after": 0,
-        "crossings": {"abduction": {"radius": 0.004}, "distal": {"radius": -0.006}},
+    "finger": {
+        "base": "ub",
+        "tendons": {
+            "T6": {
+                "kind": "passive",
+                "mass_after": 0,
+                "crossings": {"abduction": {"radius": 0.004}, "distal": {"radius": -0.006}},
+            }
+        },
     },
     "finger.passive_tendon.mass": [1e-5, 3e-4],
     "finger.passive_tendon.stiffness": [5e4, 2e4],
@@ -223,3 +228,13 @@ def test_a_joint_without_a_link_is_an_error_that_names_it():
 def test_the_export_needs_no_mujoco():
     code = "import sys; import finger_pin.mechanism.mjcf; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_joint_offset_puts_mujoco_s_fingertip_and_mass_where_the_urdf_has_them():
+    offsets = {"finger.joints.proximal.link.offset": 6e-3, "finger.joints.distal.link.offset": -4e-3}
+    finger = fp.Finger(fp.load_finger("ub", offsets))
+    model = load(to_mjcf(finger.description))
+    q = np.array([0.1, 0.4, 0.7, 0.3])
+    data = forward(model, np.append(q, 0.0), np.zeros(5), np.zeros(4))
+    np.testing.assert_allclose(data.site("fingertip").xpos, finger.rigid_body.tip_position(q), atol=1e-12)
+    np.testing.assert_allclose(data.qfrc_bias[:4], finger.rigid_body.gravity_torque(q), atol=1e-12)

@@ -404,3 +404,15 @@ def test_an_observer_sees_rising_times_and_the_signals_of_the_dynamics_and_chang
     signals = seen[-1][1].finger
     np.testing.assert_allclose(signals.state.position, observed.joint_position[-1], rtol=1e-12)
     np.testing.assert_allclose(signals.joints.reaction, observed.joint_reaction[-1], rtol=1e-9)
+
+
+def test_names_and_paths_will_do_for_a_scenario_and_a_finger(tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text('extends = "fig6"\n[simulation]\nduration = 0.002\n', encoding="utf-8")
+    expected = fp.simulate(fp.load_scenario(path))
+    assert fp.simulate(path).equals(expected) and fp.simulate(str(path)).equals(expected)
+    with pytest.raises(fp.InputError, match="did you mean fig6"):
+        fp.simulate("fgi6")
+    assert fp.Finger("ub").description == fp.load_finger("ub")
+    with pytest.raises(fp.InputError, match="no such finger"):
+        fp.Finger("no_such_hand")

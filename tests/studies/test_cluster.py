@@ -42,13 +42,13 @@ def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_loca
     over = {"controller.gain": GAINS}
     away = fp.sweep(
         "fig6", over, metrics=METRICS, overrides=SHORT, output=tmp_path,
-        executor=fp.DaskCluster(cluster.scheduler_address), progress=kill,
+        executor=fp.studies.DaskCluster(cluster.scheduler_address), progress=kill,
     )  # fmt: skip
     assert seen == [victim]
     keys = [json.loads(line)["key"] for line in (tmp_path / "runs.jsonl").read_text().splitlines()]
     assert len(keys) == len(set(keys)) == len(GAINS)
     assert set(away["status"].values) == {"done"}
-    here = fp.sweep("fig6", over, metrics=METRICS, overrides=SHORT, executor=fp.LocalProcesses(2))
+    here = fp.sweep("fig6", over, metrics=METRICS, overrides=SHORT, executor=fp.studies.LocalProcesses(2))
     assert away.identical(here)
 
 
@@ -57,7 +57,7 @@ def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster):
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
     result = fp.sweep(
         "fig6", {"controller.gain": [1.0, 2.0]}, metrics=[DIES], overrides=SHORT,
-        executor=fp.DaskCluster(cluster.scheduler_address),
+        executor=fp.studies.DaskCluster(cluster.scheduler_address),
     )  # fmt: skip
     assert result["status"].values[1] == "failed"
     assert "died" in str(result["reason"].values[1])
@@ -67,7 +67,7 @@ def test_a_stop_ends_a_sweep_on_a_cluster(cluster):
     done = []
     result = fp.sweep(
         "fig6", {"controller.gain": GAINS}, metrics=[SLOW], overrides=SHORT,
-        executor=fp.DaskCluster(cluster.scheduler_address), progress=lambda *numbers: done.append(numbers[0]),
+        executor=fp.studies.DaskCluster(cluster.scheduler_address), progress=lambda *numbers: done.append(numbers[0]),
         stop=lambda: bool(done) and done[-1] >= 2,
     )  # fmt: skip
     assert (result["status"] == "missing").any()
@@ -85,18 +85,20 @@ def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
     ) as own:
-        executor = fp.DaskCluster(own.scheduler_address)
+        executor = fp.studies.DaskCluster(own.scheduler_address)
         with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
             fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=executor, progress=leave)
     assert len((folder / "runs.jsonl").read_text().splitlines()) == 2
-    again = fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=fp.LocalProcesses(2))
+    again = fp.sweep(
+        "fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=fp.studies.LocalProcesses(2)
+    )
     np.testing.assert_array_equal(again["slow_gain"], GAINS)
 
 
-def test_workers_of_another_version_are_refused(cluster, monkeypatch):
-    monkeypatch.setattr("finger_pin.studies.runs.version", lambda: "0.0.0")
-    executor = fp.DaskCluster(cluster.scheduler_address)
-    with pytest.raises(ClusterError, match=r"a worker has finger_pin \d.*, not 0\.0\.0"):
+def test_workers_of_another_source_are_refused(cluster, monkeypatch):
+    monkeypatch.setattr("finger_pin.studies.runs.source_digest", lambda: "another")
+    executor = fp.studies.DaskCluster(cluster.scheduler_address)
+    with pytest.raises(ClusterError, match=r"a worker has another finger_pin \(\d.*\), not that of source another"):
         fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
 
 
@@ -112,7 +114,7 @@ def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, caps
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path):
     for address in ("tcp://127.0.0.1:9", "nonsense://x", "not an address"):
         with pytest.raises(InputError, match="scheduler") as caught:
-            executor = fp.DaskCluster(address, timeout=0.3)
+            executor = fp.studies.DaskCluster(address, timeout=0.3)
             fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path / "o", executor=executor)
         assert str(caught.value).isprintable()
     assert not (tmp_path / "o").exists()

@@ -8,20 +8,22 @@ from finger_pin.studies.spelling import parse_range, parse_values
 
 
 def test_a_grid_is_every_combination_with_the_last_key_fastest():
-    grid = fp.Grid({"a": [1.0, 2.0], "b": [5.0, 6.0, 7.0]})
+    grid = fp.studies.Grid({"a": [1.0, 2.0], "b": [5.0, 6.0, 7.0]})
     assert grid.dims == ("a", "b")
     assert grid.points() == [{"a": a, "b": b} for a in (1.0, 2.0) for b in (5.0, 6.0, 7.0)]
 
 
 def test_a_list_takes_the_values_of_all_keys_together():
-    listing = fp.Listing({"a": [1.0, 2.0], "b": [5.0, 6.0]})
+    listing = fp.studies.Listing({"a": [1.0, 2.0], "b": [5.0, 6.0]})
     assert listing.dims == ("sample",)
     assert listing.points() == [{"a": 1.0, "b": 5.0}, {"a": 2.0, "b": 6.0}]
 
 
 def test_a_latin_hypercube_has_one_point_in_every_slice_of_every_range():
     size = 23
-    cube = fp.LatinHypercube({"a": fp.Range(-2.0, 3.0), "b": fp.Range(1e-3, 10.0, logarithmic=True)}, size, seed=4)
+    cube = fp.studies.LatinHypercube(
+        {"a": fp.studies.Range(-2.0, 3.0), "b": fp.studies.Range(1e-3, 10.0, logarithmic=True)}, size, seed=4
+    )
     values = cube.values
     linear = np.floor((np.array(values["a"]) + 2.0) / 5.0 * size)
     decades = np.floor((np.log10(values["b"]) + 3.0) / 4.0 * size)
@@ -29,9 +31,9 @@ def test_a_latin_hypercube_has_one_point_in_every_slice_of_every_range():
 
 
 def test_a_seed_gives_the_same_points_again_and_another_one_others():
-    ranges = {"a": fp.Range(0.0, 1.0)}
-    assert fp.LatinHypercube(ranges, 5, 1).points() == fp.LatinHypercube(ranges, 5, 1).points()
-    assert fp.LatinHypercube(ranges, 5, 1).points() != fp.LatinHypercube(ranges, 5, 2).points()
+    ranges = {"a": fp.studies.Range(0.0, 1.0)}
+    assert fp.studies.LatinHypercube(ranges, 5, 1).points() == fp.studies.LatinHypercube(ranges, 5, 1).points()
+    assert fp.studies.LatinHypercube(ranges, 5, 1).points() != fp.studies.LatinHypercube(ranges, 5, 2).points()
 
 
 @pytest.mark.parametrize(
@@ -43,22 +45,25 @@ def test_a_seed_gives_the_same_points_again_and_another_one_others():
         ("a.b=1,-2.5,1e-3", (1.0, -2.5, 0.001)),
         ("a.b=7", (7.0,)),
         ("a.b=2:9:1", (2.0,)),
+        ("a.b=Rodas4, Rodas5P", ("Rodas4", "Rodas5P")),
+        ("a.b=true,false", (True, False)),
+        ("a.b=mine.toml,ub", ("mine.toml", "ub")),
     ],
 )
 def test_values_are_spelt_as_steps_or_as_a_list(text, values):
     key, found = parse_values(text)
     assert key == "a.b"
-    assert found == pytest.approx(values)
+    assert found == (values if isinstance(values[0], str) else pytest.approx(values))
 
 
 def test_a_range_is_spelt_by_its_ends():
-    assert parse_range("a[2]=-1:2") == ("a[2]", fp.Range(-1.0, 2.0))
-    assert parse_range("a=0.1:2:log") == ("a", fp.Range(0.1, 2.0, logarithmic=True))
+    assert parse_range("a[2]=-1:2") == ("a[2]", fp.studies.Range(-1.0, 2.0))
+    assert parse_range("a=0.1:2:log") == ("a", fp.studies.Range(0.1, 2.0, logarithmic=True))
 
 
 @pytest.mark.parametrize(
     "text",
-    ["a", "a=", "=1,2", "a=1:2", "a=1:2:0", "a=1:2:x", "a=1:2:3:4", "a=1,,2", "a=nan", "a=1:inf:3", "a=x,y",
+    ["a", "a=", "=1,2", "a=1:2", "a=1:2:0", "a=1:2:x", "a=1:2:3:4", "a=1,,2", "a=nan", "a=1:inf:3", "a=1,y",
      "a=-1:2:3:log", "a=1:2:99999999999999999999", "a=1:2:2.5"],
 )  # fmt: skip
 def test_wrong_values_are_told_in_one_line(text):
@@ -77,17 +82,21 @@ def test_wrong_ranges_are_told_in_one_line(text):
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: fp.Grid({}),
-        lambda: fp.Grid({"a": []}),
-        lambda: fp.Grid({"a": [1.0, 1.0]}),
-        lambda: fp.Grid({"a": [float("nan")]}),
-        lambda: fp.Grid({"a[x]": [1.0]}),
-        lambda: fp.Grid({"a": range(1001), "b": range(1001)}),
-        lambda: fp.Listing({"a": [1.0], "b": [1.0, 2.0]}),
-        lambda: fp.LatinHypercube({}, 3),
-        lambda: fp.LatinHypercube({"a": fp.Range(0.0, 1.0)}, 0),
-        lambda: fp.LatinHypercube({"a": fp.Range(0.0, 1.0)}, 3, -1),
-        lambda: fp.LatinHypercube({"a": fp.Range(1.0, 0.0)}, 3),
+        lambda: fp.studies.Grid({}),
+        lambda: fp.studies.Grid({"a": []}),
+        lambda: fp.studies.Grid({"a": [1.0, 1.0]}),
+        lambda: fp.studies.Grid({"a": [float("nan")]}),
+        lambda: fp.studies.Grid({"a[x]": [1.0]}),
+        lambda: fp.studies.Grid({"a": ["x", "x"]}),
+        lambda: fp.studies.Grid({"a": ["x", 1.0]}),
+        lambda: fp.studies.Grid({"a": [None, None]}),
+        lambda: fp.studies.Grid({"a": [[1.0], [2.0]]}),
+        lambda: fp.studies.Grid({"a": range(1001), "b": range(1001)}),
+        lambda: fp.studies.Listing({"a": [1.0], "b": [1.0, 2.0]}),
+        lambda: fp.studies.LatinHypercube({}, 3),
+        lambda: fp.studies.LatinHypercube({"a": fp.studies.Range(0.0, 1.0)}, 0),
+        lambda: fp.studies.LatinHypercube({"a": fp.studies.Range(0.0, 1.0)}, 3, -1),
+        lambda: fp.studies.LatinHypercube({"a": fp.studies.Range(1.0, 0.0)}, 3),
     ],
 )
 def test_designs_that_are_none_are_refused(make):

@@ -69,10 +69,37 @@ def test_a_key_that_holds_no_number_is_told_in_one_line(fig6, key, says):
     assert str(caught.value).isprintable()
 
 
-def test_a_key_is_right_if_any_of_its_values_is(fig6):
-    fig6.check(RADIUS, [-0.005, 0.0063])
-    with pytest.raises(fp.InputError):
-        fig6.check(RADIUS, [-0.005, -0.006])
+def test_a_key_is_right_if_any_of_its_values_is_or_may_be_with_other_keys(fig6):
+    fig6.check("controller.gain", [-1.0, 1.0])
+    with pytest.raises(fp.InputError, match=r"controller\.gain"):
+        fig6.check("controller.gain", [-1.0, -2.0])
+    # Neither has force closure, but other radii may give it.
+    fig6.check(RADIUS, [-0.005, -0.006])
+    with pytest.raises(fp.InputError, match=f"{RADIUS}: no value of it can be simulated: .*force closure"):
+        fig6.check(RADIUS, [-0.005, -0.006], alone=True)
+
+
+def test_a_key_may_hold_a_name_or_a_whole_table_that_a_name_stands_for(fig6):
+    fig6.check("simulation.method", ["Rodas4", "Rodas5P"])
+    assert fig6.at({"simulation.method": "Rodas4"}).simulation.method == "Rodas4"
+    fig6.check("finger", ["ub", "dexmart_index"])
+    assert fig6.at({"finger": "dexmart_index"}).finger == fp.load_finger("dexmart_index")
+    fig6.check("controller.gravity_compensation", [True, False])
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "says"),
+    [
+        ("simulation.method", ["Rodas6"], "did you mean Rodas"),
+        ("simulation.methd", ["Rodas4"], "did you mean simulation.method"),
+        ("finger.tendons.T9.kind", ["passive"], "did you mean finger.tendons.T"),
+        ("controller.gain", ["much", "little"], "number"),
+        ("finger", ["bu"], "there are dexmart_index, planar, ub"),
+    ],
+)
+def test_a_name_that_a_key_cannot_hold_is_told_in_one_line(fig6, key, values, says):
+    with pytest.raises(fp.InputError, match=says):
+        fig6.check(key, values)
 
 
 def test_a_reference_that_a_scenario_leaves_out_is_a_key():

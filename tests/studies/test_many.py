@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import time
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.exceptions import IntegrationError
+from finger_pin.exceptions import IntegrationError, StudyError
 from finger_pin.studies import many
 
 SHORT = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
@@ -29,6 +33,52 @@ def test_runs_in_processes_are_bit_by_bit_the_runs_one_by_one() -> None:
             np.testing.assert_array_equal(stacked[name].values[index], alone[name].values, err_msg=str(name))
         assert stacked.scenario.values[index] == fp.to_toml(run)
     assert set(stacked.failure.values) == {""}
+
+
+def test_a_killed_process_costs_no_run() -> None:
+    runs = scenarios(*np.linspace(0.8, 1.2, 40))
+    killed: list[int | None] = []
+
+    def kill(done: int, total: int) -> None:
+        while done == 2 and not multiprocessing.active_children():
+            time.sleep(0.01)
+        if done in (2, 20):
+            victim = multiprocessing.active_children()[0]
+            victim.kill()
+            killed.append(victim.pid)
+
+    stacked = fp.simulate_many(runs, workers=2, variables=["tracking_error"], progress=kill)
+    assert len(set(killed)) == 2
+    assert set(stacked.failure.values) == {""}
+    for index in (0, 20, 39):
+        alone = fp.simulate(runs[index])
+        np.testing.assert_array_equal(stacked.tracking_error.values[index], alone.tracking_error.values)
+
+
+def test_a_run_whose_process_dies_every_time_is_nan_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def do(self: object, function: Callable[[fp.Scenario], object], items: list, stop: object, helping: bool) -> object:
+        yield 1, many.Lost("planted")
+        yield 0, function(items[0])
+
+    monkeypatch.setattr(many.Pool, "do", do)
+    stacked = fp.simulate_many(scenarios(1.0, 2.0), workers=2)
+    assert list(stacked.failure.values) == ["", "planted"]
+    assert np.isfinite(stacked.joint_position.values[0]).all()
+    assert np.isnan(stacked.joint_position.values[1]).all()
+    assert np.isnan(stacked.end_time.values[1])
+    assert [fp.to_toml(run) for run in scenarios(1.0, 2.0)] == list(stacked.scenario.values)
+
+
+def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = many.simulate
+
+    def failing(scenario: fp.Scenario) -> None:
+        raise IntegrationError(0.02, "planted", "nothing", real(scenario).isel(time=slice(0, 5)))
+
+    monkeypatch.setattr(many, "simulate", failing)
+    with pytest.raises(StudyError, match=r"every run failed; the first one: .*planted") as caught:
+        fp.simulate_many(scenarios(1.0, 2.0), workers=1)
+    assert np.isfinite(caught.value.result.joint_position.values[:, :5]).all()
 
 
 def test_only_the_chosen_variables_are_kept() -> None:

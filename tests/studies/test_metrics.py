@@ -56,7 +56,7 @@ def test_slack_time_counts_from_half_an_interval_before_to_half_after(made):
 def test_losses_are_what_was_supplied_and_not_stored():
     run = Run(fp.load_scenario("fig6", {"simulation.duration": 0.1}))
     result = run.result
-    stored = ("kinetic", "gravity", "passive_tendon", "limiter", "tendon_bristles", "joint_bristles")
+    stored = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
     gain = sum(float(result[f"energy_{name}"][-1] - result[f"energy_{name}"][0]) for name in stored)
     supplied = float(result["energy_exchanged_actuators"][-1])
     assert METRICS["losses"].measure(run) == pytest.approx(supplied - gain, rel=1e-4)

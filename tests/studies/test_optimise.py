@@ -8,14 +8,15 @@ import pytest
 from planted import CHEAP, DEAR, GAIN, RAISES
 
 import finger_pin as fp
+from finger_pin.exceptions import StudyError
 from finger_pin.studies import radii
-from finger_pin.studies.goals import Constraint, Goals, parse_constraint
+from finger_pin.studies.problem import Constraint, Goals, parse_constraint, parse_variable, point_at
 from finger_pin.studies.search import Search, nondominated
-from finger_pin.studies.variables import parse_variable, point_at
 
 SHORT = {"simulation.duration": 0.02}
-TWO = fp.LocalProcesses(2)
-FEW = fp.Effort(population=8, generations=3)
+TWO = fp.studies.LocalProcesses(2)
+FEW = fp.studies.Effort(population=8, generations=3)
+RADII = {"T3": (-0.008, -0.006), "T4": (0.006, 0.008)}
 ABDUCTION = "finger.tendons.{}.crossings.abduction.radius"
 
 
@@ -159,8 +160,28 @@ def test_designs_that_cannot_be_run_do_not_count_and_are_recorded_with_their_rea
     assert result["feasible"].values[~negative].all()
 
 
+def test_radii_that_have_force_closure_only_together_are_searched():
+    # With its sign turned, either leaves the other tendons slack; with both turned, T3 pulls against T4 again.
+    over = {f"finger.tendons.{name}.crossings.medial.radius": ends for name, ends in RADII.items()}
+    for key, (low, high) in over.items():
+        for radius in (low, 0.5 * (low + high), high):
+            with pytest.raises(fp.InputError, match="force closure"):
+                fp.load_scenario("fig6", {key: radius})
+    result = fp.optimise(
+        "fig6", [f"{key}={low}:{high}" for key, (low, high) in over.items()], minimise=["self_locking_margin"],
+        constraints=[], effort=FEW, overrides=SHORT, executor=TWO,
+    )  # fmt: skip
+    assert result["feasible"].all()
+
+
+def test_a_search_whose_designs_all_fail_is_an_error_that_holds_their_reasons():
+    with pytest.raises(StudyError, match="every run failed; the first one: TypeError") as caught:
+        search_gain(minimise=[fp.studies.Metric("none", "1", "none", lambda run: None)])
+    assert not caught.value.result["feasible"].any()
+
+
 def test_what_is_best_is_found_though_some_designs_raise():
-    result = search_gain(minimise=[], maximise=[GAIN, RAISES], effort=fp.Effort(population=8, generations=8))
+    result = search_gain(minimise=[], maximise=[GAIN, RAISES], effort=fp.studies.Effort(population=8, generations=8))
     assert result["controller.gain"].values[result["front"].values == 1] > 1.9
 
 
@@ -211,4 +232,4 @@ def test_wrong_input_writes_nothing(tmp_path, over, options):
 @pytest.mark.parametrize("numbers", [{"population": 3}, {"generations": 0}, {"seed": -1}])
 def test_an_effort_that_is_none_is_refused(numbers):
     with pytest.raises(fp.InputError):
-        fp.Effort(**numbers)
+        fp.studies.Effort(**numbers)

@@ -6,9 +6,8 @@ import os
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.folder import StudyFolder
+from finger_pin.studies.folder import Store, StudyFolder
 from finger_pin.studies.runs import Record
-from finger_pin.studies.store import Store
 
 
 def record(key, value=1.0):

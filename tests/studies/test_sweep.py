@@ -1,17 +1,20 @@
 """Sweeps in local processes: the Dataset, failures with their reasons, dead processes, and going on."""
 
+import importlib
 import json
+import sys
 
 import numpy as np
 import pytest
 from planted import DIES, DIES_ONCE, GAIN, RAISES, SLOW, STOPS, THREADS
 
 import finger_pin as fp
+from finger_pin.exceptions import StudyError
 from finger_pin.studies.metrics import METRICS, Run
 
 RADIUS = "finger.tendons.T3.crossings.medial.radius"
 SHORT = {"simulation.duration": 0.02}
-TWO = fp.LocalProcesses(2)
+TWO = fp.studies.LocalProcesses(2)
 
 
 def lines(folder):
@@ -81,7 +84,7 @@ def test_the_same_again_repeats_no_run(grid):
     before = (folder / "runs.jsonl").read_bytes()
     seen = []
     again = fp.sweep(
-        "fig6", fp.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
+        "fig6", fp.studies.Grid({"controller.gain": (0.5, 1.0, 2.0), RADIUS: (-0.005, 0.0063)}),
         metrics=["tracking_rms", "tension_peak"], overrides=SHORT, output=folder, executor=TWO,
         progress=lambda *numbers: seen.append(numbers),
     )  # fmt: skip
@@ -91,8 +94,8 @@ def test_the_same_again_repeats_no_run(grid):
 
 
 def test_samples_have_every_key_as_a_coordinate():
-    cube = fp.LatinHypercube(
-        {"controller.gain": fp.Range(0.5, 2.0), "environment.fingertip_force[2]": fp.Range(0, 1)}, 3
+    cube = fp.studies.LatinHypercube(
+        {"controller.gain": fp.studies.Range(0.5, 2.0), "environment.fingertip_force[2]": fp.studies.Range(0, 1)}, 3
     )
     result = fp.sweep("fig6", cube, metrics=[GAIN], overrides=SHORT, executor=TWO)
     assert result["gain"].dims == ("sample",)
@@ -130,6 +133,73 @@ def test_a_process_that_dies_once_costs_nothing(tmp_path):
     )
     assert (tmp_path / "mark").exists()
     np.testing.assert_array_equal(result["dies_once_at_two"], [1.0, 2.0, 3.0])
+
+
+def test_a_sweep_whose_runs_all_fail_is_an_error_that_holds_their_reasons(tmp_path):
+    with pytest.raises(StudyError, match=r"every run failed; the first one: ArithmeticError: planted") as caught:
+        fp.sweep("fig6", {"controller.gain": [2.0]}, metrics=[RAISES], overrides=SHORT, output=tmp_path, executor=TWO)
+    assert fp.load_result(tmp_path / "sweep.nc").identical(caught.value.result)
+
+
+def test_names_and_switches_are_swept_like_numbers(tmp_path):
+    over = {"simulation.method": ["Rodas4", "Rodas5P"], "controller.gravity_compensation": [True, False]}
+    result = fp.sweep("fig6", over, metrics=["tracking_rms"], overrides=SHORT, output=tmp_path, executor=TWO)
+    for method in ("Rodas4", "Rodas5P"):
+        for switch in (True, False):
+            changed = {"simulation.method": method, "controller.gravity_compensation": switch}
+            alone = METRICS["tracking_rms"].measure(Run(fp.load_scenario("fig6", SHORT | changed)))
+            # A controller written in Python calls libraries that round by their number of threads.
+            assert float(result["tracking_rms"].sel(changed)) == pytest.approx(alone, rel=1e-7)
+    assert fp.load_result(tmp_path / "sweep.nc").identical(result)
+
+
+OWN_METRIC = """
+from finger_pin.studies import Metric
+
+FACTOR = {factor}
+
+
+def measure(run):
+    return {sign}FACTOR * run.scenario.controller.gain
+
+
+OWN = Metric("own", "N m/rad", "one's own", measure)
+"""
+
+
+def test_a_metric_that_was_edited_is_measured_anew_and_one_that_was_not_is_not(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    found = []
+    for number, (factor, sign) in enumerate([(2.0, ""), (2.0, ""), (3.0, ""), (3.0, "-")]):
+        # A module's own name each time: what other processes have imported stays in them.
+        (tmp_path / f"edited{number}.py").write_text(OWN_METRIC.format(factor=factor, sign=sign))
+        metric = importlib.import_module(f"edited{number}").OWN
+        result = fp.sweep(
+            "fig6", {"controller.gain": [1.0]}, metrics=[metric], overrides=SHORT, output=tmp_path / "o", executor=TWO
+        )
+        found.append((float(result["own"][0]), len(lines(tmp_path / "o"))))
+    assert found == [(2.0, 1), (2.0, 1), (3.0, 2), (-3.0, 3)]
+
+
+def test_what_depends_on_something_unknown_is_done_anew_and_said(tmp_path):
+    mystery = object()
+    metric = fp.studies.Metric("odd", "1", "odd", lambda run: float(mystery is not None))
+    for count in (1, 2):
+        with pytest.warns(UserWarning, match="the metric odd uses an object of type object, so its runs are done anew"):
+            fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[metric], output=tmp_path, executor=TWO)
+        assert len(lines(tmp_path)) == count
+
+
+def test_another_source_of_the_package_does_all_anew(tmp_path, monkeypatch):
+    def run():
+        fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path, executor=TWO)
+
+    run()
+    monkeypatch.setattr("finger_pin.studies.runs.source_digest", lambda: "another")
+    with pytest.raises(StudyError, match="another finger_pin"):
+        run()
+    assert len(lines(tmp_path)) == 2
 
 
 def test_failed_runs_are_repeated_when_asked_for(tmp_path):

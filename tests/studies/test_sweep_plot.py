@@ -72,6 +72,27 @@ def test_more_keys_and_samples_are_drawn_as_parallel_coordinates_of_all_runs(kin
     assert any(len(line.get_xdata()) == keys and line.get_linestyle() == ":" for line in axes.lines)
 
 
+def test_names_stand_side_by_side_in_lines_maps_and_parallel_coordinates():
+    methods, switch = ["Rodas4", "Rodas5P", "BDF"], [True, False]
+    (axes,) = plot_sweep(made({"simulation.method": methods}, ("simulation.method",), m=[3.0, 1.0, 2.0])).axes
+    (line,) = axes.lines
+    assert line.get_linestyle() == "None"
+    assert [label.get_text() for label in axes.get_xticklabels()] == methods
+    np.testing.assert_array_equal(axes.get_xticks(), line.get_xdata())
+    np.testing.assert_array_equal(line.get_ydata(), [3.0, 1.0, 2.0])
+    values = np.arange(6.0).reshape(3, 2)
+    axes = plot_sweep(made({"a": switch, "b": [1.0, 2.0, 4.0]}, ("a", "b"), m=values.T)).axes[0]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["true", "false"]
+    axes = plot_sweep(made({"a": methods, "b": switch}, ("a", "b"), m=values)).axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["true", "false"]
+    (mesh,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.QuadMesh))
+    np.testing.assert_array_equal(mesh.get_array(), values.T)
+    axes = plot_sweep(made({"a": ["x", "y", "x"], "b": [1.0, 2.0, 3.0]}, ("sample",), m=[4.0, 5.0, 6.0])).axes[0]
+    (lines,) = (each for each in axes.collections if isinstance(each, matplotlib.collections.LineCollection))
+    assert sorted(segment[0, 1] for segment in lines.get_segments()) == [0.0, 0.0, 1.0]
+    assert {"x", "y"} <= {text.get_text() for text in axes.texts}
+
+
 def test_keys_of_one_value_take_no_part():
     figure = plot_sweep(made({"a": [1.0], "b": [1.0, 2.0]}, ("a", "b"), m=[[3.0, 4.0]]))
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), [3.0, 4.0])

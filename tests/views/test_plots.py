@@ -1,27 +1,18 @@
 """Figures: their lines against the Dataset and hand-written formulas, for fingers of several sizes."""
 
-import itertools
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from finger_pin.description.loading import load_finger
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
 from finger_pin.views import plots
 from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
-from finger_pin.views.plots.reach import fingertip_surface, flexion_section
-from finger_pin.views.plots.style import BLUE, COLOURS, GREEN, PURPLE, VERMILLION
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
-STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "tendon_bristles", "joint_bristles")
+STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
 LOST = (
     "tendon_coulomb",
     "tendon_viscous",
@@ -30,6 +21,7 @@ LOST = (
     "joint_viscous",
     "joint_micro_damping",
     "limiter",
+    "joint_springs",
     "slack",
 )
 UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "supplied")
@@ -47,7 +39,14 @@ def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
 
     variables = {
         name: (("time", "joint"), 0.01 * noise(samples, joints))
-        for name in ("joint_reference", "tracking_error", "joint_torque_command", "joint_torque", "joint_friction")
+        for name in (
+            "joint_position",
+            "joint_reference",
+            "tracking_error",
+            "joint_torque_command",
+            "joint_torque",
+            "joint_friction",
+        )
     }
     for name in ("tendon_command", "tendon_tension"):
         variables[name] = (("time", "tendon"), 5.0 + noise(samples, tendons))
@@ -252,7 +251,12 @@ def test_draw_all_writes_whole_pictures_of_a_size_for_the_screen(tmp_path):
         picture = imread(path)
         assert 1200 < picture.shape[1] < 1800
         # Nothing is cut off: the margin is blank.
-        assert np.all(picture[:2] == 1.0) and np.all(picture[-2:] == 1.0) and np.all(picture[:, :2] == 1.0)
+        assert (
+            np.all(picture[:2] == 1.0)
+            and np.all(picture[-2:] == 1.0)
+            and np.all(picture[:, :2] == 1.0)
+            and np.all(picture[:, -2:] == 1.0)
+        )
 
 
 def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):
@@ -266,142 +270,19 @@ def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def equation_1(theta):
-    """Fingertip of the paper's finger, written out."""
-    t1, t2, t23, t234 = theta[0], theta[1], theta[1] + theta[2], theta[1] + theta[2] + theta[3]
-    reach = A1 + A2 * np.cos(t2) + A3 * np.cos(t23) + A4 * np.cos(t234)
-    return np.array([np.cos(t1) * reach, np.sin(t1) * reach, A2 * np.sin(t2) + A3 * np.sin(t23) + A4 * np.sin(t234)])
+def test_two_results_lie_over_each_other_each_on_its_own_time(result):
+    other = 2.0 * result.isel(time=slice(0, 1000, 2))
+    angles, rest = columns(plots.compare(result, other, ("one", "two")))
+    time = result["time"].values
+    for axes, name in zip(angles, result["joint"].values, strict=True):
+        drawn = lines(axes)
+        assert_shows(drawn["one"], time, np.rad2deg(result["joint_position"].sel(joint=name).values))
+        assert_shows(drawn["two"], other["time"].values, np.rad2deg(other["joint_position"].sel(joint=name).values))
+        assert axes.get_xlim() == (time[0], time[-1])
+    for axes, name in zip(rest[-result.sizes["tendon"] :], result["tendon"].values, strict=True):
+        assert_shows(lines(axes)["one"], time, result["tendon_tension"].sel(tendon=name).values)
 
 
-@pytest.fixture(scope="module")
-def paper_surface():
-    return fingertip_surface(Finger(load_finger("ub")), samples=31)
-
-
-def test_workspace_extremes_are_those_of_equation_1(paper_surface):
-    length = A1 + A2 + A3 + A4
-    # The least x lies on the edge theta2 = 90 deg, where theta4 = 0.7 theta3 by (4).
-    t3 = np.linspace(0.0, np.pi / 2, 100_001)
-    least = (A1 - A3 * np.sin(t3) - A4 * np.sin(1.7 * t3)).min()
-    expected = {
-        0: (least, length),
-        1: (-length * np.sin(np.deg2rad(10.0)), length * np.sin(np.deg2rad(10.0))),
-        2: (0.0, A2 + A3 + A4),
-    }
-    for axis, (low, high) in expected.items():
-        assert paper_surface[..., axis].min() == pytest.approx(low, abs=5e-5)
-        assert paper_surface[..., axis].max() == pytest.approx(high, abs=1e-9)
-
-
-def test_workspace_surface_bounds_all_that_the_finger_reaches(paper_surface):
-    section = flexion_section(Finger(load_finger("ub"))).patches.reshape(-1, 3)
-    radius = np.hypot(paper_surface[..., 0], paper_surface[..., 1]).ravel()
-    height = paper_surface[..., 2].ravel()
-    random = np.random.default_rng(5)
-    for _ in range(100):
-        t1, t2, t3 = random.uniform([-np.pi / 18, 0.0, 0.0], [np.pi / 18, np.pi / 2, np.pi / 2])
-        tip = equation_1([t1, t2, t3, 0.7 * t3])
-        assert np.linalg.norm(section - equation_1([0.0, t2, t3, 0.7 * t3]), axis=1).min() < 1.5e-3
-        assert abs(np.arctan(tip[1] / tip[0])) <= np.deg2rad(10.0) + 1e-12
-        assert np.hypot(tip[0], tip[1]) <= radius.max() and tip[2] <= height.max()
-
-
-def test_the_section_lies_in_the_flexion_plane_and_obeys_equation_4():
-    section = flexion_section(Finger(load_finger("ub")), samples=11)
-    assert section.plane == (0, 2)
-    assert section.patches.shape == (1, 11, 11, 3)
-    angles = np.linspace(0.0, np.pi / 2, 11)
-    for (i, t2), (j, t3) in itertools.product(enumerate(angles), enumerate(angles)):
-        np.testing.assert_allclose(section.patches[0, i, j], equation_1([0.0, t2, t3, 0.7 * t3]), atol=1e-12)
-    joints = [[0.0, 0.0, 0.0], [A1, 0.0, 0.0], [A1 + A2, 0.0, 0.0], [A1 + A2 + A3, 0.0, 0.0], equation_1(np.zeros(4))]
-    np.testing.assert_allclose(section.poses[0], joints, atol=1e-12)
-
-
-def test_a_driven_joint_that_would_leave_its_range_bounds_the_workspace():
-    finger = Finger(load_finger("ub", {"finger.joints.distal.range": [0.0, 0.35]}))
-    section = flexion_section(finger, samples=61)
-    flexed = np.linspace(0.0, np.pi / 2, 61)
-    outside = np.isnan(section.patches[0, ..., 0]).all(axis=0)
-    np.testing.assert_array_equal(outside, 0.7 * flexed > 0.35 + 1e-9)
-
-
-def test_the_workspace_of_a_planar_finger_lies_in_its_plane():
-    finger = Finger(load_finger("planar"))
-    section = flexion_section(finger, samples=21)
-    assert section.plane == (0, 1)
-    l1, l2 = (joint.link.length for joint in finger.description.joints.values())
-    tips = section.patches.reshape(-1, 3)
-    np.testing.assert_allclose(tips.max(axis=0), [l1 + l2, l1 + l2, 0.0], atol=1e-12)
-    np.testing.assert_allclose(tips.min(axis=0), [-l2, 0.0, 0.0], atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["ub", "planar"])
-def test_fig2_prints_ranges_in_millimetres_and_accepts_finger_and_description(name, tmp_path):
-    description = load_finger(name)
-    for finger in (Finger(description), description):
-        figure = plots.plot_workspace(finger)
-        space, plane = figure.axes
-        labels = [space.get_xlabel(), space.get_ylabel(), space.get_zlabel(), plane.get_xlabel(), plane.get_ylabel()]
-        assert all(label.endswith("(mm)") for label in labels)
-        texts = [text.get_text() for text in figure.texts]
-        assert all("mm" in text for text in texts)
-        assert all(("(4) imposed" in text) == (name == "ub") for text in texts)
-    if name == "ub":
-        assert "x: \N{MINUS SIGN}27.3 to 116.9 mm,   y: \N{MINUS SIGN}20.3 to 20.3 mm,   z: 0.0 to 96.7 mm" in texts[0]
-    plots.save_figure(figure, tmp_path / "fig2.png")
-
-
-def test_fig2_needs_links(network):
-    with pytest.raises(InputError):
-        plots.plot_workspace(network(("one",), {"T1": {"one": 5.0}, "T2": {"one": -5.0}}))
-
-
-def lab(rgb):
-    """CIELAB of linear sRGB under D65."""
-    xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) @ rgb
-    f = np.cbrt(xyz / [0.9505, 1.0, 1.089])
-    return np.array([116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])])
-
-
-# Machado, Oliveira and Fernandes (2009), severity 1.0, for linear RGB.
-BLINDNESS = {
-    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
-    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
-    "none": np.eye(3),
-}
-
-
-@pytest.mark.parametrize("blindness", BLINDNESS.values(), ids=BLINDNESS.keys())
-def test_colour_blind_people_tell_the_joints_apart(blindness):
-    assert COLOURS[:4] == (BLUE, VERMILLION, GREEN, PURPLE)
-    seen = []
-    for colour in COLOURS[:4]:
-        srgb = np.array(to_rgb(colour))
-        linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-        seen.append(lab(np.clip(np.array(blindness) @ linear, 1e-6, 1.0)))
-    # Two points of CIELAB are just noticeable side by side; thin lines need ten or so.
-    assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 12.0
-
-
-def run_python(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-
-
-def test_importing_the_package_is_light_and_figures_open_no_windows_and_leave_settings_alone():
-    code = """
-import sys
-import finger_pin
-print("matplotlib" in sys.modules)
-import matplotlib
-
-def settings():
-    # Looking at the backend would choose one.
-    return {key: matplotlib.rcParams[key] for key in matplotlib.rcParams if key != "backend"}
-
-before = settings()
-from finger_pin.views import plots
-plots.plot_friction_law()
-print("matplotlib.pyplot" in sys.modules, "tkinter" in sys.modules, settings() == before)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False", "False", "False", "True"]
+def test_results_of_fingers_with_other_joints_are_not_compared():
+    with pytest.raises(InputError, match="joint_0"):
+        plots.compare(synthetic(4), synthetic(2, 3, 0))

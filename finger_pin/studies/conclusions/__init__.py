@@ -6,7 +6,15 @@ Every experiment takes a scenario, so that the same questions can be put to any 
 from __future__ import annotations
 
 from finger_pin.studies.conclusions.delivery import DELIVERY_RUNS, PassiveDelivery, check_delivery, passive_delivery
-from finger_pin.studies.conclusions.findings import Finding, Verdict, findings_table, write_findings
+from finger_pin.studies.conclusions.findings import (
+    Finding,
+    Verdict,
+    delivery_findings,
+    findings_table,
+    influence_findings,
+    transmission_findings,
+    write_findings,
+)
 from finger_pin.studies.conclusions.influence import (
     INFLUENCE_RUNS,
     FrictionInfluence,
@@ -14,7 +22,6 @@ from finger_pin.studies.conclusions.influence import (
     friction_influence,
 )
 from finger_pin.studies.conclusions.posture import TRANSMISSION_RUNS, Transmission, transmission
-from finger_pin.studies.conclusions.verdicts import delivery_findings, influence_findings, transmission_findings
 
 __all__ = [
     "DELIVERY_RUNS",

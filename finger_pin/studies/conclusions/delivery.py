@@ -20,11 +20,12 @@ import numpy as np
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.studies.conclusions.runs import Progress, simulated
-from finger_pin.studies.conclusions.variations import (
+from finger_pin.studies.conclusions.runs import (
+    Progress,
     at_speed,
     internal_passive_tension,
     lasting,
+    simulated,
     weightless,
     with_joint_friction,
     with_passive_tension,

@@ -19,14 +19,17 @@ import numpy as np
 
 from finger_pin.analysis import self_locking_margin
 from finger_pin.analysis.transmission import coupling_in_motion
-from finger_pin.control.reference import HarmonicReference
+from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.studies.conclusions.runs import Measures, Progress, measured, simulated
-from finger_pin.studies.conclusions.variations import (
+from finger_pin.studies.conclusions.runs import (
+    Measures,
+    Progress,
     lasting,
+    measured,
+    simulated,
     swinging_to_lock,
     with_joint_friction,
     with_minimum_tension,
@@ -216,7 +219,7 @@ def gripping(scenario: Scenario, *, progress: Progress | None = None) -> Grippin
 def _tendons_lock(swing: Scenario) -> float:
     for factor in np.arange(1.0, MOST_TENDON_FRICTION + 1.0):
         tendons = Tendons.from_description(with_tendon_friction(swing, float(factor)).finger)
-        motion = HarmonicReference.from_scenario(swing, tendons.routing).at(0.5 * swing.simulation.duration)
+        motion = SignalReference.from_scenario(swing, tendons.routing).at(0.5 * swing.simulation.duration)
         for way in (1.0, -1.0):
             coupling = coupling_in_motion(tendons, motion.position, way * motion.velocity)
             if not ForceClosure.of(coupling, tendons.routing.tendons).holds:

@@ -1,4 +1,4 @@
-"""Runs of one experiment: simulated in processes, and reduced to a few numbers each."""
+"""Runs of the experiments: scenarios with more or less friction, tension or speed, and what is measured in them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.routing import Array
+from finger_pin.analysis import self_locking_margin
+from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import IntegrationError, SelfLockingWarning
+from finger_pin.description.signals import JointReference
+from finger_pin.description.validation import Numbers, expand
+from finger_pin.exceptions import IntegrationError, ScenarioWarning, StudyError
 from finger_pin.studies.many import simulate_many
 
 Progress = Callable[[int], None]
+#: Half a period of the swing in which a finger is led to self-locking, s.
+SWING = 2.0
 
 _VARIABLES = (
     "tracking_error",
@@ -78,8 +83,11 @@ def simulated(
 
     with warnings.catch_warnings():
         # Experiments go to the edge on purpose.
-        warnings.simplefilter("ignore", SelfLockingWarning)
-        runs = simulate_many(scenarios, variables=variables, progress=tell)
+        warnings.simplefilter("ignore", ScenarioWarning)
+        try:
+            runs = simulate_many(scenarios, variables=variables, progress=tell)
+        except StudyError as error:
+            runs = error.result
     for failure, end in zip(runs["failure"].values, runs["end_time"].values, strict=True):
         if failure:
             raise IntegrationError(float(end), str(failure), "other factors of friction, tension or speed")
@@ -109,3 +117,86 @@ def measured(
         joint_work=work("joint"),
         tendon_work=work("tendon"),
     )
+
+
+def scaled(value: Numbers, factor: float) -> Numbers:
+    """Return one number, or one for each, times a factor."""
+    return tuple(factor * each for each in value) if isinstance(value, tuple) else factor * value
+
+
+def with_joint_friction(scenario: Scenario, factor: float) -> Scenario:
+    """Return a scenario with M^d and M^c of the joints times a factor."""
+    law = scenario.finger.joint_friction
+    update = {"coulomb": scaled(law.coulomb, factor), "stiction": scaled(law.stiction, factor)}
+    finger = scenario.finger.model_copy(update={"joint_friction": law.model_copy(update=update)})
+    return scenario.model_copy(update={"finger": finger})
+
+
+def with_tendon_friction(scenario: Scenario, factor: float) -> Scenario:
+    """Return a scenario with mu_e of the tendons times a factor."""
+    law = scenario.finger.tendon_friction
+    update = {"tendon_friction": law.model_copy(update={"coulomb": scaled(law.coulomb, factor)})}
+    return scenario.model_copy(update={"finger": scenario.finger.model_copy(update=update)})
+
+
+def with_minimum_tension(scenario: Scenario, tension: float) -> Scenario:
+    """Return a scenario with f0 in N for all tendons."""
+    return scenario.model_copy(
+        update={"controller": scenario.controller.model_copy(update={"minimum_tension": tension})}
+    )
+
+
+def with_passive_tension(scenario: Scenario, tension: tuple[float, ...]) -> Scenario:
+    """Return a scenario whose references (20) let passive tendons carry f5^d, N."""
+    update = {"passive_tension": tension}
+    return scenario.model_copy(update={"controller": scenario.controller.model_copy(update=update)})
+
+
+def weightless(scenario: Scenario) -> Scenario:
+    """Return a scenario without gravity."""
+    finger = scenario.finger.model_copy(update={"gravity": (0.0, 0.0, 0.0)})
+    return scenario.model_copy(update={"finger": finger})
+
+
+def lasting(scenario: Scenario, duration: float, samples: int) -> Scenario:
+    """Return a scenario of another duration, s, with about so many samples."""
+    update = {"duration": duration, "sample_rate": samples / duration}
+    return scenario.model_copy(update={"simulation": scenario.simulation.model_copy(update=update)})
+
+
+def at_speed(scenario: Scenario, factor: float) -> Scenario:
+    """Return a scenario whose reference runs through the same motion in its time over a factor."""
+    joints = {name: joint.faster(factor) for name, joint in scenario.reference.joints.items()}
+    settings = scenario.simulation
+    update = {"duration": settings.duration / factor, "sample_rate": settings.sample_rate * factor}
+    return scenario.model_copy(
+        update={
+            "reference": scenario.reference.model_copy(update={"joints": joints}),
+            "simulation": settings.model_copy(update=update),
+        }
+    )
+
+
+def swinging_to_lock(scenario: Scenario) -> Scenario:
+    """Return a scenario whose joints swing once through their amplitudes, in the directions closest to self-locking."""
+    margin = self_locking_margin(scenario)
+    routing = Routing.from_description(scenario.finger)
+    joints = {
+        name: JointReference(
+            offset=joint.offset,
+            amplitude=-float(margin.directions[routing.joints.index(name)]) * abs(joint.amplitude),
+            frequency=0.5 / SWING,
+            phase=0.5 * np.pi,
+        )
+        for name, joint in scenario.reference.joints.items()
+    }
+    swung = scenario.model_copy(update={"reference": scenario.reference.model_copy(update={"joints": joints})})
+    return lasting(swung, SWING, 200)
+
+
+def internal_passive_tension(scenario: Scenario) -> tuple[float, ...]:
+    """Return what (21), (22) plan for the passive tendons where no torque is asked for: lambda f^k, N."""
+    routing = Routing.from_description(scenario.finger)
+    internal = routing.force_closure().tension
+    level = np.max(expand(scenario.controller.minimum_tension, len(internal)) / internal)
+    return tuple(float(each) for each in level * internal[routing.actuated :])

@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.studies.comparison import Comparison
-from finger_pin.views.plots.lines import trace
+from finger_pin.views.plots.lines import names, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, styled
 
 _COLOURS = (GREY, VERMILLION, BLUE, BLACK)
@@ -45,7 +44,7 @@ def plot_controllers(results: dict[str, xr.Dataset], rows: Sequence[Comparison])
         [row.passive_error for row in rows],
         color=ORANGE,
         height=0.66,
-        label="passive stretch",
+        label="of which passive stretch",
     )
     left.legend(loc="lower right")
     _bars(right, rows, [row.peak_tension for row in rows], BLUE, "peak command (N)", ".2f")
@@ -56,7 +55,7 @@ def plot_controllers(results: dict[str, xr.Dataset], rows: Sequence[Comparison])
 
 
 def _bars(axes: Axes, rows: Sequence[Comparison], values: Sequence[float], colour: str, label: str, form: str) -> None:
-    axes.barh(range(len(rows)), values, color=colour, height=0.66)
+    axes.barh(range(len(rows)), values, color=colour, height=0.66, label="all of it")
     axes.set_xlabel(label)
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0)

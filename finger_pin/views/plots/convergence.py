@@ -7,9 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
-from finger_pin.views.plots.lines import series
-from finger_pin.views.plots.panels import legend, stack, title
-from finger_pin.views.plots.signals import names
+from finger_pin.views.plots.lines import names, series
+from finger_pin.views.plots.panels import legend, logarithmic, stack, title
 from finger_pin.views.plots.style import GREY, new_figure, styled
 
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.
@@ -34,7 +33,7 @@ def plot_convergence(result: xr.Dataset) -> Figure:
     time, values = result["time"].values[reached], np.maximum(values[reached], _LEAST)
     for index, name in enumerate(names(result, "joint")):
         axes.plot(*_envelope(time, values[:, index]), label=name, **series(index))
-    axes.set_yscale("log")
+    logarithmic(axes)
     axes.set_xlim(time[0], max(time[-1], time[0] + 1e-9))
     limit, parting = result.attrs["convergence_limit"], result.attrs["convergence_parting_time"]
     axes.axhline(limit, color=GREY, linestyle="--", linewidth=1.0, label=f"limit, {limit:g} rad")

@@ -6,11 +6,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 from finger_pin.description.routing import Array
 from finger_pin.views.plots.lines import shade, trace
-from finger_pin.views.plots.panels import labelled, stack, title
+from finger_pin.views.plots.panels import labelled, logarithmic, stack, title
 from finger_pin.views.plots.style import (
     BLACK,
     BLUE,
@@ -22,6 +21,7 @@ from finger_pin.views.plots.style import (
     VERMILLION,
     YELLOW,
     new_figure,
+    power_of_ten,
     styled,
 )
 
@@ -30,6 +30,7 @@ _STORED = {
     "gravity": "gravity",
     "passive_tendon": "passive tendons",
     "limiter": "limiters",
+    "joint_springs": "joints' springs",
     "tendon_bristles": "tendon bristles",
     "joint_bristles": "joint bristles",
 }
@@ -42,6 +43,7 @@ _LOST = {
     "joint_viscous": ("joints viscous", SKY),
     "joint_micro_damping": ("joints' micro-damping", BLACK),
     "limiter": ("stroke limiters", GREEN),
+    "joint_springs": ("joints' springs", "saddlebrown"),
     "slack": ("tensions cut at zero", PURPLE),
 }
 _MILLI = 1e3
@@ -100,8 +102,7 @@ def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
     worst = float(np.max(share))
     if worst > 0.0:
         # Zeros have no place on a logarithmic axis: they go below its end.
-        axes.set_yscale("log")
-        axes.yaxis.set_minor_locator(NullLocator())
+        logarithmic(axes)
         axes.set_ylim(1e-4 * worst, 10.0 * worst)
         share = np.maximum(share, 1e-6 * worst)
     trace(axes, time, share, color=BLUE, linewidth=0.9)
@@ -112,4 +113,4 @@ def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
 
 def _scientific(value: float) -> str:
     mantissa, exponent = f"{value:.0e}".split("e")
-    return rf"${mantissa} \times 10^{{{int(exponent)}}}$" if value else "0"
+    return f"{mantissa} \N{MULTIPLICATION SIGN} {power_of_ten(int(exponent))}" if value else "0"

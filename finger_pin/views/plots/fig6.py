@@ -9,9 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.views.plots.lines import series, trace
+from finger_pin.views.plots.lines import names, passive_proximal, series, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names, passive_proximal
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, new_figure, styled
 
 
@@ -27,7 +26,7 @@ def plot_fig6(result: xr.Dataset) -> Figure:
     """
     tendons = names(result, "tendon")
     figure = new_figure(11.0, max(6.6, 1.3 * len(tendons)))
-    labels = [r"reference $\theta^d$ (°)", r"error $\theta^d - \theta$ (°)"]
+    labels = ["reference θᵈ (°)", "error θᵈ \N{MINUS SIGN} θ (°)"]
     # One row of the legend for every four joints.
     bottom = 0.8 + 0.2 * ((result.sizes["joint"] - 1) // 4)
     angles = stack(figure, 0.0, 5.0, labels, gap=0.4, bottom=bottom)
@@ -58,8 +57,8 @@ def _tensions(panels: list[Axes], result: xr.Dataset) -> None:
     other = f"proximal half of {next(iter(proximal))}" if len(proximal) == 1 else "proximal half"
     dots: dict[str, Any] = {"label": other, "color": VERMILLION, "linestyle": ":", "linewidth": 1.8}
     for index, (axes, name) in enumerate(zip(panels, names(result, "tendon"), strict=True)):
-        trace(axes, time, delivered[:, index], label="delivered $f$", color=BLUE)
-        trace(axes, time, planned[:, index], label=r"planned $\hat f$", color=BLACK, linestyle="--", linewidth=1.0)
+        trace(axes, time, delivered[:, index], label="delivered", color=BLUE)
+        trace(axes, time, planned[:, index], label="planned", color=BLACK, linestyle="--", linewidth=1.0)
         if name in proximal:
             trace(axes, time, proximal[name], **dots)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
@@ -16,15 +14,17 @@ from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.reach import flexion_section
+from finger_pin.views.plots.space import AXES, space
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, new_figure, styled
 
-_AXES = "xyz"
 _LABELS = {
     Friction.HELPING: "can hold, friction helps",
     Friction.NONE: "without friction",
     Friction.HINDERING: "can push, friction hinders",
 }
 _DIRECTIONS = 120
+# Angle beside a direction at which a joint's torque changes its sign, rad.
+_BESIDE = 0.02
 
 
 @styled
@@ -40,22 +40,12 @@ def plot_force_polytope(finger: Finger, position: Sequence[float] | Array, limit
     """
     figure = new_figure(11.0, 5.2)
     polytope = force_polytope(finger, position, limit)
-    if polytope.basis.shape[1] == 3 and len(polytope.faces):
-        space = figure.add_axes((0.01, 0.03, 0.44, 0.86), projection="3d")
-        assert isinstance(space, Axes3D)
-        triangles = polytope.vertices[polytope.triangles()]
-        space.add_collection3d(Poly3DCollection(triangles, facecolors=BLUE, alpha=0.18, edgecolors="none"))
-        for first, second in polytope.ridges():
-            space.plot(*polytope.vertices[[first, second]].T, color=BLUE, linewidth=0.9)
-        space.scatter(0.0, 0.0, 0.0, color=BLACK, s=14)
-        low, high = polytope.vertices.min(axis=0), polytope.vertices.max(axis=0)
-        for index, name in enumerate(_AXES):
-            getattr(space, f"set_{name}lim")(low[index], high[index])
-            getattr(space, f"set_{name}label")(f"{name} (N)")
-            few = (high - low)[index] < 0.5 * np.max(high - low)
-            getattr(space, f"{name}axis").set_major_locator(MaxNLocator(2 if few else 5, steps=[1, 2, 5, 10]))
-        space.set_box_aspect(tuple(high - low), zoom=0.8)
-        space.view_init(elev=20, azim=-55)
+    axes = space(figure, (0.01, 0.03, 0.44, 0.86), np.vstack([polytope.vertices, np.zeros(3)]), "N")
+    triangles = polytope.vertices[polytope.triangles()]
+    axes.add_collection3d(Poly3DCollection(triangles, facecolors=BLUE, alpha=0.18, edgecolors="none"))
+    for first, second in polytope.ridges():
+        axes.plot(*polytope.vertices[[first, second]].T, color=BLUE, linewidth=0.9)
+    axes.scatter(0.0, 0.0, 0.0, color=BLACK, s=14)
     figure.text(0.03, 0.95, "(a) forces within the tension limits, without friction", fontsize=10.5)
     plane = figure.add_axes((0.55, 0.12, 0.43, 0.78))
     _section(plane, finger, position, limit)
@@ -88,13 +78,19 @@ def plot_radius_sensitivity(
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("change of the largest tension with the signed radius (N/mm)")
-    axes.set_title(f"largest tension {needed.largest:.3g} N for a force of {np.linalg.norm(force):.3g} N")
+    along = ", ".join(f"{each:.3g}" for each in force)
+    axes.set_title(f"largest tension {needed.largest:.3g} N for the force ({along}) N")
     return figure
 
 
 def _section(axes: Axes, finger: Finger, position: Sequence[float] | Array, limit: float | tuple[float, ...]) -> None:
     plane = flexion_section(finger, samples=2).plane
-    angles = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
+    across = finger.rigid_body.jacobian(np.asarray(position, dtype=float))[plane, :]
+    # The joint's torque changes its sign where the force points at its axis: on either side of it, within its friction
+    # circle, lies a step of what the finger can push.
+    towards = np.arctan2(-across[0], across[1])
+    beside = towards[:, None] + np.array([-_BESIDE, _BESIDE, np.pi - _BESIDE, np.pi + _BESIDE])
+    angles = np.unique(np.concatenate([np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1), beside.ravel() % (2.0 * np.pi)]))
     directions = np.zeros((len(angles), 3))
     directions[:, plane] = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     for index, (friction, label) in enumerate(_LABELS.items()):
@@ -103,6 +99,6 @@ def _section(axes: Axes, finger: Finger, position: Sequence[float] | Array, limi
         axes.plot(*(reach[:, None] * directions[:, plane]).T, label=label, **series(index))
     axes.plot(0.0, 0.0, color=BLACK, marker="o", markersize=4)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"{_AXES[plane[0]]} (N)")
-    axes.set_ylabel(f"{_AXES[plane[1]]} (N)")
+    axes.set_xlabel(f"{AXES[plane[0]]} (N)")
+    axes.set_ylabel(f"{AXES[plane[1]]} (N)")
     axes.legend(loc="best")

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from finger_pin.description.routing import Array
+from finger_pin.views.plots.panels import plain
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
 
 if TYPE_CHECKING:
@@ -68,19 +67,13 @@ def _line(axes: Axes, sweep: Sweep, value: Callable[[Measures], Array], label: s
 def _logarithmic(axes: Axes, label: str) -> None:
     axes.set_yscale("log")
     axes.set_ylabel(label)
-    _plain(axes.yaxis)
+    plain(axes.yaxis)
 
 
 def _tensions(axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_xlabel(r"least tension $f_0$ (N)")
-    _plain(axes.xaxis)
-
-
-def _plain(axis: Axis) -> None:
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_locator(NullLocator())
+    plain(axes.xaxis)
 
 
 def _same_work(axes: Axes, found: FrictionInfluence) -> None:

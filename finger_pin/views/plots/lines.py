@@ -1,10 +1,11 @@
-"""Long signals as lines and areas of few points that hide no spike."""
+"""The signals of a result, of a finger of any size, as lines and areas of few points that hide no spike."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -14,6 +15,25 @@ from finger_pin.views.plots.style import COLOURS, DASHES
 
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.
 BINS = 800
+
+
+def names(result: xr.Dataset, coordinate: str) -> list[str]:
+    """Return the names along a coordinate of a result."""
+    return [str(name) for name in result[coordinate].values]
+
+
+def passive_proximal(result: xr.Dataset) -> dict[str, Array]:
+    """Return the tension of the proximal half of every passive tendon, N, by tendon.
+
+    A result with one passive tendon keeps it without a dimension of its own; the tendons list it last.
+    """
+    if "passive_tension_proximal" not in result:
+        return {}
+    tension = result["passive_tension_proximal"]
+    if "passive_tendon" in tension.dims:
+        columns = tension.transpose("time", "passive_tendon").values.T
+        return dict(zip(names(result, "passive_tendon"), columns, strict=True))
+    return {names(result, "tendon")[-1]: tension.values}
 
 
 def extremes(values: Array, bins: int = BINS) -> NDArray[np.intp]:

@@ -7,9 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
-from finger_pin.views.plots.lines import shade, trace
+from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.signals import names, passive_proximal
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
 
 
@@ -57,10 +56,10 @@ def _joints(figure: Figure, result: xr.Dataset) -> None:
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
     title(panels[0], "(b) joint torque before and after joint friction")
-    legend(panels[-1], panels[0].get_lines(), columns=3)
+    legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=4)
 
 
 def _gap(axes: Axes, time: Array, before: Array, after: Array, first: str, second: str) -> None:
-    shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="taken by friction")
+    shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="friction")
     trace(axes, time, before, label=first, color=BLUE, linewidth=1.1)
     trace(axes, time, after, label=second, color=VERMILLION, linewidth=1.1)

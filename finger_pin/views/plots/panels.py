@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+from finger_pin.views.plots.style import power_of_ten
 
 # Distances in inches: the top margin, and where labels stand outside a panel.
 _TOP, _LABELS, _LABEL, _TIME = 0.32, 0.92, 0.52, 0.27
@@ -66,14 +70,28 @@ def title(axes: Axes, text: str) -> None:
 
 
 def legend(axes: Axes, handles: Sequence[Artist], columns: int) -> None:
-    """Write a legend below the lowest panel of a column."""
+    """Write a legend below the lowest panel of a column, as wide as that is with its labels."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     box = axes.get_position()
     figure.legend(
-        handles=handles, ncols=columns, columnspacing=1.4, handletextpad=0.5, borderaxespad=0.2,
-        loc="lower center", bbox_to_anchor=(0.5 * (box.x0 + box.x1), 0.0),
+        handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2,
+        loc="lower center", bbox_to_anchor=(0.5 * (box.x0 - _LABELS / figure.get_figwidth() + box.x1), 0.0),
     )  # fmt: skip
+
+
+def logarithmic(axes: Axes) -> None:
+    """Give the vertical axis a logarithmic scale with powers of ten in plain text."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(round(math.log10(value)))))
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def plain(axis: Axis) -> None:
+    """Write 1, 2 and 5 times powers of ten as they are along a logarithmic axis."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def labelled(name: str, unit: str) -> str:

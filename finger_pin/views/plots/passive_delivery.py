@@ -48,7 +48,8 @@ def _causes(axes: Axes, found: PassiveDelivery) -> None:
     for row, value in enumerate(shown.values()):
         axes.barh(row, 100.0 * value, height=0.6, color=VERMILLION if value > found.broken else BLUE)
         axes.text(100.0 * value, row, f" {100.0 * value:.1f}", va="center", fontsize=9.5)
-    axes.axvline(100.0 * found.broken, color=GREY, linestyle=(0, (5, 3)), linewidth=1.0)
+    axes.axvline(100.0 * found.broken, color=GREY, linestyle=(0, (5, 3)), linewidth=1.0, label="beyond: plan fails")
+    axes.legend(loc="lower right", fontsize=8.5)
     axes.set_yticks(range(len(shown)), list(shown))
     axes.invert_yaxis()
     axes.margins(x=0.15)
@@ -62,7 +63,7 @@ def _grid(axes: Axes, found: PassiveDelivery) -> None:
         deviation = 100.0 * found.grid.deviation[:, index]
         label = "no friction" if factor == 0.0 else f"friction \N{MULTIPLICATION SIGN} {factor:g}"
         axes.plot(found.speeds, deviation, label=label, marker="o", markersize=3.5, **series(index))
-    axes.axhline(100.0 * found.broken, color=GREY, linestyle=(0, (5, 3)), linewidth=1.0)
+    axes.axhline(100.0 * found.broken, color=GREY, linestyle=(0, (5, 3)), linewidth=1.0, label="beyond: plan fails")
     axes.set_xscale("log", base=2)
     axes.set_xticks(found.speeds, [f"{speed:g}" for speed in found.speeds])
     axes.set_ylim(0.0, 1.3 * float(np.max(100.0 * found.grid.deviation)))

@@ -112,7 +112,9 @@ def _joint_axes(finger: Finger, position: Array) -> Array:
     data = model.createData()
     pin.computeJointJacobians(model, data, position)
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    return np.array([pin.getJointJacobian(model, data, j, frame)[3:, j - 1] for j in range(1, model.njoints)])
+    # Of a single joint Pinocchio returns a vector.
+    turns = (pin.getJointJacobian(model, data, j, frame).reshape(6, -1) for j in range(1, model.njoints))
+    return np.array([turn[3:, index] for index, turn in enumerate(turns)])
 
 
 def _skeleton(finger: Finger, position: Array) -> Array:

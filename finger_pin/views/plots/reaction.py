@@ -40,7 +40,7 @@ def plot_reaction(motion: JointReactions, loaded: Mapping[str, JointReactions]) 
     for index, (whole, rest) in enumerate(zip(left, middle, strict=True)):
         _along(whole, rest, motion, index)
     legend(left[-1], left[0].get_lines(), columns=3)
-    legend(middle[-1], middle[0].get_lines()[2:3], columns=1)
+    legend(middle[-1], middle[0].get_lines()[:3], columns=2)
     if loaded:
         right = stack(figure, edges[2], edges[2] + _COLUMN, ["of mean (17)\n(%)"] * len(joints), bottom=1.0)
         title(right[0], "(c) quasi-static, under fingertip forces")

@@ -12,10 +12,10 @@ from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
+from finger_pin.views.plots.panels import plain
 from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
 
 _MAP = "cividis"
@@ -29,12 +29,14 @@ _SILENT = {"finger", "joints", "link", "tendons", "crossings"}
 def plot_sweep(result: xr.Dataset) -> Figure:
     """Draw the metrics of a sweep: lines over one key, maps over two, parallel coordinates over more or over samples.
 
-    Runs that failed are marked in lines and maps; in parallel coordinates they end at the last key.
+    Runs that failed are marked in lines and maps; in parallel coordinates they end at the last key. The values of a key
+    that holds names stand side by side.
 
     Args:
         result: Dataset of `sweep`.
     """
     keys = [str(name) for name in result.coords]
+    result = _numbered(result)
     if "sample" not in result.dims:
         keys = [key for key in keys if result.sizes[key] > 1] or keys[:1]
         result = result.squeeze([name for name in result.dims if name not in keys], drop=True)
@@ -50,16 +52,30 @@ def short_key(key: str) -> str:
     return " ".join(part.replace("_", " ") for part in key.split(".") if part not in _SILENT)
 
 
+def _numbered(result: xr.Dataset) -> xr.Dataset:
+    """Return a sweep with numbers from 0 in place of names, which are then the attribute ``names`` of their key."""
+    for key, held in result.coords.items():
+        if held.dtype.kind not in "iuf":
+            names = list(dict.fromkeys(held.values.tolist()))
+            places = np.array([float(names.index(name)) for name in held.values.tolist()])
+            spelt = [str(name).lower() if isinstance(name, bool) else str(name) for name in names]
+            result = result.assign_coords({key: (held.dims, places, {**held.attrs, "names": spelt})})
+    return result
+
+
 def _lines(result: xr.Dataset, key: str) -> Figure:
     figure, panels = _panels(result, 4.6, 2.5)
+    # Between names there is nothing.
+    named = "names" in result[key].attrs
     order = np.argsort(result[key].values)
     values = result[key].values[order]
     failed = result["status"].values[order] == "failed"
     for name, axes in panels.items():
         found = result[name].values[order]
-        axes.plot(values, found, color=BLUE, marker="o" if len(values) <= 40 else "", markersize=3.5)
-        _scale(axes.set_xscale, axes.xaxis, values)
-        axes.margins(x=0.02)
+        marker, line = ("o" if len(values) <= 40 or named else ""), ("none" if named else "-")
+        axes.plot(values, found, color=BLUE, marker=marker, markersize=3.5, linestyle=line)
+        axes.margins(x=0.2 if named else 0.02)
+        _scale(axes.set_xscale, axes.xaxis, result[key])
         if not np.any(np.nan_to_num(found)):
             axes.set_ylim(0.0, 1.0)
         axes.set_ylabel(_unit(result, name))
@@ -88,8 +104,8 @@ def _maps(result: xr.Dataset, first: str, second: str) -> Figure:
             if shown.min() == shown.max():
                 # A scale of made-up width would look like a range that was found.
                 bar.set_ticks([float(shown.min())])
-        _scale(axes.set_xscale, axes.xaxis, x)
-        _scale(axes.set_yscale, axes.yaxis, y)
+        _scale(axes.set_xscale, axes.xaxis, result[first])
+        _scale(axes.set_yscale, axes.yaxis, result[second])
         for which, colour in (("failed", VERMILLION), ("missing", GREY)):
             i, j = np.nonzero(status == which)
             if i.size:
@@ -122,9 +138,12 @@ def _parallel(result: xr.Dataset, keys: list[str]) -> Figure:
         axes.plot(places[: len(keys)], row[: len(keys)], color=GREY, linewidth=0.6, linestyle=":", alpha=0.7)
     for place, (least, most) in enumerate(zip(low, high, strict=True)):
         axes.axvline(place, color="black" if place >= len(keys) else GREY, linewidth=1.0)
-        for height, value in ((0.0, least), (1.0, most)) if most > least else ((0.5, least),):
-            text = axes.annotate(f"{value:.3g}", (place, height), xytext=(3, 0), textcoords="offset points", fontsize=9)
-            text.set(va={0.0: "top", 0.5: "center", 1.0: "bottom"}[height])
+        names = result[columns[place]].attrs.get("names")
+        marks = enumerate(names) if names else ((value, f"{value:.3g}") for value in dict.fromkeys((least, most)))
+        for value, word in marks:
+            height = (value - least) / (most - least) if most > least else 0.5
+            text = axes.annotate(word, (place, height), xytext=(3, 0), textcoords="offset points", fontsize=9)
+            text.set(va={0.0: "top", 1.0: "bottom"}.get(height, "center"))
     axes.set_xlim(-0.15, len(columns) - 0.5)
     axes.set_ylim(-0.06, 1.06)
     axes.set_yticks([])
@@ -188,7 +207,8 @@ def _metrics(result: xr.Dataset) -> list[str]:
 
 
 def _label(result: xr.Dataset, key: str) -> str:
-    return f"{short_key(key)} ({result[key].attrs['units']})"
+    unit = result[key].attrs.get("units")
+    return short_key(key) if unit is None else f"{short_key(key)} ({unit})"
 
 
 def _unit(result: xr.Dataset, name: str) -> str:
@@ -208,12 +228,12 @@ def _logarithmic(values: Array) -> bool:
     return bool(np.allclose(ratios, ratios[0], rtol=1e-3) and not np.allclose(steps, steps[0], rtol=1e-2))
 
 
-def _scale(set_scale: Any, axis: Axis, values: Array) -> None:
-    if _logarithmic(values):
+def _scale(set_scale: Any, axis: Axis, key: xr.DataArray) -> None:
+    if "names" in key.attrs:
+        axis.set_ticks(range(len(key.attrs["names"])), key.attrs["names"])
+    elif _logarithmic(key.values):
         set_scale("log")
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_locator(NullLocator())
+        plain(axis)
 
 
 def _edges(values: Array) -> Array:

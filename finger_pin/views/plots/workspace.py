@@ -8,18 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views.plots.reach import fingertip_surface, flexion_section
+from finger_pin.views.plots.space import AXES, space
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
 
 _MILLI = 1e3
-_AXES = "xyz"
 _ISOLINES = 7
 
 
@@ -36,9 +34,7 @@ def plot_workspace(finger: Finger | FingerDescription) -> Figure:
         finger = Finger(finger)
     surface, section = fingertip_surface(finger), flexion_section(finger)
     figure = new_figure(11.0, 5.2)
-    space = figure.add_axes((0.0, 0.0, 0.475, 0.92), projection="3d")
-    assert isinstance(space, Axes3D)
-    _surface(space, _MILLI * surface, _MILLI * section.poses)
+    _surface(figure, _MILLI * surface, _MILLI * section.poses)
     plane = figure.add_axes((0.575, 0.12, 0.415, 0.74))
     _section(plane, _MILLI * section.patches, _MILLI * section.poses, section.plane)
     imposed = ", with (4) imposed" if finger.routing.passive else ""
@@ -50,22 +46,13 @@ def plot_workspace(finger: Finger | FingerDescription) -> Figure:
     return figure
 
 
-def _surface(axes: Axes3D, patches: Array, poses: Array) -> None:
+def _surface(figure: Figure, patches: Array, poses: Array) -> None:
     quads = _quads(patches)
+    corners = np.concatenate([quads.reshape(-1, 3), poses[0]])
+    axes = space(figure, (0.0, 0.0, 0.475, 0.92), corners, "mm")
     colours = _lit(quads)
     axes.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=0.88 * colours, linewidths=0.3))
     axes.plot(*poses[0].T, color=BLACK, marker="o", markersize=3.5, linewidth=2.0)
-    corners = np.concatenate([quads.reshape(-1, 3), poses[0]])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    span = np.maximum(high - low, 0.2 * np.max(high - low))
-    for index, name in enumerate(_AXES):
-        middle = 0.5 * (low + high)[index]
-        getattr(axes, f"set_{name}lim")(middle - 0.52 * span[index], middle + 0.52 * span[index])
-        getattr(axes, f"set_{name}label")(f"{name} (mm)")
-        few = span[index] < 0.5 * np.max(span)
-        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(2 if few else 5, steps=[1, 2, 5, 10]))
-    axes.set_box_aspect(tuple(span), zoom=1.0)
-    axes.view_init(elev=20, azim=-55)
 
 
 def _section(axes: Axes, patches: Array, poses: Array, plane: tuple[int, int]) -> None:
@@ -83,8 +70,8 @@ def _section(axes: Axes, patches: Array, poses: Array, plane: tuple[int, int]) -
         axes.plot(*pose.T, color=colour, label=label, marker="o", markersize=4, linewidth=2.2)
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
-    axes.set_xlabel(f"{_AXES[plane[0]]} (mm)")
-    axes.set_ylabel(f"{_AXES[plane[1]]} (mm)")
+    axes.set_xlabel(f"{AXES[plane[0]]} (mm)")
+    axes.set_ylabel(f"{AXES[plane[1]]} (mm)")
     axes.legend(loc="upper right")
 
 
@@ -93,7 +80,7 @@ def _ranges(patches: Array, axes: Iterable[int]) -> str:
     texts = []
     for axis in axes:
         low, high = _MILLI * np.nanmin(patches[..., axis]), _MILLI * np.nanmax(patches[..., axis])
-        texts.append(f"{_AXES[axis]}: {low + 0.0:.1f} to {high + 0.0:.1f} mm".replace("-", "\N{MINUS SIGN}"))
+        texts.append(f"{AXES[axis]}: {low + 0.0:.1f} to {high + 0.0:.1f} mm".replace("-", "\N{MINUS SIGN}"))
     return ",   ".join(texts)
 
 

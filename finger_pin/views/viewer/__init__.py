@@ -2,10 +2,27 @@
 
 The page is meshcat's own viewer with a player beside it. It is the same page as a file (`write_animation`), served
 while somebody looks at a result (`view`), and during a simulation (`LiveView`). Meshcat's server is not used: it
-listens on every network interface, while this one is bound to the loopback address.
+listens on every network interface, while this one is bound to the loopback address. Who runs it anyway can have the
+finger there (`draw`).
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from finger_pin.views.viewer.animation import write_animation
+from finger_pin.views.viewer.drawing import draw
 from finger_pin.views.viewer.serving import LiveView, Viewing, view, view_forces
 
-__all__ = ["LiveView", "Viewing", "view", "view_forces", "write_animation"]
+if TYPE_CHECKING:
+    from finger_pin.views.viewer.video import write_video
+
+__all__ = ["LiveView", "Viewing", "draw", "view", "view_forces", "write_animation", "write_video"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what needs matplotlib on first use."""
+    if name == "write_video":
+        return import_module("finger_pin.views.viewer.video").write_video
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.viewer.page import render
-from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.scene import Ghost, Scene
 
 Indices = NDArray[np.intp]
 
@@ -27,7 +28,13 @@ FRAME_RATE, MOST_FRAMES = 60.0, 3000
 _POSITIONS_IN_VIEW = 40
 
 
-def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces: ForcePolytope | None = None) -> Path:
+def write_animation(
+    result: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    forces: ForcePolytope | None = None,
+    ghost: xr.Dataset | None = None,
+) -> Path:
     """Write a result as one HTML file that plays it, without a network.
 
     The file appears whole or not at all; an earlier one is replaced.
@@ -36,6 +43,7 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces:
         result: What `simulate` returned or saved.
         path: Of the file.
         forces: Drawn at the fingertip of its posture, if given.
+        ghost: Another result, whose finger moves faintly beside this one at the same times, if given.
 
     Returns:
         The path of the file.
@@ -43,30 +51,22 @@ def write_animation(result: xr.Dataset, path: str | os.PathLike[str], *, forces:
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    target, text = Path(path), animation_page(result, forces)
+    target, text = Path(path), animation_page(result, forces, ghost)
     with replacing(target) as temporary:
         Path(temporary).write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None) -> str:
-    """Return the page that plays a result, with a set of fingertip forces if given."""
-    scenario = _scenario(result)
-    scene = Scene(FingerDescription.model_validate(scenario["finger"]))
-    time = _variable(result, "time")
-    if len(time) == 0:
-        raise InputError("result.time", "must have at least one sample")
-    frames = _frame_indices(time)
-    time = time[frames]
-    position = _variable(result, "joint_position")[frames]
-    tension = strand_tensions(scene, result, frames)
-    for name, values in (("joint_position", position), ("tendon_tension", tension)):
-        if not np.isfinite(values).all():
-            raise InputError(f"result.{name}", "must be finite")
-    in_view = position[:: max(1, len(position) // _POSITIONS_IN_VIEW)]
-    title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
-    header = scene.header(title, in_view, float(tension.max()), live=False, forces=forces)
-    return render({**header, "chunks": [scene.chunk(time, position, tension)]})
+def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghost: xr.Dataset | None = None) -> str:
+    """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
+    motion = Motion.of(result)
+    in_view = motion.position[:: max(1, len(motion.time) // _POSITIONS_IN_VIEW)]
+    beside = Motion.of(ghost).ghost(motion.time) if ghost is not None else None
+    header = motion.scene.header(motion.title, in_view, motion.largest, live=False, forces=forces, ghost=beside)
+    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension)
+    if beside is not None:
+        chunk["ghost"] = beside.chunk()
+    return render({**header, "chunks": [chunk]})
 
 
 def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
@@ -85,11 +85,62 @@ def posture_page(description: FingerDescription, forces: ForcePolytope, strands:
     return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
 
 
-def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
-    """Return the tension of every strand at some samples of a result, shape (m, s), N.
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What of a result is shown: the frames of a film.
 
-    The proximal half of a passive tendon has the result's ``passive_tension_proximal``.
+    Attributes:
+        scene: The finger, prepared for drawing.
+        title: Of the scenario or the finger.
+        time: Shape (m,), s: samples of the result.
+        position: theta, shape (m, n), rad.
+        tension: Of every strand, shape (m, s), N.
     """
+
+    scene: Scene
+    title: str
+    time: Array
+    position: Array
+    tension: Array
+
+    @property
+    def largest(self) -> float:
+        """Largest tension of all, N."""
+        return float(self.tension.max())
+
+    def ghost(self, time: Array) -> Ghost:
+        """Return it as seen beside another motion, with frames at other times, shape (m,), s; it ends where it ends."""
+        position = np.stack([np.interp(time, self.time, column) for column in self.position.T], axis=-1)
+        return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
+
+    @classmethod
+    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE) -> Motion:
+        """Choose the frames of a result.
+
+        Args:
+            result: What `simulate` returned or saved.
+            rate: Frames per second of motion; fewer where the motion is long or the result has fewer samples.
+
+        Raises:
+            InputError: If the result lacks something that is shown.
+        """
+        scenario = _scenario(result)
+        scene = Scene(FingerDescription.model_validate(scenario["finger"]))
+        time = _variable(result, "time")
+        if len(time) == 0:
+            raise InputError("result.time", "must have at least one sample")
+        frames = _frame_indices(time, rate)
+        position = _variable(result, "joint_position")[frames]
+        tension = _strand_tensions(scene, result, frames)
+        for name, values in (("joint_position", position), ("tendon_tension", tension)):
+            if not np.isfinite(values).all():
+                raise InputError(f"result.{name}", "must be finite")
+        title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
+        return cls(scene, title, time[frames], position, tension)
+
+
+def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
+    # The proximal half of a passive tendon has the result's `passive_tension_proximal`.
     description = scene.geometry.description
     tension = _variable(result, "tendon_tension")[frames]
     actuated, passive = len(description.actuated_names), len(description.passive_names)
@@ -101,9 +152,9 @@ def strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
     return np.concatenate([tension[:, :actuated], halves], axis=1)
 
 
-def _frame_indices(time: Array) -> Indices:
+def _frame_indices(time: Array, rate: float) -> Indices:
     # Samples as they are, none between them: a frame shows what was computed.
-    wanted = int(np.clip(round((time[-1] - time[0]) * FRAME_RATE) + 1, 1, MOST_FRAMES))
+    wanted = int(np.clip(round((time[-1] - time[0]) * rate) + 1, 2, MOST_FRAMES))
     return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,12 @@ from numpy.typing import ArrayLike
 from finger_pin.analysis import ForcePolytope
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import BASE_LEAD, LinkPoses, TendonGeometry
 from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.solids import link_names, root_command, solid_commands
+from finger_pin.views.viewer.solids import ROOT, link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
 SLACK_TENSION = 0.05
@@ -27,6 +30,51 @@ _TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
 #: Points per span and per radian of the tendons drawn, so that sags and arcs look smooth.
 _RESOLUTION = 11
 _LARGEST = 32767
+_GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """Another motion that is seen faintly beside the one that is played.
+
+    Attributes:
+        scene: Its finger.
+        title: What it is.
+        poses: Of its links in every frame of the motion that is played.
+    """
+
+    scene: Scene
+    title: str
+    poses: LinkPoses
+
+    def header(self) -> dict[str, Any]:
+        """Return what the page needs to know of it."""
+        scene = self.scene
+        solids = solid_commands(scene.geometry, scene.urdf, scene.tube_radius, _GHOST, _GHOST_COLOUR)
+        moving = [each for each in solids if not each["path"].startswith(f"{_GHOST}/base/")]
+        return {"title": self.title, "links": link_names(scene.geometry)[1:], "commands": moving}
+
+    def chunk(self) -> str:
+        """Return the frames for the page."""
+        return _encode_poses(LinkPoses(self.poses.rotation[:, 1:], self.poses.translation[:, 1:]))
+
+    def seen(self) -> Array:
+        """Return points that the camera must have in view, shape (m, 3), m."""
+        return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
+
+
+def shown(finger: Finger | FingerDescription) -> FingerDescription:
+    """Return the description of what can be shown, a finger or the description of one.
+
+    Raises:
+        InputError: If it is a finger on a model of the user's own (`Finger.from_model`), whose looks are not known.
+    """
+    if isinstance(finger, FingerDescription):
+        return finger
+    if finger.rigid_body.joints != tuple(finger.description.joints):
+        allowed = "stands on another model (Finger.from_model); the viewer shows fingers that are made of links"
+        raise InputError(f"finger {finger.description.name}", allowed)
+    return finger.description
 
 
 class Scene:
@@ -35,12 +83,23 @@ class Scene:
     Attributes:
         geometry: Its tendons in space.
         strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
+        urdf: The finger's URDF, as text.
+        tube_radius: Of the tubes that are drawn for tendons, m.
+        tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots.
     """
 
     def __init__(self, description: FingerDescription) -> None:
-        """Prepare solids and tendons."""
+        """Prepare solids and tendons.
+
+        Raises:
+            InputError: If a joint carries no link.
+        """
+        for name, joint in description.joints.items():
+            if joint.link is None:
+                allowed = "is missing; the viewer shows fingers whose joints all have links, not those on another model"
+                raise InputError(f"finger.joints.{name}.link", allowed)
         self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
-        self._urdf = to_urdf(description)
+        self.urdf = to_urdf(description)
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self.strands = (*description.actuated_names, *halves)
         links = [joint.link for joint in description.joints.values() if joint.link is not None]
@@ -48,6 +107,10 @@ class Scene:
         size = self._size = BASE_LEAD * links[0].width + sum(link.length for link in links)
         # Points travel as 16-bit integers; this is their unit, a few micrometres.
         self._quantum = 1.5 * size / _LARGEST
+        self.tube_radius = min(_TUBE_IN_LANE * self.geometry.lanes.spacing, _TUBE_IN_LINK * min(self._widths))
+        self.tendons = [
+            self._tendon(path.name, path.distal.tolist()) for path in self.geometry.paths(np.zeros(len(links)))
+        ]
         self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
     def header(
@@ -58,6 +121,7 @@ class Scene:
         *,
         live: bool,
         forces: ForcePolytope | None = None,
+        ghost: Ghost | None = None,
     ) -> dict[str, Any]:
         """Return what the page needs to know before the first frame.
 
@@ -67,33 +131,36 @@ class Scene:
             largest_tension: That the legend must reach, N.
             live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
+            ghost: Another finger, drawn faintly beside this one, if given.
         """
-        geometry, widths = self.geometry, self._widths
-        tube = min(_TUBE_IN_LANE * geometry.lanes.spacing, _TUBE_IN_LINK * min(widths))
+        geometry, tube = self.geometry, self.tube_radius
         poses = geometry.poses(joint_positions)
         paths = geometry.paths(joint_positions, poses=poses)
-        turn = self._view()
+        turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation, self._tips(poses)[:, None, :], *(path.points for path in paths)]
+        seen = [poses.translation, self.tips(poses)[:, None, :], *(path.points for path in paths)]
         if shown is not None:
             seen.append(shown.corners)
+        if ghost is not None:
+            seen.append(ghost.seen())
         corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
             "live": live,
-            "commands": [root_command(turn), *solid_commands(geometry, self._urdf, tube), *drawn],
+            "commands": [root_command(turn), *solid_commands(geometry, self.urdf, tube), *drawn],
+            "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",
             "links": link_names(geometry),
             "joints": list(geometry.description.joints),
             "strands": list(self.strands),
-            "tendons": [self._tendon(path.name, path.distal.tolist()) for path in paths],
+            "tendons": self.tendons,
             "tubeRadius": tube,
             "quantum": self._quantum,
             "grid": self._grid,
             "inView": np.round(_outermost(corners), 5).tolist(),
-            "margin": 0.55 * max(widths),
-            "tensionScale": _scale_above(largest_tension),
+            "margin": 0.55 * max(self._widths),
+            "tensionScale": scale_above(largest_tension),
             "slackTension": SLACK_TENSION,
             "chunks": [],
         }
@@ -108,15 +175,13 @@ class Scene:
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q)
-        loose = np.clip(1.0 - self._per_tendon(f) / SLACK_TENSION, 0.0, 1.0)
-        paths = np.concatenate([path.points for path in self.geometry.paths(q, loose, poses)], axis=-2)
-        quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
+        paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
         return {
             "time": _encode(time, "<f8"),
-            "pose": _encode(np.concatenate([poses.translation, quaternions.reshape(*q.shape[:-1], -1, 4)], -1), "<f4"),
+            "pose": _encode_poses(poses),
             "path": _encode(np.clip(np.rint(paths / self._quantum), -_LARGEST, _LARGEST), "<i2"),
             "tension": _encode(f, "<f4"),
-            "tip": _encode(self._tips(poses), "<f4"),
+            "tip": _encode(self.tips(poses), "<f4"),
             "joint": _encode(q, "<f4"),
         }
 
@@ -125,16 +190,19 @@ class Scene:
         model = self.geometry.model
         return model.frames[model.getFrameId(TIP_FRAME)].placement
 
-    def _tips(self, poses: LinkPoses) -> Array:
+    def tips(self, poses: LinkPoses) -> Array:
+        """Return the fingertips, shape (..., 3), m, of poses of the links."""
         offset = np.array(self._tip_placement.translation)
         return np.asarray(poses.rotation[..., -1, :, :] @ offset + poses.translation[..., -1, :])
 
-    def _per_tendon(self, strand_tension: Array) -> Array:
+    def looseness(self, strand_tension: Array) -> Array:
+        """Return how loose tendons are drawn, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""
         # A passive tendon is drawn loose when both its halves are.
         actuated = len(self.geometry.description.actuated_names)
         passive = strand_tension[..., actuated:]
         halves = passive.reshape(*passive.shape[:-1], -1, 2)
-        return np.concatenate([strand_tension[..., :actuated], halves.max(axis=-1)], axis=-1)
+        tension = np.concatenate([strand_tension[..., :actuated], halves.max(axis=-1)], axis=-1)
+        return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
 
     def _tendon(self, name: str, distal: Sequence[bool]) -> dict[str, Any]:
         description, last = self.geometry.description, len(distal) - 1
@@ -144,8 +212,9 @@ class Scene:
         knots = sorted({0, last, *([distal.index(True)] if True in distal else [])})
         return {"name": name, "strand": [first + int(flag) for flag in distal], "knots": knots}
 
-    def _view(self) -> Array:
-        # From the base frame to the scene's: z is up, the camera stands on the side of -y, where the axes of most
+    def view(self) -> Array:
+        """Return the rotation from the base frame to the frame in which the finger is looked at, shape (3, 3)."""
+        # There z is up, the camera stands on the side of -y, where the axes of most
         # joints point, so that flexion is seen from the side and runs counter-clockwise.
         model, data = self.geometry.model, self.geometry.model.createData()
         pin.forwardKinematics(model, data, np.zeros(model.nq))
@@ -167,12 +236,19 @@ def _outermost(points: Array) -> Array:
     return np.asarray(points[np.unique(np.argmax(points @ fan, axis=0))])
 
 
-def _scale_above(tension: float) -> float:
-    # The upper end of the legend: its quarters are short numbers. The page goes on in the same steps.
+def scale_above(tension: float) -> float:
+    """Return the upper end of a legend of tensions, N: its quarters are short numbers."""
+    # The page goes on in the same steps.
     if not tension > 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(tension))
     return float(next(step * decade for step in (1, 2, 4, 6, 8, 10) if step * decade >= tension * (1.0 - 1e-9)))
+
+
+def _encode_poses(poses: LinkPoses) -> str:
+    quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
+    turned = quaternions.reshape(*poses.translation.shape[:-1], 4)
+    return _encode(np.concatenate([poses.translation, turned], axis=-1), "<f4")
 
 
 def _encode(values: ArrayLike, kind: str) -> str:

@@ -19,13 +19,16 @@ from finger_pin.control.closed_loop import LoopSignals
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
-from finger_pin.views.viewer.scene import Scene
+from finger_pin.views.viewer.scene import Scene, shown
 from finger_pin.views.viewer.server import PageServer
 
 #: Upper end of the legend before a live tension exceeds it, N.
 LIVE_TENSION = 10.0
+#: Height of the page in a notebook, pixels.
+_CELL = 620
 
 
 class Viewing:
@@ -51,6 +54,14 @@ class Viewing:
         """Stop serving; open pages keep what they have."""
         self._server.close()
 
+    def __repr__(self) -> str:
+        """Return the address."""
+        return f"<{type(self).__name__} at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        # Notebooks show the page itself.
+        return f'<iframe src="{self.url}" width="100%" height="{_CELL}" style="border: none"></iframe>'
+
     def __enter__(self) -> Self:
         """Return itself."""
         return self
@@ -66,7 +77,8 @@ def view(
     result: xr.Dataset,
     *,
     forces: ForcePolytope | None = None,
-    open_browser: bool = True,
+    ghost: xr.Dataset | None = None,
+    open_browser: bool | None = None,
     block: bool | None = None,
 ) -> Viewing:
     """Show a result in meshcat: the finger moves, its tendons run along their paths in the colour of their tension.
@@ -74,7 +86,8 @@ def view(
     Args:
         result: What `simulate` returned or saved.
         forces: What `force_polytope` returned, drawn translucent at the fingertip of its posture.
-        open_browser: Whether to open the page in the user's browser.
+        ghost: Another result, whose finger moves faintly beside this one at the same times.
+        open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
     Returns:
@@ -83,62 +96,79 @@ def view(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    return _served(animation_page(result, forces), open_browser, block)
+    return _served(animation_page(result, forces, ghost), open_browser, block)
 
 
 def view_forces(
-    finger: FingerDescription,
+    finger: Finger | FingerDescription,
     forces: ForcePolytope,
     *,
     tension: ArrayLike | None = None,
-    open_browser: bool = True,
+    open_browser: bool | None = None,
     block: bool | None = None,
 ) -> Viewing:
     """Show the forces that a fingertip can exert: a translucent body at the tip of the finger at rest.
 
     Args:
-        finger: The finger.
+        finger: The finger, or its description.
         forces: What `force_polytope` returned.
         tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
-        open_browser: Whether to open the page in the user's browser.
+        open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
     Returns:
         The page in service, with its address; already closed if the call has blocked.
+
+    Raises:
+        InputError: If the finger is not made of links.
     """
-    return _served(posture_page(finger, forces, tension), open_browser, block)
+    return _served(posture_page(shown(finger), forces, tension), open_browser, block)
 
 
-def _served(page: str, open_browser: bool, block: bool | None) -> Viewing:
+def _served(page: str, open_browser: bool | None, block: bool | None) -> Viewing:
     viewing = Viewing(PageServer(page))
-    if open_browser:
-        webbrowser.open(viewing.url, new=2)
+    _open(viewing.url, open_browser)
     if block is None:
-        block = not (sys.flags.interactive or "ps1" in vars(sys))
+        block = not (sys.flags.interactive or "ps1" in vars(sys) or _in_notebook())
     if block:
         print(f"The finger moves at {viewing.url} (Ctrl-C ends this)", flush=True)
         viewing.wait()
     return viewing
 
 
+def _in_notebook() -> bool:
+    return "ipykernel" in sys.modules
+
+
+def _open(url: str, wanted: bool | None) -> None:
+    if not _in_notebook() if wanted is None else wanted:
+        webbrowser.open(url, new=2)
+
+
 class LiveView(Viewing):
     """A page that shows a simulation while it runs."""
 
     def __init__(
-        self, description: FingerDescription, *, title: str = "", open_browser: bool = True, rate: float = 30.0
+        self,
+        finger: Finger | FingerDescription,
+        *,
+        title: str = "",
+        open_browser: bool | None = None,
+        rate: float = 30.0,
     ) -> None:
-        """Serve the page; frames come with `update`.
+        """Serve the page and print its address; frames come with `update`.
 
         Args:
-            description: The finger.
+            finger: The finger, or its description.
             title: Shown above the legend; the finger's title when left out.
-            open_browser: Whether to open the page in the user's browser.
+            open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
             rate: Most frames per second of real time.
         """
+        description = shown(finger)
         self._scene = Scene(description)
         self._interval = 1.0 / rate
         self._due = -np.inf
-        self._started = np.inf
+        self._started = -np.inf
         self._pending: tuple[float, Array, Array, Array | None] | None = None
         limits = np.array([joint.range for joint in description.joints.values()]).clip(-np.pi, np.pi)
         # The camera must see all of the range: poses with the joints bent alike, and every combination of the first
@@ -149,8 +179,8 @@ class LiveView(Viewing):
         reach = np.concatenate([alike, combined])
         header = self._scene.header(title or description.title or description.name, reach, LIVE_TENSION, live=True)
         super().__init__(PageServer(render(header), live=True))
-        if open_browser:
-            webbrowser.open(self.url, new=2)
+        print(f"The finger moves at {self.url}", flush=True)
+        _open(self.url, open_browser)
 
     def update(
         self,
@@ -183,8 +213,9 @@ class LiveView(Viewing):
             signals: All signals then.
         """
         now = time.monotonic()
-        self._started = min(self._started, now - t)
-        time.sleep(max(0.0, self._started + t - now))
+        # A simulation that has fallen behind does not catch up: it goes on from there in real time.
+        self._started = max(self._started, now - t)
+        time.sleep(self._started + t - now)
         strands = signals.finger.tendons.strands
         actuated = signals.finger.command.size
         tension = np.concatenate([strands[:actuated], strands[actuated + 1 :: 2]])

@@ -15,9 +15,9 @@ from finger_pin.mechanism.geometry import TendonGeometry
 ROOT = "/finger_pin"
 Command = dict[str, Any]
 
-#: Opacity of the solids, so that the tendons show inside, and of the grooves.
-_SOLID_OPACITY, _GROOVE_OPACITY = 0.28, 0.28
-_GROOVE_COLOUR = (0.55, 0.62, 0.72)
+#: Opacity of solids and grooves, so that the tendons show inside.
+SOLID_OPACITY = 0.28
+GROOVE_COLOUR = (0.55, 0.62, 0.72)
 
 # Three.js runs its cylinders along y, URDF along z.
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -28,13 +28,17 @@ def link_names(geometry: TendonGeometry) -> list[str]:
     return ["base", *(f"{name}_link" for name in geometry.description.joints)]
 
 
-def solid_commands(geometry: TendonGeometry, urdf: str, tube_radius: float) -> Iterator[Command]:
+def solid_commands(
+    geometry: TendonGeometry, urdf: str, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
+) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
     Args:
         geometry: The finger and its tendons.
         urdf: Its URDF, as text.
         tube_radius: Radius with which tendons are drawn, m; grooves are smaller by as much.
+        root: Path below which the links hang.
+        colour: Of all solids, red, green and blue; by default each has its own.
 
     Raises:
         InputError: If a visual is no box, cylinder or sphere.
@@ -44,19 +48,19 @@ def solid_commands(geometry: TendonGeometry, urdf: str, tube_radius: float) -> I
     for visual in visuals.geometryObjects:
         placement = visual.placement
         shape, turn = _primitive(visual.name, visual.geometry)
-        colour, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * _SOLID_OPACITY
-        path = f"{ROOT}/{links[visual.parentJoint]}/{visual.name}"
-        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour, opacity)
+        own, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * SOLID_OPACITY
+        path = f"{root}/{links[visual.parentJoint]}/{visual.name}"
+        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
-        path = f"{ROOT}/{links[pulley.joint]}/groove_{pulley.tendon}"
+        path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
         shape = _cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), _GROOVE_COLOUR, _GROOVE_OPACITY)
+        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
     """Return meshcat's ``set_transform`` command that turns the base frame into the frame of the scene."""
-    return {"type": "set_transform", "path": ROOT, "matrix": _matrix(rotation, np.zeros(3))}
+    return {"type": "set_transform", "path": ROOT, "matrix": placed(rotation, np.zeros(3))}
 
 
 def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
@@ -99,7 +103,7 @@ def _mesh(
         "type": "Mesh",
         "geometry": f"{path}:geometry",
         "material": material["uuid"],
-        "matrix": _matrix(rotation, translation),
+        "matrix": placed(rotation, translation),
     }
     return {
         "type": "set_object",
@@ -113,7 +117,8 @@ def _mesh(
     }
 
 
-def _matrix(rotation: Array, translation: Array) -> list[float]:
+def placed(rotation: Array, translation: Array) -> list[float]:
+    """Return a pose as meshcat has it: 16 numbers, column by column."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
     return [float(entry) for entry in matrix.T.ravel()]

@@ -24,7 +24,7 @@ from finger_pin.studies.conclusions import (
 )
 from finger_pin.studies.conclusions.delivery import crossing, delivered_tensions
 from finger_pin.studies.conclusions.influence import gripping
-from finger_pin.studies.conclusions.variations import weightless, with_joint_friction, with_tendon_friction
+from finger_pin.studies.conclusions.runs import weightless, with_joint_friction, with_tendon_friction
 
 STILL = {f"reference.joints.{name}.amplitude": 0.0 for name in ("abduction", "proximal", "medial")}
 

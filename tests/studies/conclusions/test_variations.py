@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.reference import HarmonicReference
-from finger_pin.studies.conclusions.variations import (
+from finger_pin.control.reference import SignalReference
+from finger_pin.studies.conclusions.runs import (
     at_speed,
     internal_passive_tension,
     swinging_to_lock,
@@ -47,8 +47,8 @@ def test_at_another_speed_the_motion_is_the_same_in_stretched_time(fig6_scenario
     quick = at_speed(fig6_scenario, 4.0)
     times = np.linspace(0.0, 2.0, 50)
     np.testing.assert_allclose(
-        HarmonicReference.from_scenario(quick, routing).at(times).position,
-        HarmonicReference.from_scenario(fig6_scenario, routing).at(4.0 * times).position,
+        SignalReference.from_scenario(quick, routing).at(times).position,
+        SignalReference.from_scenario(fig6_scenario, routing).at(4.0 * times).position,
         atol=1e-12,
     )
     assert quick.simulation.duration == 2.0
@@ -64,7 +64,7 @@ def test_the_internal_tension_of_the_passive_tendon_is_the_null_vector_by_hand(f
 def test_the_swing_moves_all_joints_their_amplitudes_in_the_directions_that_lock_first(fig6_scenario, routing):
     swing = swinging_to_lock(fig6_scenario)
     start, end = (
-        HarmonicReference.from_scenario(swing, routing).at(t).position for t in (0.0, swing.simulation.duration)
+        SignalReference.from_scenario(swing, routing).at(t).position for t in (0.0, swing.simulation.duration)
     )
     np.testing.assert_allclose(np.abs(end - start), np.deg2rad([16.0, 50.0, 50.0, 35.0]), rtol=1e-6)
     assert abs(np.sign(end - start) @ [1, 1, -1, -1]) == 4

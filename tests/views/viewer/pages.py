@@ -1,8 +1,21 @@
-"""What the tests ask of a page in the browser."""
+"""What the tests ask of a page in the browser, and a clock for what is paced."""
 
 import time
 
 import numpy as np
+
+
+class Clock:
+    """Time that passes when somebody sleeps or computes."""
+
+    now = 1000.0
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, duration):
+        assert duration >= 0.0
+        self.now += duration
 
 
 def opened(browser, url):

@@ -19,7 +19,7 @@ POSTURE = (0.1, 0.5, 0.6, 0.42)
 
 @pytest.fixture(scope="module")
 def polytope(finger):
-    return fp.force_polytope(finger, POSTURE, 20.0)
+    return fp.analysis.force_polytope(finger, POSTURE, 20.0)
 
 
 @pytest.fixture(scope="module")
@@ -105,14 +105,16 @@ def test_without_forces_the_panel_does_not_mention_them(page):
 def test_flat_sets_are_shown_too(browser, tmp_path, name, posture):
     finger = fp.Finger(fp.load_finger(name))
     path = tmp_path / "flat.html"
-    path.write_text(posture_page(finger.description, fp.force_polytope(finger, posture, 10.0)), encoding="utf-8")
+    path.write_text(
+        posture_page(finger.description, fp.analysis.force_polytope(finger, posture, 10.0)), encoding="utf-8"
+    )
     shown = opened(browser, path.as_uri())
     assert len(corners(shown, "body")) >= 9
     assert console_errors(shown) == []
 
 
 def test_a_finger_at_rest_is_served_in_the_posture_of_its_forces_with_the_tensions_of_one(browser, finger, polytope):
-    needed = fp.tension_for_force(finger, POSTURE, [0.0, 0.0, 1.0])
+    needed = fp.analysis.tension_for_force(finger, POSTURE, [0.0, 0.0, 1.0])
     with view_forces(finger.description, polytope, tension=needed.strands, open_browser=False, block=False) as viewing:
         shown = opened(browser, viewing.url)
         angles = [cell.text for cell in shown.find_elements("css selector", "#joints .value")]

@@ -8,10 +8,12 @@ import socket
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from motion import joint_position, tensions
+from pages import Clock
 
 import finger_pin as fp
 from finger_pin.views.viewer import LiveView, view, write_animation
@@ -102,6 +104,31 @@ def test_a_live_view_is_throttled_and_shows_the_last_state():
     assert last == pytest.approx(joint_position(1.0), abs=1e-6)
 
 
+def test_a_simulation_that_is_watched_is_never_ahead_of_real_time(monkeypatch, capsys, finger):
+    clock = Clock()
+    monkeypatch.setattr("finger_pin.views.viewer.serving.time", clock)
+    signals = finger.evaluate(finger.rest_state(joint_position(0.0)), np.ones(4))
+    seen = []
+    with LiveView(finger.description, open_browser=False) as live:
+        assert live.url in capsys.readouterr().out
+        # The step from 0.5 s on takes 2 s to compute; the others take a hundredth of what they simulate.
+        for t, work in ((0.0, 0.0), (0.25, 0.0025), (0.5, 0.0025), (0.75, 2.0), (1.0, 0.0025), (1.5, 0.005)):
+            clock.now += work
+            live.observe(t, SimpleNamespace(finger=signals))
+            seen.append(clock.now - 1000.0)
+    np.testing.assert_allclose(seen, [0.0, 0.25, 0.5, 2.5, 2.75, 3.25])
+
+
 def test_a_live_view_refuses_tensions_of_another_finger():
     with LiveView(fp.load_finger("planar"), open_browser=False) as live, pytest.raises(fp.InputError, match="3"):
         live.update(0.0, np.zeros(2), np.ones(5))
+
+
+def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda url, new: opened.append(url))
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    with view(result) as viewing:
+        assert re.search(r'<iframe [^>]*src="([^"]*)"', viewing._repr_html_())[1] == viewing.url
+        assert viewing.url in repr(viewing)
+    assert opened == []

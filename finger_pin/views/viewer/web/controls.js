@@ -140,9 +140,11 @@ class Player {
     const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
-    const forces = document.getElementById("forces");
-    forces.hidden = !this.config.forces;
-    forces.lastElementChild.textContent = this.config.forces;
+    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title]]) {
+      const note = document.getElementById(name);
+      note.hidden = !text;
+      note.lastElementChild.textContent = text;
+    }
     document.querySelector(".grid-note").textContent = ` · grid ${1000 * this.config.grid} mm`;
     this.rows = this.config.strands.map((name) => {
       const row = document.getElementById("tensions").insertRow();
@@ -169,6 +171,8 @@ class Player {
       button.onclick = () => this.scene.frame(button.dataset.view);
     }
     window.addEventListener("keydown", (event) => this.key(event));
+    // A phone that is turned.
+    window.matchMedia("(orientation: portrait)").addEventListener("change", () => this.scene.frame(this.scene.view));
   }
 
   key(event) {
@@ -190,7 +194,7 @@ class Player {
       pen.fillStyle = css(tensionColour((x / (legend.width - 1)) * this.scale, this.scale));
       pen.fillRect(x, 0, 1, 1);
     }
-    ticks.replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((part) => {
+    ticks.replaceChildren(...[0, 0.5, 1].map((part) => {
       const tick = document.createElement("span");
       tick.style.left = `${100 * part}%`;
       tick.textContent = `${Number((part * this.scale).toPrecision(3))}${part === 1 ? " N" : ""}`;

@@ -63,6 +63,7 @@ class Frames {
       tension: new Rows(config.strands.length, Float32Array),
       tip: new Rows(3, Float32Array),
       joint: new Rows(config.joints.length, Float32Array),
+      ...(config.ghost && { ghost: new Rows(7 * config.ghost.links.length, Float32Array) }),
     };
   }
 
@@ -96,10 +97,10 @@ class Frames {
     return Float32Array.from(before, (value, i) => value + place.weight * (after[i] - value));
   }
 
-  poses(place) {
-    const before = this.columns.pose.row(place.low);
-    const after = this.columns.pose.row(place.high);
-    const mixed = this.mix("pose", place);
+  poses(name, place) {
+    const before = this.columns[name].row(place.low);
+    const after = this.columns[name].row(place.high);
+    const mixed = this.mix(name, place);
     for (let i = 0; i < mixed.length; i += 7) {
       MeshCat.THREE.Quaternion.slerpFlat(mixed, i + 3, before, i + 3, after, i + 3, place.weight);
     }

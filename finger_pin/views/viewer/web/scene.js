@@ -121,6 +121,8 @@ class FingerScene {
     this.frames = frames;
     for (const command of config.commands) viewer.handle_command(command);
     this.links = config.links.map((name) => viewer.scene_tree.find([ROOT, name]).object);
+    for (const command of config.ghost?.commands ?? []) viewer.handle_command(command);
+    this.ghostLinks = (config.ghost?.links ?? []).map((name) => viewer.scene_tree.find([ROOT, "ghost", name]).object);
     this.tendons = config.tendons.map((tendon) => new TendonView(viewer, config, tendon));
     this.trace = new Trace(viewer, config, frames);
     this.root = viewer.scene_tree.find([ROOT]).object;
@@ -160,11 +162,8 @@ class FingerScene {
   }
 
   show(place, colours) {
-    const poses = this.frames.poses(place);
-    this.links.forEach((link, i) => {
-      link.position.fromArray(poses, 7 * i);
-      link.quaternion.fromArray(poses, 7 * i + 3);
-    });
+    this.pose(this.links, "pose", place);
+    if (this.config.ghost) this.pose(this.ghostLinks, "ghost", place);
     const points = this.frames.mix("path", place).map((value) => value * this.config.quantum);
     let first = 0;
     for (const tendon of this.tendons) {
@@ -176,8 +175,17 @@ class FingerScene {
     this.viewer.set_dirty();
   }
 
+  pose(links, name, place) {
+    const poses = this.frames.poses(name, place);
+    links.forEach((link, i) => {
+      link.position.fromArray(poses, 7 * i);
+      link.quaternion.fromArray(poses, 7 * i + 3);
+    });
+  }
+
   // The camera looks at the whole motion, in the part of the window that the panel and the bar leave free.
   frame(name) {
+    this.view = name;
     const { Vector3 } = MeshCat.THREE;
     const { camera, controls } = this.viewer;
     const away = new Vector3(...{ oblique: [0.42, -1, 0.5], side: [0, -1, 0.0], top: [0, -0.001, 1] }[name]).normalize();
@@ -185,13 +193,15 @@ class FingerScene {
     const right = new Vector3(0, 0, 1).cross(away).normalize();
     const up = away.clone().cross(right);
     const [width, height] = [window.innerWidth, window.innerHeight];
-    const panel = document.getElementById("panel").getBoundingClientRect().right;
-    const [left, bottom] = [panel < 0.45 * width ? panel + 20 : 0, 70];
+    const panel = document.getElementById("panel").getBoundingClientRect();
+    const beside = panel.right < 0.45 * width;
+    const [left, top] = beside ? [panel.right + 20, 0] : [0, panel.bottom];
+    const bottom = height - document.getElementById("bar").getBoundingClientRect().top;
     camera.fov = 30;
     camera.near = 0.002;
     camera.far = 20;
     const slope = Math.tan((camera.fov * Math.PI) / 360);
-    const [reachX, reachY] = [(slope * 0.92 * (width - left)) / height, (slope * 0.92 * (height - bottom)) / height];
+    const [reachX, reachY] = [(slope * 0.92 * (width - left)) / height, (slope * 0.92 * (height - top - bottom)) / height];
     // Move until the sides that are seen at the largest angles are equally far out, then back off until all fits.
     const points = this.config.inView.map((point) => new Vector3(...point));
     const centre = points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
@@ -214,7 +224,7 @@ class FingerScene {
       distance = needed;
     }
     const pixel = (2 * slope * distance) / height;
-    centre.addScaledVector(right, (-left / 2) * pixel).addScaledVector(up, (-bottom / 2) * pixel);
+    centre.addScaledVector(right, (-left / 2) * pixel).addScaledVector(up, ((top - bottom) / 2) * pixel);
     controls.target.copy(toWorld(centre));
     camera.position.copy(toWorld(centre.clone().addScaledVector(away, distance)));
     controls.minDistance = 0.1 * distance;

@@ -1,0 +1,40 @@
+"""Whether law (9) can drive motion: micro-damping above what the viscous friction covers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import Numbers, expand
+from finger_pin.laws.bristle import passive_micro_damping
+
+
+def micro_damping_advice(finger: FingerDescription) -> str:
+    """Return what to say about a finger whose micro-damping can drive motion, in one line; otherwise nothing."""
+    tendons, joints = finger.tendon_friction, finger.joint_friction
+    # The normal force of a tendon is a factor of both coefficients: their ratio counts.
+    ratio = expand(tendons.stiction_ratio, len(finger.tendons))
+    coulomb = expand(joints.coulomb, len(finger.joints))
+    static = expand(joints.stiction, len(finger.joints))
+    found = [
+        _exceeded("tendon", finger.tendons, tendons.micro_damping, tendons.viscous, np.ones_like(ratio), ratio),
+        _exceeded("joint", finger.joints, joints.micro_damping, joints.viscous, coulomb, static),
+    ]
+    return "; ".join(filter(None, found))
+
+
+def _exceeded(kind: str, names: Iterable[str], given: Numbers, viscous: Numbers, kinetic: Array, static: Array) -> str:
+    listed = list(names)
+    micro, b = expand(given, len(listed)), expand(viscous, len(listed))
+    most = passive_micro_damping(b, kinetic, static)
+    wrong = [index for index in range(len(listed)) if micro[index] > most[index]]
+    if not wrong:
+        return ""
+    first = wrong[0]
+    return (
+        f"finger.{kind}_friction.micro_damping = {micro[first]:g} can drive the motion of {listed[first]}: "
+        f"friction is passive up to {most[first]:.3g} (b M^d / (M^c - M^d))"
+    )

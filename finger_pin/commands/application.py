@@ -1,0 +1,115 @@
+"""All commands under one roof: one parser of command lines, and one place where exceptions become exit codes."""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import sys
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from functools import wraps
+from typing import Any
+
+import typer
+
+from finger_pin.commands import (
+    conclusions,
+    controllers,
+    force_capability,
+    optimise,
+    reaction,
+    reproduce,
+    self_locking,
+    simulate,
+    sweep,
+    validate,
+)
+from finger_pin.commands.console import Unsuccessful, complain
+from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, StudyError
+
+# What is left when a process ends is not worth a search for garbage, which takes half a second.
+atexit.register(gc.freeze)
+
+DONE, NOT_WRITTEN, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+COMMANDS = (
+    simulate.simulate,
+    sweep.sweep,
+    optimise.optimise,
+    conclusions.conclusions,
+    controllers.controllers,
+    reaction.reaction,
+    self_locking.self_locking,
+    force_capability.force_capability,
+    reproduce.reproduce,
+    validate.validate,
+)
+
+
+def run(name: str | None = None, arguments: Sequence[str] | None = None) -> int:
+    """Do what a command line says; return the exit code.
+
+    0: done. 1: results cannot be written or drawn. 2: the input is wrong. 3: the integration failed. 130: interrupted.
+
+    Args:
+        name: The command that the arguments are for, as in ``scripts/``; without it they begin with its name.
+        arguments: Default those of this process.
+    """
+    return run_function(None if name is None else next(each for each in COMMANDS if each.__name__ == name), arguments)
+
+
+def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] | None = None) -> int:
+    """Do what a command line for one function says, or without it one that begins with a command; as `run`."""
+    program = "finger-pin" if function is None else f"{function.__name__}.py"
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=False, rich_markup_mode=None)
+    for each in COMMANDS if function is None else (function,):
+        app.command(each.__name__.replace("_", "-"))(_told(each, program))
+    try:
+        code = typer.main.get_command(app).main(
+            given if given or function else ["--help"], prog_name=program, standalone_mode=False
+        )
+    except typer.TyperException as error:
+        complain(program, _usage(error))
+        return WRONG_INPUT
+    return int(code or DONE)
+
+
+def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
+    """Return a command that tells in one line what stopped it, with the notes of the exception, and an exit code."""
+
+    @wraps(command)
+    def told(*arguments: Any, **options: Any) -> int:
+        try:
+            return int(command(*arguments, **options) or DONE)
+        except KeyboardInterrupt as error:
+            problem: BaseException = error
+            code, text = INTERRUPTED, "interrupted"
+        except FingerPinError as error:
+            kinds = {
+                InputError: WRONG_INPUT,
+                IntegrationError: FAILED,
+                StudyError: FAILED,
+                Unsuccessful: FAILED,
+                Interrupted: INTERRUPTED,
+            }
+            code = next((kinds[kind] for kind in type(error).__mro__ if kind in kinds), NOT_WRITTEN)
+            problem, text = error, str(error)
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            problem, code = error, NOT_WRITTEN
+            text = f"the results cannot be written: {where}{error.strerror or error}"
+        complain(program, "; ".join([text, *getattr(problem, "__notes__", ())]))
+        return code
+
+    return told
+
+
+def _usage(error: typer.TyperException) -> str:
+    """Return what is wrong with a command line, with the options that there are where one is not."""
+    option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
+    text = str(error.format_message()) if hasattr(error, "format_message") else str(error)
+    if context is None or not text.startswith("No such option"):
+        return text
+    names = [name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"]
+    near = "".join(f"; did you mean {each}?" for each in get_close_matches(option, [*names, "--help"], n=1))
+    return f"{option}: no such option; there are {', '.join(names)}{near}"

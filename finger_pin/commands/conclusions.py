@@ -1,0 +1,94 @@
+"""The command conclusions: put the paper's three conclusions to the test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from finger_pin.commands.console import count_bar, noted, print_text, talks
+from finger_pin.commands.options import Output, Quiet, ScenarioName
+
+if TYPE_CHECKING:
+    from finger_pin.description.scenario import Scenario
+    from finger_pin.studies.conclusions import Finding
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What measures, judges and draws one conclusion; the name of its figure, its runs, and whom it refuses."""
+
+    measure: Callable[..., Any]
+    judge: Callable[[Any], list[Finding]]
+    draw: Callable[[Any], Any]
+    figure: str
+    runs: int
+    check: Callable[[Scenario], None] = lambda scenario: None
+
+
+def conclusions(
+    scenario: ScenarioName = "fig6",
+    only: Annotated[
+        Literal["a", "b", "c"] | None,
+        typer.Option(
+            help="a: tendon friction depends on the posture; b: joint friction depends on the sum of the tensions; "
+            "c: force closure sets the passive tendon's tension.",
+        ),
+    ] = None,
+    output: Output = Path("results/conclusions"),
+    quiet: Quiet = False,
+) -> None:
+    """Put the paper's three conclusions to the test: figures, and a table of what was claimed, measured and found."""
+    shown = talks(quiet)
+    from finger_pin.description.loading import load_scenario
+    from finger_pin.studies.conclusions import findings_table, write_findings
+    from finger_pin.views.plots import save_figure
+
+    loaded = load_scenario(scenario)
+    findings: list[Finding] = []
+    chosen = experiments(only or "abc")
+    for each in chosen:
+        each.check(loaded)
+    bar = count_bar(sum(each.runs for each in chosen)) if shown else nullcontext()
+    with bar as progress, noted(f"what was complete is in {output}"):
+        for each in chosen:
+            found = each.measure(loaded, progress=progress)
+            findings += each.judge(found)
+            # As soon as it is there: who interrupts keeps it.
+            save_figure(each.draw(found), output / each.figure)
+            write_findings(findings, output / "conclusions.csv")
+    if not quiet:
+        print_text(f"{findings_table(findings)}\nFigures and table are in {output}")
+
+
+def experiments(chosen: str) -> list[Experiment]:
+    """Return what measures, judges and draws the chosen conclusions."""
+    from finger_pin.studies import conclusions as e
+    from finger_pin.views import plots as p
+
+    table = {
+        "a": Experiment(
+            e.transmission, e.transmission_findings, p.plot_transmission, "transmission.png", e.TRANSMISSION_RUNS
+        ),
+        "b": Experiment(
+            e.friction_influence,
+            e.influence_findings,
+            p.plot_friction_influence,
+            "friction_influence.png",
+            e.INFLUENCE_RUNS,
+            e.check_influence,
+        ),
+        "c": Experiment(
+            e.passive_delivery,
+            e.delivery_findings,
+            p.plot_passive_delivery,
+            "passive_delivery.png",
+            e.DELIVERY_RUNS,
+            e.check_delivery,
+        ),
+    }
+    return [table[part] for part in chosen]

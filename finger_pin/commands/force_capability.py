@@ -1,0 +1,57 @@
+"""The command force-capability: what a fingertip can push."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from finger_pin.commands.console import print_text, talks
+from finger_pin.commands.options import Output, number, numbers
+
+
+def force_capability(
+    finger: Annotated[str, typer.Argument(metavar="FINGER", help="Name, or path of a .toml file.")] = "ub",
+    posture: Annotated[
+        str | None,
+        typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range."),
+    ] = None,
+    limit: Annotated[str, typer.Option(metavar="N", help="Greatest tension.")] = "20",
+    force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tension is told, N.")] = "0,0,1",
+    output: Output = Path("results/force_capability"),
+    view: Annotated[bool, typer.Option("--view", help="Show the forces at the fingertip in the viewer.")] = False,
+) -> None:
+    """Report and draw the forces that a fingertip can exert at a posture, and the tension that one force needs."""
+    talks(quiet=False)
+    degrees = None if posture is None else numbers("--posture", posture)
+    most, wish = number("--limit", limit, positive=True), numbers("--force", force)
+    import numpy as np
+
+    import finger_pin as fp
+    from finger_pin.analysis import Friction, force_polytope, tension_for_force
+    from finger_pin.description.validation import finite_vector
+    from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
+
+    finite_vector("--force", wish, 3)
+    built = fp.Finger(fp.load_finger(finger))
+    limiter, joints = built.stroke_limiter, built.routing.joints
+    angles = limiter.lower + (limiter.upper - limiter.lower) / 3.0 if degrees is None else np.deg2rad(degrees)
+    if len(angles) != len(joints):
+        allowed = f"must be {len(joints)} angles with commas between, one per joint ({', '.join(joints)})"
+        raise fp.InputError("--posture", allowed, degrees)
+    needed = {each: tension_for_force(built, angles, wish, friction=each) for each in Friction}
+    polytope = force_polytope(built, angles, most)
+    figures = {
+        "forces": plot_force_polytope(built, angles, most),
+        "sensitivity": plot_radius_sensitivity(built, angles, wish),
+    }
+    for name, figure in figures.items():
+        save_figure(figure, output / f"{name}.png")
+    lines = [f"Largest tension for a force of {np.linalg.norm(wish):g} N, N"]
+    lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
+    print_text("\n".join([*lines, f"Figures are in {output}"]))
+    if view:
+        from finger_pin.views.viewer import view_forces
+
+        view_forces(built.description, polytope, tension=needed[Friction.NONE].strands)

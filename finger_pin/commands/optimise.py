@@ -1,0 +1,143 @@
+"""The command optimise: search for designs that no other one is better than."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from finger_pin.commands.console import Interrupts, Unsuccessful, noted, print_text, runs_bar, talks
+from finger_pin.commands.options import (
+    Figures,
+    Quiet,
+    Restart,
+    ScenarioName,
+    Scheduler,
+    Settings,
+    Workers,
+    folder_name,
+    overrides,
+    pool,
+    wrong,
+)
+from finger_pin.commands.sweep import KEPT
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def optimise(
+    scenario: ScenarioName = "fig6",
+    over: Annotated[
+        list[str],
+        typer.Option(
+            metavar="KEY=RANGE",
+            help="Range of a key, LOW:HIGH or LOW:HIGH:log; keys that go together are KEY,KEY2,-KEY3; repeatable; "
+            "default the finger's radii.",
+        ),
+    ] = [],  # noqa: B006
+    minimise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made small; repeatable.")] = [],  # noqa: B006
+    maximise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made large; repeatable.")] = [],  # noqa: B006
+    constraint: Annotated[
+        list[str],
+        typer.Option(
+            metavar="BOUND",
+            help="NAME>=VALUE or NAME<=VALUE; repeatable; default self_locking_margin>=1.5 and fingertip_force>=0.8.",
+        ),
+    ] = [],  # noqa: B006
+    no_constraints: Annotated[bool, typer.Option("--no-constraints", help="Ask for force closure alone.")] = False,
+    population: Annotated[int | None, typer.Option(metavar="N", help="Designs of a generation; default 24.")] = None,
+    generations: Annotated[int | None, typer.Option(metavar="N", help="Default 20.")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="S", help="Of the search; default 0.")] = None,
+    settings: Settings = [],  # noqa: B006
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Where results go; default results/optimise-<scenario, goals>."),
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    restart: Restart = False,
+    figures: Figures = True,
+    quiet: Quiet = False,
+) -> None:
+    """Search for designs that no other one is better than: small, large and bounded metrics over chosen numbers.
+
+    Without arguments: the winding radii of the paper's finger, tracking error against peak tension. Force closure is
+    always asked for. The same command again goes on where an earlier one ended, however it ended. For example:
+
+    optimise fig6 --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses
+
+    optimise fig6 --minimise tension_peak --constraint "tracking_rms<=0.006" --constraint "self_locking_margin>=2"
+
+    simulate results/optimise-fig6/front/01.toml
+    """
+    if no_constraints and constraint:
+        raise wrong("--no-constraints", "contradicts --constraint")
+    given = {"population": population, "generations": generations, "seed": seed}
+    effort = {name: value for name, value in given.items() if value is not None}
+    changed, shown = overrides(settings), talks(quiet)
+    with Interrupts() as interrupts, noted(KEPT):
+        executor = pool(workers, scheduler)
+        from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
+        from finger_pin.studies.keys import Starting
+
+        name = Starting.load(scenario, changed).scenario.name
+        goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint]
+        goals += ["no-constraints"] * no_constraints + [f"{name}={value}" for name, value in effort.items()]
+        output = output or Path("results", folder_name(f"optimise-{name}", *settings, *goals))
+        with runs_bar("search") if shown else nullcontext() as progress, interrupts.patient():
+            result = optimise(
+                scenario,
+                over or None,
+                minimise=minimise or (() if maximise else DEFAULT_OBJECTIVES),
+                maximise=maximise,
+                constraints=constraint or (() if no_constraints else DEFAULT_CONSTRAINTS),
+                effort=Effort(**effort),
+                overrides=changed,
+                output=output,
+                executor=executor,
+                restart=restart,
+                progress=progress,
+                stop=lambda: interrupts.requested,
+            )
+        if figures and not interrupts.requested:
+            from finger_pin.views.plots import plot_pareto, save_figure
+
+            save_figure(plot_pareto(result), output / "figures" / "pareto.png")
+        if not quiet:
+            print_text(f"{summary(result)}\n\nResults are in {output}")
+        if interrupts.requested:
+            raise KeyboardInterrupt
+        if not result["feasible"].any():
+            raise Unsuccessful("no design keeps all constraints")
+
+
+def summary(result: xr.Dataset) -> str:
+    """Return the table of the front, and the starting design beside it."""
+    metrics = [str(name) for name in result.data_vars if "units" in result[name].attrs]
+    keys = [str(key) for key in result.coords]
+    status, feasible = result["status"].values, result["feasible"].values
+    count = int(result["front"].max())
+    head = f"{status.size} designs: {feasible.sum()} keep all bounds, {count} on the front"
+    failed = int((status == "failed").sum())
+    note = f"; {failed} cannot be run (no force closure, or a run that failed: see optimise.nc)" if failed else ""
+    columns = {name: [f"{value:.4g}" for value in result[name].values] for name in (*metrics, *keys)}
+    shown = [("start", 0), *((f"{n:02d}", int((result["front"].values == n).argmax())) for n in range(1, count + 1))]
+    width = max(len(label(result, name)) for name in columns)
+    lines = [f"{head}{note}", "", f"  {'design'.ljust(width)}" + "".join(mark.rjust(11) for mark, _ in shown[:8])]
+    lines += [
+        f"  {label(result, name).ljust(width)}" + "".join(values[row].rjust(11) for _, row in shown[:8])
+        for name, values in columns.items()
+    ]
+    if len(shown) > 8:
+        lines.append(f"  and {len(shown) - 8} more designs on the front: see front.csv")
+    return "\n".join(lines)
+
+
+def label(result: xr.Dataset, name: str) -> str:
+    """Return a short name of a metric or key with its unit."""
+    from finger_pin.views.plots.sweep import short_key
+
+    return f"{short_key(name)} ({result[name].attrs['units']})"

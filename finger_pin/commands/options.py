@@ -1,0 +1,107 @@
+"""Arguments and options that several commands take, and how their text is read."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from finger_pin.studies import DaskCluster, LocalProcesses
+
+# A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
+_BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
+
+ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, or path of a .toml file.")]
+Settings = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="Override an entry; repeatable.")]
+Output = Annotated[Path, typer.Option(metavar="DIR", help="Where results go.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
+Figures = Annotated[bool, typer.Option(help="Draw the figures.")]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Processes; default one per core.")]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster of a scheduler, such as tcp://host:8786.")
+]
+Restart = Annotated[bool, typer.Option("--restart", help="Drop what the folder holds of a study, and begin anew.")]
+
+
+def wrong(option: str, allowed: str) -> typer.TyperException:
+    """Return the error of an option."""
+    return typer.TyperException(f"{option}: {allowed}")
+
+
+def overrides(settings: list[str], **short: str | None) -> dict[str, Any]:
+    """Return overrides of `load_scenario` from texts KEY=VALUE, the value in TOML or a string without quotes.
+
+    Args:
+        settings: Of ``--set``.
+        short: By the name of a short option for an entry of ``simulation``, its text; it wins.
+    """
+    found = {}
+    for text in settings:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise wrong("--set", f"{text}: must be KEY=VALUE, such as controller.gain=2")
+        found[key.strip()] = _value(key.strip(), value)
+    given = {f"simulation.{name}": text for name, text in short.items() if text is not None}
+    return found | {key: _value(key, text) for key, text in given.items()}
+
+
+def _value(key: str, text: str) -> Any:
+    text = text.strip()
+    try:
+        table = tomllib.loads(f"value = {text}")
+        if table.keys() == {"value"}:
+            return table["value"]
+    except (ValueError, RecursionError):
+        if _BARE_STRING.fullmatch(text):
+            return text
+    raise wrong(key, f"{text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
+
+
+def pool(workers: int | None, scheduler: str | None) -> DaskCluster | LocalProcesses:
+    """Return what makes the runs of a study.
+
+    Raises:
+        InputError: If there are no workers.
+    """
+    if scheduler is not None and workers is not None:
+        raise wrong("--workers", "are local; those of a scheduler are its own")
+    from finger_pin.studies import DaskCluster, LocalProcesses
+
+    return LocalProcesses(workers) if scheduler is None else DaskCluster(scheduler)
+
+
+def numbers(option: str, text: str) -> list[float]:
+    """Return the finite numbers of a text with commas between."""
+    return [number(option, each) for each in text.split(",")]
+
+
+def number(option: str, text: str | float, *, positive: bool = False) -> float:
+    """Return a finite number, above zero if asked."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) < float("inf"):
+        raise wrong(option, f"{text}: must be a finite number")
+    if positive and not value > 0.0:
+        raise wrong(option, f"{text}: must be above 0")
+    return value
+
+
+def folder_name(name: str, *variants: str) -> str:
+    """Return the name of a folder for what is asked for beyond a scenario's own entries.
+
+    Args:
+        name: Of the scenario, or of a study on it.
+        variants: Such as ``controller.gain=2``. What a path cannot hold is replaced, and a digest then tells others.
+    """
+    text = ",".join([name, *(re.sub(r"[\s\[\]{}\"']", "", each).replace(":", "_") for each in variants)])
+    plain = re.sub(r"[^\w.=,+-]+", "-", text, flags=re.ASCII)
+    if plain == text and len(text) <= 120:
+        return text
+    return f"{plain[:110]}-{hashlib.sha256(text.encode(errors='surrogateescape')).hexdigest()[:8]}"

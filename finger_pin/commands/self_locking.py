@@ -1,0 +1,61 @@
+"""The command self-locking: the joint friction at which a finger grips itself."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from finger_pin.commands.console import print_text, talks
+from finger_pin.commands.options import Output, ScenarioName
+
+if TYPE_CHECKING:
+    from finger_pin.description.scenario import Scenario
+
+SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
+
+
+def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results/self_locking")) -> None:
+    """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it."""
+    talks(quiet=False)
+    import numpy as np
+
+    import finger_pin as fp
+    from finger_pin.analysis import critical_friction, self_locking_map, self_locking_margin
+    from finger_pin.views.plots import plot_critical_friction, plot_runaway, plot_self_locking_map, save_figure
+
+    loaded = fp.load_scenario(scenario)
+    finger, margin = loaded.finger, self_locking_margin(loaded)
+    lines = ["Joint friction at which the finger locks, mm"]
+    for joint in finger.joints:
+        lines.append(f"  {joint:12} {1e3 * critical_friction(finger, joints=[joint]).coefficient:8.3f}")
+    lines.append(f"  {'all joints':12} {1e3 * critical_friction(finger).coefficient:8.3f}")
+    lines.append(
+        f"On its reference, {loaded.name} stays a factor {margin.margin:.3g} below, least at {margin.time:.3g} s"
+    )
+    figures = {
+        "critical_friction": plot_critical_friction(finger),
+        "map": plot_self_locking_map(self_locking_map(fp.Finger(finger))),
+    }
+    if np.isfinite(margin.margin):
+        with warnings.catch_warnings():
+            # Runs on both sides are the point.
+            warnings.simplefilter("ignore", fp.SelfLockingWarning)
+            runs = {
+                f"{share:g} of critical": fp.simulate(scaled(scenario, loaded, share * margin.margin))
+                for share in SHARES
+            }
+        figures["runs"] = plot_runaway(runs)
+    for title, figure in figures.items():
+        save_figure(figure, output / f"{title}.png")
+    print_text("\n".join([*lines, f"Figures are in {output}"]))
+
+
+def scaled(name: str, scenario: Scenario, factor: float) -> Scenario:
+    """Return the scenario with M^c of the joints times a factor, and M^d alike: sliding is no easier than starting."""
+    import numpy as np
+
+    from finger_pin.description.loading import load_scenario
+
+    static = (factor * np.asarray(scenario.finger.joint_friction.stiction)).tolist()
+    return load_scenario(name, {f"finger.joint_friction.{key}": static for key in ("coulomb", "stiction")})

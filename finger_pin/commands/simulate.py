@@ -1,0 +1,156 @@
+"""The command simulate: run a scenario, write its results, print a summary."""
+
+from __future__ import annotations
+
+import gc
+import warnings
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
+from finger_pin.commands.drawing import Drawing, NotDrawn, without_dask
+from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
+from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.description.scenario import Scenario
+    from finger_pin.simulation.results import ResultFolder
+
+
+def simulate(
+    scenario: ScenarioName = "fig6",
+    settings: Settings = [],  # noqa: B006
+    duration: Annotated[str | None, typer.Option(metavar="S", help="Override simulation.duration.")] = None,
+    method: Annotated[str | None, typer.Option(metavar="NAME", help="Override simulation.method.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where results go; default results/<scenario and overrides>.")
+    ] = None,
+    view: Annotated[bool, typer.Option(help="Open the viewer and play the result.")] = False,
+    live: Annotated[bool, typer.Option("--live", help="Watch while it computes, at most in real time.")] = False,
+    figures: Figures = True,
+    check: Annotated[
+        bool, typer.Option("--check", help="Repeat the run at a tighter tolerance, and report where the two part.")
+    ] = False,
+    quiet: Quiet = False,
+    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers and methods, and exit.")] = False,
+) -> None:
+    """Simulate a scenario, write its results, and print a summary."""
+    changed = overrides(settings, duration=duration, method=method)
+    if listed:
+        print_text(listing())
+        return
+    with Interrupts() as interrupts, without_dask(), Drawing() if figures else nullcontext() as drawing:
+        # Imports leave no garbage to look for.
+        gc.disable()
+        from finger_pin.description.loading import load_scenario
+        from finger_pin.simulation.convergence import tightened
+        from finger_pin.simulation.results import ResultFolder
+        from finger_pin.views.summary import summarize
+
+        gc.enable()
+
+        loaded = load_scenario(scenario, changed)
+        output = output or Path("results", default_name(loaded, settings, duration, method))
+        if check:
+            tightened(loaded)
+        with ResultFolder(output) as folder:
+            result, problem = compute(loaded, interrupts, quiet, live, check)
+            if result is None:
+                assert problem is not None
+                problem.add_note("nothing was computed")
+                raise problem
+            with noted("earlier results are as they were"):
+                with interrupts.patient():
+                    folder.write(result)
+                if interrupts.requested:
+                    # Who interrupts wants an end soon: the data are kept, the views are not drawn.
+                    problem = problem or KeyboardInterrupt()
+                else:
+                    problem = draw(result, folder, drawing) or problem
+                with interrupts.patient():
+                    folder.publish()
+        if not quiet:
+            print_text(f"{summarize(result)}\n\nResults are in {output}")
+        if problem is not None:
+            problem.add_note(f"what was computed is in {output}")
+            raise problem
+        if view:
+            from finger_pin.views.viewer import view as show
+
+            show(result)
+
+
+def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
+    """Return the name of the folder of results: the scenario's, and of what was overridden besides it."""
+    short = [f"{name}={text}" for name, text in (("duration", duration), ("method", method)) if text is not None]
+    return folder_name(scenario.name, *(each for each in settings if each.partition("=")[0].strip() != "name"), *short)
+
+
+def compute(
+    scenario: Scenario, interrupts: Interrupts, quiet: bool, live: bool, check: bool
+) -> tuple[xr.Dataset | None, BaseException | None]:
+    """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did."""
+    from finger_pin.simulation.convergence import check_convergence
+    from finger_pin.simulation.simulate import simulate
+
+    if live:
+        from finger_pin.views.viewer import LiveView
+
+        watched = LiveView(scenario.finger, title=scenario.title)
+    shown = talks(quiet)
+    bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
+    with bar as progress, watched if live else nullcontext() as viewer, interrupts.patient(), warnings.catch_warnings():
+        # The summary says what it would say.
+        warnings.simplefilter("ignore", ScenarioWarning)
+        observe = viewer.observe if viewer else None
+        try:
+            result = simulate(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested)
+        except (IntegrationError, Interrupted) as error:
+            return error.result, error
+        try:
+            if check:
+                found = check_convergence(scenario, result, progress=progress, stop=lambda: interrupts.requested)
+                result = found.attach(result)
+        except IntegrationError as error:
+            complain("simulate", f"convergence could not be checked: {error}")
+        except Interrupted as error:
+            error.add_note("before convergence was checked")
+            return result, error
+    return result, None
+
+
+def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> BaseException | None:
+    """Draw animation and figures, all or none; return what went wrong if anything did."""
+    try:
+        if drawing is not None:
+            drawing.start(folder.stage)
+        from finger_pin.views.viewer import write_animation
+
+        write_animation(result, folder.stage / "animation.html")
+        if drawing is not None:
+            drawing.wait()
+    except OSError:
+        raise
+    except (KeyboardInterrupt, Exception) as error:
+        # A result is worth more than its pictures.
+        folder.discard_views()
+        if isinstance(error, KeyboardInterrupt):
+            return error
+        what = str(error) if isinstance(error, NotDrawn) else f"{type(error).__name__}: {error}"
+        return NotDrawn(f"animation and figures cannot be drawn: {what}")
+    return None
+
+
+def listing() -> str:
+    """Return the names that the command line takes, with a line about each."""
+    from finger_pin.description.loading import list_fingers, list_scenarios
+    from finger_pin.description.scenario import METHODS
+
+    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Methods": dict.fromkeys(METHODS, "")}
+    rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}
+    return "\n\n".join("\n".join([title, *lines]) for title, lines in rows.items())

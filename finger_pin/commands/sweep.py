@@ -1,0 +1,163 @@
+"""The command sweep: run a scenario at many points, measure every run, and draw what came out."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from finger_pin.commands.console import Interrupts, Unsuccessful, noted, print_text, runs_bar, talks
+from finger_pin.commands.options import (
+    Figures,
+    Quiet,
+    Restart,
+    ScenarioName,
+    Scheduler,
+    Settings,
+    Workers,
+    folder_name,
+    overrides,
+    pool,
+    wrong,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.studies.designs import Design
+
+KEPT = "the same command goes on from what is recorded"
+
+
+def sweep(
+    scenario: ScenarioName = "fig6",
+    over: Annotated[
+        list[str],
+        typer.Option(
+            metavar="KEY=VALUES",
+            help="Values of a key: START:STOP:N, START:STOP:N:log or A,B,C; for a latin design LOW:HIGH or "
+            "LOW:HIGH:log; repeatable.",
+        ),
+    ] = [],  # noqa: B006
+    metric: Annotated[list[str], typer.Option(metavar="NAME", help="What to measure; repeatable; see --list.")] = [],  # noqa: B006
+    design: Annotated[
+        Literal["grid", "list", "latin"],
+        typer.Option(help="Every combination; first values together, then second ones; a Latin hypercube."),
+    ] = "grid",
+    samples: Annotated[int | None, typer.Option(metavar="N", help="Points of a latin design.")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="S", help="Of a latin design; default 0.")] = None,
+    settings: Settings = [],  # noqa: B006
+    output: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where results go; default results/sweep-<scenario and keys>.")
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    restart: Restart = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Repeat runs that failed before.")] = False,
+    figures: Figures = True,
+    quiet: Quiet = False,
+    listed: Annotated[bool, typer.Option("--list", help="List metrics, and exit.")] = False,
+) -> None:
+    """Run a scenario at many points, measure every run, and draw what came out.
+
+    The same command again goes on where an earlier one ended, however it ended. For example:
+
+    sweep fig6 --over controller.gain=0.5:2:7 --over finger.tendon_friction.coulomb=0.05,0.11,0.2
+
+    sweep fig6 --design latin --samples 50 --over controller.gain=0.5:2 --over finger.tendon_friction.coulomb=0.02:0.3
+    """
+    if listed:
+        print_text(listing())
+        return
+    if not over:
+        raise wrong("--over", "at least one key is needed, such as --over controller.gain=0.5:2:7")
+    if (samples is None) == (design == "latin"):
+        raise wrong("--samples", "is needed by --design latin, and by no other")
+    if seed is not None and design != "latin":
+        raise wrong("--seed", "is for --design latin")
+    changed, shown = overrides(settings), talks(quiet)
+    with Interrupts() as interrupts, noted(KEPT):
+        executor = pool(workers, scheduler)
+        from finger_pin.exceptions import StudyError
+        from finger_pin.studies import DEFAULT_METRICS, sweep
+        from finger_pin.studies.keys import Starting
+
+        points = build_design(design, over, samples, seed or 0)
+        name = Starting.load(scenario, changed).scenario.name
+        chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
+        output = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
+        with runs_bar("sweep") if shown else nullcontext() as progress, interrupts.patient():
+            try:
+                result = sweep(
+                    scenario,
+                    points,
+                    metrics=metric or DEFAULT_METRICS,
+                    overrides=changed,
+                    output=output,
+                    executor=executor,
+                    restart=restart,
+                    retry_failed=retry_failed,
+                    progress=progress,
+                    stop=lambda: interrupts.requested,
+                )
+            except StudyError as error:
+                # The summary tells what every run died of.
+                result = error.result
+        if figures and not interrupts.requested:
+            from finger_pin.views.plots import plot_sweep, save_figure
+
+            save_figure(plot_sweep(result), output / "figures" / "sweep.png")
+        if not quiet:
+            print_text(f"{summary(result)}\n\nResults are in {output}")
+        if interrupts.requested and (result["status"] == "missing").any():
+            raise KeyboardInterrupt
+        if (result["status"] == "failed").all():
+            raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
+
+
+def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> Design:
+    """Return the design that the options describe."""
+    from finger_pin.exceptions import InputError
+    from finger_pin.studies import Grid, LatinHypercube, Listing
+    from finger_pin.studies.spelling import parse_range, parse_values
+
+    parse_one: Any = parse_range if kind == "latin" else parse_values
+    given: dict[str, Any] = {}
+    for text in over:
+        key, values = parse_one(text)
+        if key in given:
+            raise InputError("over", "a key must not come twice", text)
+        given[key] = values
+    if kind == "latin":
+        return LatinHypercube(given, samples or 0, seed)
+    return Listing(given) if kind == "list" else Grid(given)
+
+
+def summary(result: xr.Dataset) -> str:
+    """Return the ranges of the metrics, how many runs there are, and why runs failed."""
+    status = result["status"].values.ravel()
+    counts = [f"{(status == kind).sum()} {kind}" for kind in ("done", "failed", "missing") if (status == kind).any()]
+    rows = [("", "least", "greatest", "")]
+    for name in result.data_vars:
+        if name not in ("status", "reason"):
+            values = result[name].values[result["status"].values == "done"]
+            ends = (f"{values.min():.4g}", f"{values.max():.4g}") if values.size else ("-", "-")
+            rows.append((str(name), *ends, result[name].attrs["units"]))
+    width = max(len(row[0]) for row in rows)
+    lines = [f"{status.size} runs: {', '.join(counts)}", ""]
+    lines += [f"  {a.ljust(width)}{b.rjust(12)}{c.rjust(12)}  {d}".rstrip() for a, b, c, d in rows]
+    reasons = sorted(set(result["reason"].values.ravel()) - {""})
+    if reasons:
+        lines += ["", "Why runs failed"] + [f"  {each}" for each in reasons[:5]]
+        lines += [f"  and {len(reasons) - 5} more: see sweep.nc"] if len(reasons) > 5 else []
+    return "\n".join(lines)
+
+
+def listing() -> str:
+    """Return the metrics, with a line about each."""
+    from finger_pin.studies import DEFAULT_METRICS, METRICS
+
+    lines = [f"  {m.name:21}{m.unit:5}{m.long_name}" for m in METRICS.values()]
+    return "\n".join(["Metrics", *lines, "", f"Measured by default: {', '.join(DEFAULT_METRICS)}"])

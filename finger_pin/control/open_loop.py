@@ -1,0 +1,68 @@
+"""Tensions over time, whatever the finger does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.control.signal import Signal
+from finger_pin.description.routing import Array, Routing
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import ForceSignal
+from finger_pin.description.validation import expand
+from finger_pin.exceptions import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class OpenLoopTensions:
+    """f^a over time.
+
+    The torque that goes with it is what it would exert free of friction; passive tensions are planned to be zero.
+
+    Attributes:
+        signal: A signal for each of the a actuated tendons, N.
+        routing: The routing.
+    """
+
+    signal: Signal
+    routing: Routing
+
+    @classmethod
+    def from_scenario(cls, scenario: Scenario, routing: Routing) -> OpenLoopTensions:
+        """Read ``controller.tensions``; a tendon without any is held at its minimum tension."""
+        given = scenario.controller.tensions or {}
+        least = expand(scenario.controller.minimum_tension, len(routing.tendons))
+        settings = [
+            given.get(name, ForceSignal(offset=float(tension)))
+            for name, tension in zip(routing.tendons[: routing.actuated], least, strict=False)
+        ]
+        return cls(Signal.from_settings(settings).later(scenario.simulation.start_time), routing)
+
+    @classmethod
+    def from_samples(
+        cls, samples: tuple[ArrayLike, ArrayLike], scenario: Scenario, routing: Routing
+    ) -> OpenLoopTensions:
+        """Return the tensions through samples: times, shape (m,), s, and tensions, shape (m, a), N.
+
+        Raises:
+            InputError: If shapes or numbers are wrong, or a tension is negative.
+        """
+        signal = Signal.from_samples("controller", samples, routing.tendons[: routing.actuated])
+        if np.min(samples[1]) < 0.0:
+            raise InputError(
+                "controller", "tensions must not be negative: a tendon only pulls", float(np.min(samples[1]))
+            )
+        return cls(signal.later(scenario.simulation.start_time), routing)
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return the tensions at one time, or at times of shape (m,)."""
+        # Rounding may take what is at zero below it.
+        pulled = np.maximum(self.signal.at(time)[0], 0.0)
+        planned = np.zeros((*pulled.shape[:-1], self.routing.passive))
+        return ControlSignals(pulled @ self.routing.actuated_coupling, np.concatenate([pulled, planned], axis=-1))

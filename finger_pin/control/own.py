@@ -1,0 +1,171 @@
+"""Controllers and references of a user's own: asked for one time at a time, and checked.
+
+Nobody has to vectorise over time, and what is wrong is said at the first answer. What goes wrong later ends the
+simulation there, because a command that is not a number does; what was computed until then is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from finger_pin.control.measurement import MeasuringController
+from finger_pin.control.proportional import Controller, ControlSignals
+from finger_pin.control.reference import Reference, ReferenceSignals
+from finger_pin.description.routing import Array, Routing
+from finger_pin.exceptions import InputError
+
+# Rounding, N.
+_LEAST = -1e-6
+
+
+class OwnReference:
+    """A reference of one's own.
+
+    Attributes:
+        reference: Asked for one time, s, at a time.
+        joints: Names, n of them.
+        start: What its clock shows when the simulation begins, s.
+    """
+
+    def __init__(self, reference: Reference, joints: Sequence[str], start: float) -> None:
+        """Take a reference.
+
+        Raises:
+            InputError: If it has no ``at``.
+        """
+        if not callable(getattr(reference, "at", None)):
+            allowed = "must have at(time), or be a pair of arrays: times, and angles with one row for each"
+            raise InputError("reference", allowed, type(reference).__name__)
+        self.reference, self.joints, self.start = reference, joints, start
+
+    def at(self, time: Array | float) -> ReferenceSignals:
+        """Return theta^d and its rate at one time, or at times of shape (m,).
+
+        Raises:
+            InputError: If either is not n finite numbers.
+        """
+        if np.ndim(time) == 0:
+            return self._one(float(time))
+        found = [self._one(float(each)) for each in np.asarray(time)]
+        return ReferenceSignals(
+            np.array([each.position for each in found]), np.array([each.velocity for each in found])
+        )
+
+    def _one(self, time: float) -> ReferenceSignals:
+        found = self.reference.at(time + self.start)
+        values = []
+        for name in ("position", "velocity"):
+            if not hasattr(found, name):
+                raise InputError("reference", "at(time) must return ReferenceSignals(position, velocity)")
+            value = _numbers(getattr(found, name))
+            if value.shape != (len(self.joints),) or not np.isfinite(value).all():
+                allowed = f"{name} at t = {time:g} s must be {len(self.joints)} finite numbers, one per joint"
+                raise InputError("reference", allowed, value.tolist())
+            values.append(value)
+        return ReferenceSignals(*values)
+
+
+class OwnController:
+    """A controller of one's own.
+
+    It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones.
+
+    Attributes:
+        controller: Asked for one time at a time: time, s, `ReferenceSignals`, theta and theta', shape (n,).
+        problem: What has gone wrong after the first answer, or empty.
+        problem_time: When, s.
+    """
+
+    def __init__(self, controller: Controller, routing: Routing, start: float) -> None:
+        """Take a controller; ``start`` is what its clock shows when the simulation begins, s.
+
+        Raises:
+            InputError: If it has no ``command``.
+        """
+        if not callable(getattr(controller, "command", None)):
+            allowed = (
+                "must have command(time, reference, position, velocity), or be a pair of arrays: times, and tensions"
+            )
+            raise InputError("controller", allowed, type(controller).__name__)
+        self.controller, self.problem, self.problem_time = controller, "", -np.inf
+        self._routing, self._start, self._asked = routing, start, False
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return the commands for shapes (..., n).
+
+        Raises:
+            InputError: If the first answer has a wrong size, or a tension that is negative or not finite.
+        """
+        if np.ndim(position) == 1:
+            return self._one(float(time), reference, position, velocity)
+        times = np.broadcast_to(time, len(position))
+        rows = zip(times, reference.position, reference.velocity, position, velocity, strict=True)
+        found = [self._one(float(t), ReferenceSignals(p, v), *motion) for t, p, v, *motion in rows]
+        missing = [each.shortfall for each in found if each.shortfall is not None]
+        return ControlSignals(
+            np.array([each.torque for each in found]),
+            np.array([each.tension for each in found]),
+            np.array(missing) if len(missing) == len(found) else None,
+        )
+
+    def _one(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:
+        first, self._asked = not self._asked, True
+        try:
+            found = self._complete(self.controller.command(time + self._start, reference, position, velocity))
+            self._check(found, first)
+            return found
+        except Exception as error:
+            if first:
+                raise
+            # An integrator that meets this in a step that it tries takes a smaller one; in the end it stops.
+            text = (
+                str(error)
+                if isinstance(error, InputError)
+                else f"the controller raised {type(error).__name__}: {error}"
+            )
+            self.problem, self.problem_time = " ".join(text.split()), time
+            routing = self._routing
+            return ControlSignals(np.zeros(len(routing.joints)), np.full(len(routing.tendons), np.nan))
+
+    def _complete(self, found: object) -> ControlSignals:
+        routing = self._routing
+        tension = _numbers(getattr(found, "tension", found))
+        if tension.shape not in ((len(routing.tendons),), (routing.actuated,)):
+            sizes = " or ".join(map(str, dict.fromkeys([routing.actuated, len(routing.tendons)])))
+            names = ", ".join(routing.tendons)
+            allowed = f"command() must return {sizes} tensions ({names}) for one time, not shape {tension.shape}"
+            raise InputError("controller", allowed)
+        torque = _numbers(getattr(found, "torque", tension[: routing.actuated] @ routing.actuated_coupling))
+        if torque.shape != (len(routing.joints),):
+            allowed = f"command() must return {len(routing.joints)} torques for one time, not shape {torque.shape}"
+            raise InputError("controller", allowed)
+        # A passive tendon of which nothing is said is planned to carry nothing.
+        tension = np.append(tension, np.zeros(len(routing.tendons) - len(tension)))
+        return ControlSignals(torque, tension, getattr(found, "shortfall", None))
+
+    def _check(self, found: ControlSignals, first: bool) -> None:
+        for name, tension in zip(self._routing.tendons, found.tension, strict=True):
+            if tension < _LEAST or (first and not np.isfinite(tension)):
+                allowed = f"tensions must be finite and not negative, that of {name} is not; clip it at 0 or above"
+                raise InputError("controller", allowed, float(tension))
+
+
+class OwnMeasuringController(OwnController, MeasuringController):
+    """A controller of one's own that also listens to tension sensors."""
+
+    controller: MeasuringController
+
+    def sense(self, tension: Array, elapsed: float) -> None:
+        """Pass on what the sensors say."""
+        self.controller.sense(tension, elapsed)
+
+
+def _numbers(value: object) -> Array:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return np.full((), np.nan)

@@ -1,0 +1,138 @@
+"""Signals over time as arrays: what references, open-loop tensions and the force at the fingertip are made of.
+
+Every signal is a sinusoid about an offset, and on top of it a polynomial of degree five at most between knots that all
+signals share, constant before the first knot and after the last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator, PPoly
+
+from finger_pin.description.routing import Array
+from finger_pin.description.signals import SignalSettings
+from finger_pin.exceptions import InputError
+from finger_pin.laws.harmonic import harmonic, harmonic_rate
+from finger_pin.laws.quintic import quintic, quintic_rate
+
+_ORDER = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """k signals over time.
+
+    Attributes:
+        harmonics: Shape (k, 4): offset and amplitude in the unit of the signal, frequency, Hz, phase, rad.
+        knots: Shape (m,), s, increasing, at least two; the polynomials are constant outside.
+        coefficients: Shape (6, m - 1, k): of the powers 5 to 0 of the time since the knot before, as scipy's `PPoly`.
+    """
+
+    harmonics: Array
+    knots: Array
+    coefficients: Array
+
+    @classmethod
+    def from_settings(cls, settings: Sequence[SignalSettings]) -> Signal:
+        """Return the signals that settings describe, k of them."""
+        harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
+        return cls(harmonics.reshape(-1, 4), *_joined([_polynomial(each) for each in settings]))
+
+    @classmethod
+    def from_samples(cls, name: str, samples: tuple[ArrayLike, ArrayLike], columns: Sequence[str]) -> Signal:
+        """Return signals through samples, joined by monotone cubics.
+
+        Args:
+            name: Of the argument, for messages.
+            samples: Times, shape (m,), s, and values, shape (m, k).
+            columns: Names of the k signals.
+
+        Raises:
+            InputError: If the shapes differ from these, a number is not finite, or times do not increase.
+        """
+        try:
+            times, values = (np.asarray(each, dtype=float) for each in samples)
+        except (TypeError, ValueError):
+            raise InputError(name, "must be a pair of arrays: times, and values with one row for each") from None
+        shape, wanted = values.shape, f"one column for each of {', '.join(columns)}"
+        if times.ndim != 1 or len(times) < 2 or shape != (len(times), len(columns)):
+            rows = f"{max(times.size, 2)} rows like the times, and {wanted}"
+            raise InputError(name, f"times have shape {times.shape} and values {shape}; values must have {rows}")
+        if not (np.isfinite(times).all() and np.isfinite(values).all()):
+            raise InputError(name, "times and values must be finite")
+        if not np.all(np.diff(times) > 0.0):
+            raise InputError(name, "times must increase")
+        return cls(np.zeros((len(columns), 4)), *_joined([PchipInterpolator(times, each) for each in values.T]))
+
+    @cached_property
+    def is_harmonic(self) -> bool:
+        """Whether there are sinusoids only."""
+        return not self.coefficients.any()
+
+    def at(self, time: Array | float) -> tuple[Array, Array]:
+        """Return values and rates at one time, each of shape (k,), or at times of shape (m,), each (m, k)."""
+        instant = np.asarray(time, dtype=float)[..., None]
+        offset, amplitude, frequency, phase = self.harmonics.T
+        value = harmonic(instant, offset, amplitude, frequency, phase)
+        rate = harmonic_rate(instant, amplitude, frequency, phase)
+        if self.is_harmonic:
+            return value, rate
+        inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], inside, side="right")
+        since, factors = inside - self.knots[piece], self.coefficients[:, piece[..., 0]]
+        moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
+        return value + quintic(since, *factors), rate + moving * quintic_rate(since, *factors[:-1])
+
+    def later(self, start: float) -> Signal:
+        """Return the signals with their time counted from a start, s."""
+        harmonics = self.harmonics.copy()
+        harmonics[:, 3] += 2.0 * math.pi * harmonics[:, 2] * start
+        return replace(self, harmonics=harmonics, knots=self.knots - start)
+
+
+def _polynomial(settings: SignalSettings) -> PPoly | None:
+    """Return what the kind of a signal adds to the sinusoid, or None."""
+    if settings.times is not None:
+        times, values = np.array(settings.times), np.array(settings.values)
+        if settings.kind == "samples":
+            return PchipInterpolator(times, values)
+        length, change = np.diff(times), np.diff(values)
+        nothing = np.zeros_like(change)
+        terms = [6.0 / length**5, -15.0 / length**4, 10.0 / length**3]
+        return PPoly(np.array([*(change * term for term in terms), nothing, nothing, values[:-1]]), times)
+    if settings.time is None:
+        return None
+    start, height = settings.time, settings.height or 0.0
+    if settings.duration is None:
+        return PPoly(np.array([[0.0, height]]), np.array([start - 1.0, start, start + 1.0]))
+    return PPoly(np.array([[height / settings.duration], [0.0]]), np.array([start, start + settings.duration]))
+
+
+def _joined(columns: Sequence[PPoly | None]) -> tuple[Array, Array]:
+    """Return knots, shape (m,), and coefficients, shape (6, m - 1, k), of polynomials about shared knots."""
+    knots = np.unique(np.concatenate([[], *[each.x for each in columns if each is not None]]))
+    if len(knots) == 0:
+        knots = np.array([0.0, 1.0])
+    start, middle = knots[:-1], 0.5 * (knots[:-1] + knots[1:])
+    coefficients = np.zeros((_ORDER, len(start), len(columns)))
+    for column, each in enumerate(columns):
+        if each is None:
+            continue
+        powers = np.vstack([np.zeros((_ORDER - len(each.c), len(each.x) - 1)), each.c])[::-1]
+        piece = np.clip(np.searchsorted(each.x, middle) - 1, 0, len(each.x) - 2)
+        # Outside its own knots a signal keeps its value there; inside, its piece is expanded about the shared knot.
+        since = np.clip(start, each.x[0], each.x[-1]) - each.x[piece]
+        inside = (middle > each.x[0]) & (middle < each.x[-1])
+        for power in range(_ORDER):
+            terms = [
+                math.comb(higher, power) * powers[higher, piece] * since ** (higher - power)
+                for higher in range(power, _ORDER)
+            ]
+            coefficients[_ORDER - 1 - power, :, column] = sum(terms) * (inside | (power == 0))
+    return knots, coefficients

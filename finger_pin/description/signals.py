@@ -1,0 +1,119 @@
+"""Signals over time as data: a sinusoid about an offset, and on top of it a step, a ramp, points or samples.
+
+Angles of joints, tensions of tendons and the force at the fingertip are all described in this way.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
+
+from finger_pin.description.validation import (
+    IN_RADIANS,
+    MOST_ANGLE,
+    Description,
+    choice,
+    problem,
+    quantity,
+    real,
+    series,
+)
+
+#: The most points or samples of a signal in a file. Arrays in Python may be longer.
+MOST_POINTS = 20_000
+_LATEST, _MOST_FORCE = 1e6, 1e6
+_NEEDED: dict[str, tuple[str, ...]] = {
+    "sine": (),
+    "step": ("time", "height"),
+    "ramp": ("time", "duration", "height"),
+    "points": ("times", "values"),
+    "samples": ("times", "values"),
+}
+_ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
+_FORCE = real(-_MOST_FORCE, _MOST_FORCE)
+
+
+class SignalSettings(Description):
+    """offset + amplitude sin(2 pi frequency t + phase) + what ``kind`` adds.
+
+    A step adds ``height`` from ``time`` on; a ramp reaches it after ``duration``. Points are joined by motions of least
+    jerk that rest at every point (Flash and Hogan, J. Neuroscience 5(7), 1985); samples by monotone cubics (Fritsch and
+    Butland, SIAM J. Scientific Computing 5(2), 1984). Neither overshoots, and both are constant before and after.
+    """
+
+    kind: Annotated[Literal["sine", "step", "ramp", "points", "samples"], choice(*_NEEDED)] = quantity(
+        "sine", unit="1", source="chosen", doc="What is added to the sinusoid: nothing, or one of these."
+    )
+    frequency: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="Hz", source="chosen", doc="Of the sinusoid.")
+    phase: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="chosen", doc="At t = 0.")
+    time: Annotated[float, real(-_LATEST, _LATEST)] | None = quantity(
+        None, unit="s", source="chosen", doc="Instant of the step, or start of the ramp."
+    )
+    duration: Annotated[float, real(1e-6, _LATEST)] | None = quantity(
+        None, unit="s", source="chosen", doc="Of the ramp."
+    )
+    times: Annotated[tuple[float, ...], series(-_LATEST, _LATEST)] | None = quantity(
+        None, unit="s", source="chosen", doc="Of the points or samples, increasing."
+    )
+    offset: float
+    amplitude: float
+    height: float | None
+    values: tuple[float, ...] | None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        needed = _NEEDED[self.kind]
+        for entry in ("time", "duration", "height", "times", "values"):
+            given = getattr(self, entry)
+            if given is None and entry in needed:
+                raise problem(entry, f'is missing: kind = "{self.kind}" needs {", ".join(needed)}')
+            if given is not None and entry not in needed:
+                kinds = " or ".join(f'"{kind}"' for kind, entries in _NEEDED.items() if entry in entries)
+                raise problem(entry, f'is for kind = {kinds}, not "{self.kind}"', given)
+        if self.times is not None and self.values is not None:
+            if len(self.values) != len(self.times):
+                raise problem("values", f"must be {len(self.times)} numbers, one for each of times", self.values)
+            if not 2 <= len(self.times) <= MOST_POINTS:
+                raise problem("times", f"must be 2 to {MOST_POINTS} numbers, not {len(self.times)}")
+            for index, (before, after) in enumerate(zip(self.times, self.times[1:], strict=False)):
+                if after <= before:
+                    raise problem(f"times[{index + 1}]", f"times must increase: it comes after {before:g}", after)
+        return self
+
+    def faster(self, factor: float) -> Self:
+        """Return the same signal in its time over a factor."""
+        update: dict[str, float | tuple[float, ...]] = {"frequency": self.frequency * factor}
+        for entry in ("time", "duration"):
+            if getattr(self, entry) is not None:
+                update[entry] = getattr(self, entry) / factor
+        if self.times is not None:
+            update["times"] = tuple(time / factor for time in self.times)
+        return self.model_copy(update=update)
+
+    @property
+    def lowest(self) -> float:
+        """A value that the signal is never below: the least of the sinusoid and of the rest together."""
+        return self.offset - abs(self.amplitude) + min(self.values or (0.0, self.height or 0.0))
+
+
+class JointReference(SignalSettings):
+    """theta^d of a joint."""
+
+    offset: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _ANGLE] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...], series(-MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] | None = quantity(
+        None, unit="rad", source="chosen", doc="At the points or samples."
+    )
+
+
+class ForceSignal(SignalSettings):
+    """Tension of a tendon, or a component of a force."""
+
+    offset: Annotated[float, _FORCE] = quantity(0.0, unit="N", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="N", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _FORCE] | None = quantity(None, unit="N", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...], series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
+        None, unit="N", source="chosen", doc="At the points or samples."
+    )

@@ -1,0 +1,78 @@
+"""Whether springs at the joints keep tendons taut that nothing else would: fingers without force closure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import scipy.optimize
+
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array, Routing
+
+
+@dataclass(frozen=True, eq=False)
+class Tautness:
+    """How far above their minimum all tendons can be where the springs help least.
+
+    At rest the tendons balance the springs, H_c^T f = k (theta - theta_0); gravity is left out. The torques that
+    tensions of at least f0 exert are a convex set, and the torque of the springs is affine in the posture. So the
+    tensions exist at all postures within the ranges if they exist at the corners, and the spare tension, the largest e
+    with f >= f0 + e, is concave in the posture: it is least at a corner. Each corner is a linear programme. Joints that
+    follow a passive tendon (20) are where the others put them, which is affine too.
+
+    Attributes:
+        spare: e at the worst corner, N; minus infinity where no tensions at all hold the posture.
+        posture: theta there, shape (n,), rad.
+        minimum: f0, shape (t,), N.
+        joints: Names of the joints.
+    """
+
+    spare: float
+    posture: Array
+    minimum: Array
+    joints: tuple[str, ...]
+
+    @classmethod
+    def of(cls, finger: FingerDescription, routing: Routing, coupling: PassiveCoupling, minimum: Array) -> Tautness:
+        """Solve the programmes of all corners; for a finger without force closure, whose spare tension is finite."""
+        joints = list(finger.joints.values())
+        stiffness = np.array([joint.spring.stiffness if joint.spring else 0.0 for joint in joints])
+        rest = np.array([joint.spring.rest if joint.spring else 0.0 for joint in joints])
+        free = [index for index in range(len(joints)) if index not in coupling.followers]
+        tendons = len(minimum)
+        scale = np.max(np.abs(routing.coupling))
+        worst = (np.inf, np.zeros(len(joints)))
+        for corner in product(*(joints[index].range for index in free)):
+            base = np.zeros(len(joints))
+            base[free] = corner
+            posture = coupling.matrix @ base + coupling.offset
+            torque = stiffness * (posture - rest) - routing.coupling.T @ minimum
+            found = scipy.optimize.linprog(
+                np.append(np.zeros(tendons), -1.0),
+                A_eq=np.hstack([routing.coupling.T / scale, np.zeros((len(joints), 1))]),
+                b_eq=torque / scale,
+                A_ub=np.hstack([-np.eye(tendons), np.ones((tendons, 1))]),
+                b_ub=np.zeros(tendons),
+                bounds=(None, None),
+            )
+            spare = float(found.x[-1]) if found.status == 0 else -np.inf
+            if spare < worst[0]:
+                worst = (spare, posture)
+        return cls(*worst, minimum, tuple(finger.joints))
+
+    @property
+    def holds(self) -> bool:
+        """Whether all tendons can be taut, and at their minimum at least, at all postures."""
+        return self.spare >= 0.0 and bool(np.all(self.minimum + self.spare > 0.0))
+
+    def __str__(self) -> str:
+        """Say in one line how well the springs keep the tendons taut, and where they do so least."""
+        where = ", ".join(f"{name} {angle:.3g}" for name, angle in zip(self.joints, self.posture, strict=True))
+        if self.spare == -np.inf:
+            return f"no tensions hold it against its springs at {where} rad"
+        if self.holds:
+            return f"the springs keep all tendons taut, {self.spare:.3g} N above their minimum or more"
+        return f"its springs leave a tendon {max(-self.spare, 0.0):.3g} N short of its minimum tension at {where} rad"

@@ -1,0 +1,55 @@
+"""Torsion springs of the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.description.parameters import FingerDescription, Spring
+from finger_pin.description.routing import Array
+from finger_pin.laws.spring import JOINT_SPRING, spring_torque
+from finger_pin.mechanism.rows import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class JointSprings:
+    """The springs of all joints; all zero at a joint that has none.
+
+    Attributes:
+        stiffness: k, shape (n,), N m/rad.
+        rest: theta_0, shape (n,), rad.
+        damping: c, shape (n,), N m s/rad.
+    """
+
+    stiffness: Array
+    rest: Array
+    damping: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription) -> JointSprings:
+        """Read the springs of the joints."""
+        springs = [joint.spring or Spring(stiffness=0.0) for joint in description.joints.values()]
+        return cls(*(np.array([getattr(each, name) for each in springs]) for name in cls.__annotations__))
+
+    @property
+    def present(self) -> bool:
+        """Whether any joint has a spring that does something."""
+        return bool(np.any(self.stiffness) or np.any(self.damping))
+
+    def torque(self, position: Array, velocity: Array) -> Array:
+        """Return tau^k, shape (..., n), N m."""
+        torque: Array = spring_torque(position, velocity, self.stiffness, self.rest, self.damping)
+        return torque
+
+    def rows(self, names: tuple[str, ...], width: int) -> Rows:
+        """Return the table of the springs, of those joints that have one."""
+        sprung = np.flatnonzero((self.stiffness != 0.0) | (self.damping != 0.0))
+        return Rows(
+            group="joint_springs",
+            law=JOINT_SPRING,
+            names=tuple(names[joint] for joint in sprung),
+            parameters=np.array([self.stiffness, self.rest, self.damping])[:, sprung],
+            arm=np.eye(len(names), width)[sprung],
+            powers=("joint_springs",),
+        )

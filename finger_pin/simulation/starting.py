@@ -1,0 +1,68 @@
+"""Where a simulation starts: a packed state, or the last saved state of a result; and what of it is a user's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import finite_vector
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.state import State
+
+_PARTS = {
+    "position": "joint_position",
+    "velocity": "joint_velocity",
+    "passive_position": "passive_position",
+    "passive_velocity": "passive_velocity",
+    "tendon_stiction": "tendon_stiction",
+    "joint_stiction": "joint_stiction",
+}
+
+
+def own_parts(controller: object, reference: object, fingertip_force: object, initial: object) -> str:
+    """Return what of a simulation is a user's own, such as ``controller, reference``; empty for nothing.
+
+    Args:
+        controller: As for `simulate`.
+        reference: As for `simulate`.
+        fingertip_force: As for `simulate`.
+        initial: As for `simulate`.
+    """
+    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
+    return ", ".join(name for name, each in given.items() if each is not None)
+
+
+def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
+    """Return the packed state at the start, shape (size,).
+
+    Args:
+        initial: A packed state, or a result of the same finger, which is continued from its last saved state.
+        finger: The finger.
+
+    Raises:
+        InputError: If sizes, names or numbers are not those of a state of this finger.
+    """
+    if not isinstance(initial, xr.Dataset):
+        try:
+            return finite_vector("initial", np.array(initial, dtype=float), finger.layout.size)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            allowed = f"must be a result, or a packed state of {finger.layout.size} numbers"
+            raise InputError("initial", allowed, type(initial).__name__) from None
+    routing = finger.routing
+    for dimension, names in (("joint", routing.joints), ("tendon", routing.tendons)):
+        if dimension not in initial.coords or tuple(map(str, initial[dimension].values)) != names:
+            raise InputError("initial", f"is a result of another finger: its {dimension}s must be {', '.join(names)}")
+    last, parts = initial.isel(time=-1), {}
+    for part, name in _PARTS.items():
+        if name in last:
+            parts[part] = np.atleast_1d(last[name].values)
+        elif routing.passive or not name.startswith("passive"):
+            raise InputError("initial", f"has no {name}; give what simulate returned")
+        else:
+            parts[part] = np.zeros(0)
+    return finite_vector("initial", finger.layout.pack(State(**parts)), finger.layout.size)

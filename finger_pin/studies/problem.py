@@ -1,0 +1,233 @@
+"""What a search is about: the variables that it may change, its objectives, and its constraints."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from finger_pin.description.parameters import FingerDescription, Tendon
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.studies.designs import Range
+from finger_pin.studies.keys import Point, Starting
+from finger_pin.studies.metrics import Metric, choose
+from finger_pin.studies.spelling import parse_range
+
+#: Least winding radius that a search of radii tries, m: a thinner pulley bends a tendon too sharply.
+LEAST_RADIUS = 3e-3
+_CONSTRAINT = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<sense>[<>]=)\s*(?P<bound>\S+)\s*")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number that a search varies.
+
+    Attributes:
+        keys: The keys that hold it.
+        signs: 1 or -1 for each: a key with -1 holds the negative of the first one.
+        range: Of the first key.
+    """
+
+    keys: tuple[str, ...]
+    signs: tuple[int, ...]
+    range: Range
+
+    def at(self, share: float) -> Point:
+        """Return the numbers of all keys at a share of the way from low to high."""
+        value = float(self.range.at(share))
+        return {key: sign * value for key, sign in zip(self.keys, self.signs, strict=True)}
+
+    def describe(self) -> dict[str, Any]:
+        """Return it for a TOML file."""
+        own = {"low": self.range.low, "high": self.range.high, "logarithmic": self.range.logarithmic}
+        return {"keys": list(self.keys), "signs": list(self.signs), **own}
+
+
+def parse_variable(text: str) -> Variable:
+    """Return the variable of ``KEY=LOW:HIGH`` or, for keys that go together, ``KEY,KEY2,-KEY3=LOW:HIGH``.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    names, found = parse_range(text)
+    keys, signs = [], []
+    for name in names.split(","):
+        spelt = re.fullmatch(r"\s*(-?)\s*(\S+)\s*", name)
+        if spelt is None:
+            raise InputError("over", "must be KEY=LOW:HIGH, or KEY,KEY2,-KEY3=LOW:HIGH for keys that go together", text)
+        keys.append(spelt[2])
+        signs.append(-1 if spelt[1] else 1)
+    if signs[0] < 0:
+        raise InputError("over", "the range is that of the first key, which has no sign", text)
+    return Variable(tuple(keys), tuple(signs), found)
+
+
+def radii(finger: FingerDescription) -> list[Variable]:
+    """Return the winding radii of a finger as variables: from `LEAST_RADIUS` to half the width of the joint's link.
+
+    Radii of zero stay so, and so do signs. Tendons that cross the same joints at radii alike but for their signs are
+    mirror images, and stay so.
+    """
+    variables: dict[Any, list[tuple[str, float]]] = {}
+    widths = {}
+    for name, tendon in finger.tendons.items():
+        for joint, crossing in tendon.crossings.items():
+            link = finger.joints[joint].link
+            if crossing.radius and link is not None and 0.5 * link.width > LEAST_RADIUS:
+                widths[joint] = 0.5 * link.width
+                key = f"finger.tendons.{name}.crossings.{joint}.radius"
+                variables.setdefault((_shape(tendon), joint), []).append((key, crossing.radius))
+    made = []
+    for (_, joint), members in variables.items():
+        first = members[0][1]
+        ends = (LEAST_RADIUS, widths[joint]) if first > 0.0 else (-widths[joint], -LEAST_RADIUS)
+        signs = tuple(1 if radius * first > 0.0 else -1 for _, radius in members)
+        made.append(Variable(tuple(key for key, _ in members), signs, Range(*ends)))
+    return made
+
+
+def check_variables(variables: Sequence[Variable], starting: Starting) -> None:
+    """Raise unless there are variables, and every one of their keys can hold a number of its range.
+
+    Raises:
+        InputError: Naming the key.
+    """
+    if not variables:
+        raise InputError("over", "at least one key is needed")
+    seen: set[str] = set()
+    for variable in variables:
+        variable.range.check(variable.keys[0])
+        for key, sign in zip(variable.keys, variable.signs, strict=True):
+            if key in seen:
+                raise InputError(key, "must not come twice")
+            seen.add(key)
+            starting.check(key, [sign * float(variable.range.at(share)) for share in (0.5, 0.0, 1.0)])
+
+
+def point_at(variables: Sequence[Variable], shares: Sequence[float]) -> Point:
+    """Return the numbers of all keys at shares of the ways from low to high, one per variable."""
+    return {key: value for v, share in zip(variables, shares, strict=True) for key, value in v.at(share).items()}
+
+
+def start_of(variables: Sequence[Variable], starting: Starting) -> Mapping[str, float]:
+    """Return the numbers that the scenario itself has at the keys."""
+    return {key: starting.number(key) for variable in variables for key in variable.keys}
+
+
+def _shape(tendon: Tendon) -> Any:
+    return tendon.kind, tuple((joint, abs(crossing.radius)) for joint, crossing in tendon.crossings.items())
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A metric to be made small or large.
+
+    Attributes:
+        name: Of the metric.
+        sign: 1 where less is better, -1 where more is.
+    """
+
+    name: str
+    sign: int = 1
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A bound that a metric has to keep.
+
+    Attributes:
+        name: Of the metric.
+        bound: Least or greatest value.
+        sign: 1 for a greatest value, -1 for a least one.
+    """
+
+    name: str
+    bound: float
+    sign: int
+
+    def excess(self, value: float) -> float:
+        """Return by how much a value breaks the bound, over the size of the bound; not above zero if it keeps it."""
+        return self.sign * (value - self.bound) / (abs(self.bound) or 1.0)
+
+    def __str__(self) -> str:
+        """Spell it as `parse_constraint` reads it."""
+        return f"{self.name}{'<=' if self.sign > 0 else '>='}{self.bound:g}"
+
+
+def parse_constraint(text: str) -> Constraint:
+    """Return the constraint of ``NAME>=VALUE`` or ``NAME<=VALUE``.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    found = _CONSTRAINT.fullmatch(text)
+    try:
+        bound = float(found["bound"]) if found else math.nan
+    except ValueError:
+        bound = math.nan
+    if found is None or not math.isfinite(bound):
+        raise InputError("constraint", "must be NAME>=VALUE or NAME<=VALUE, such as self_locking_margin>=1.5", text)
+    return Constraint(found["name"], bound, 1 if found["sense"] == "<=" else -1)
+
+
+@dataclass(frozen=True)
+class Goals:
+    """Objectives and constraints, with the metrics that they need.
+
+    Attributes:
+        objectives: At least one.
+        constraints: Any number.
+        metrics: All that are needed, each once.
+    """
+
+    objectives: tuple[Objective, ...]
+    constraints: tuple[Constraint, ...]
+    metrics: tuple[Metric, ...]
+
+    @classmethod
+    def of(
+        cls,
+        minimise: Iterable[str | Metric],
+        maximise: Iterable[str | Metric],
+        constraints: Iterable[str | Constraint],
+        further: Iterable[Metric] = (),
+    ) -> Goals:
+        """Collect goals.
+
+        Args:
+            minimise: Metrics to be made small, by name or as such.
+            maximise: Metrics to be made large.
+            constraints: As `Constraint` or spelt as `parse_constraint` reads them.
+            further: Metrics of one's own that constraints name.
+
+        Raises:
+            InputError: If there is no objective, a metric is unknown or comes twice among them.
+        """
+        small, large, bounds = list(minimise), list(maximise), list(constraints)
+        chosen = choose([*small, *large])
+        objectives = tuple(Objective(m.name, 1 if i < len(small) else -1) for i, m in enumerate(chosen))
+        limits = tuple(each if isinstance(each, Constraint) else parse_constraint(each) for each in bounds)
+        known = {metric.name: metric for metric in (*chosen, *further)}
+        needed = {name: known.get(name, name) for name in (*(o.name for o in objectives), *(c.name for c in limits))}
+        return cls(objectives, limits, choose(needed.values()))
+
+    def values(self, metrics: Mapping[str, float]) -> Array:
+        """Return the objectives of a run, each to be made small."""
+        return np.array([each.sign * metrics[each.name] for each in self.objectives])
+
+    def excesses(self, metrics: Mapping[str, float]) -> Array:
+        """Return the excesses of a run over the constraints."""
+        return np.array([each.excess(metrics[each.name]) for each in self.constraints])
+
+    def describe(self) -> dict[str, Any]:
+        """Return them for a TOML file."""
+        return {
+            "minimise": [each.name for each in self.objectives if each.sign > 0],
+            "maximise": [each.name for each in self.objectives if each.sign < 0],
+            "constraints": [str(each) for each in self.constraints],
+        }

@@ -1,0 +1,128 @@
+"""A result in the user's own meshcat.Visualizer: the finger moves there, among whatever else stands there."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.views.viewer.animation import Motion
+from finger_pin.views.viewer.scene import SLACK_TENSION, Scene, scale_above
+from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, solid_commands
+
+if TYPE_CHECKING:
+    import meshcat
+
+_SIDES = 8
+_LOOSE = (0.62, 0.64, 0.67)
+
+
+def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1.0, rate: float = 30.0) -> None:
+    """Play a result in a ``meshcat.Visualizer``, in real time, and leave the finger in its last posture.
+
+    Nothing but the finger is touched: it stands below the visualizer's path in ``finger_pin``, in its base frame. To
+    move it, set the transform of a path and draw there: ``draw(visualizer["left"], result)``.
+
+    Args:
+        visualizer: The user's own.
+        result: What `simulate` returned or saved.
+        speed: Simulated seconds per second; infinite for the last posture at once.
+        rate: Most frames per second.
+
+    Raises:
+        InputError: If the result lacks something that is shown, or speed or rate are not above zero.
+    """
+    for name, value in (("speed", speed), ("rate", rate)):
+        if not value > 0.0:
+            raise InputError(name, "must be above 0", value)
+    motion = Motion.of(result, rate / speed)
+    root = visualizer.path.lower()
+    scene, tube, scale = motion.scene, motion.scene.tube_radius, scale_above(motion.largest)
+    for command in solid_commands(scene.geometry, scene.urdf, tube):
+        _send(visualizer, {**command, "path": root + command["path"]})
+    started, last = time.monotonic(), len(motion.time) - 1
+    for index, due in enumerate((motion.time - motion.time[0]) / speed):
+        ahead = started + due - time.monotonic()
+        # A frame that comes too late to be seen is left out, but for the last.
+        if ahead < -1.0 / rate and index < last:
+            continue
+        time.sleep(max(0.0, ahead))
+        for command in _frame(scene, motion.position[index], motion.tension[index], scale):
+            _send(visualizer, {**command, "path": root + command["path"]})
+
+
+def tension_colours(tension: Array, scale: float) -> Array:
+    """Return the colour of tensions, shape (..., 3): the upper part of viridis up to a scale, N; grey when loose."""
+    from matplotlib import colormaps
+
+    taut = colormaps["viridis"](0.25 + 0.75 * np.clip(tension / scale, 0.0, 1.0))[..., :3]
+    loose = np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)[..., None]
+    return np.asarray(taut + loose * (np.array(_LOOSE) - taut))
+
+
+def _frame(scene: Scene, position: Array, tension: Array, scale: float) -> list[Command]:
+    geometry = scene.geometry
+    poses = geometry.poses(position)
+    commands = [_placement(name, poses, index) for index, name in enumerate(link_names(geometry))]
+    colours = tension_colours(tension, scale)
+    for path, tendon in zip(geometry.paths(position, scene.looseness(tension), poses), scene.tendons, strict=True):
+        commands.append(_tube(path.name, path.points, scene.tube_radius, colours[tendon["strand"]]))
+    return commands
+
+
+def _placement(name: str, poses: LinkPoses, index: int) -> Command:
+    matrix = placed(poses.rotation[index], poses.translation[index])
+    return {"type": "set_transform", "path": f"{ROOT}/{name}", "matrix": matrix}
+
+
+def _tube(name: str, points: Array, radius: float, colours: Array) -> Command:
+    """Return a tube along points, shape (p, 3), in a colour at each of them, shape (p, 3)."""
+    from meshcat.geometry import pack_numpy_array
+
+    tangent = np.gradient(points, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+    across = np.empty_like(points)
+    carried = np.array([0.31, 1.0, 0.17])
+    for index, along in enumerate(tangent):
+        carried = carried - (carried @ along) * along
+        carried /= np.linalg.norm(carried)
+        across[index] = carried
+    angle = 2.0 * np.pi * np.arange(_SIDES)[:, None] / _SIDES
+    normal = np.cos(angle) * across[:, None] + np.sin(angle) * np.cross(tangent, across)[:, None]
+    ring, side = (each.ravel() for each in np.meshgrid(np.arange(len(points) - 1), np.arange(_SIDES), indexing="ij"))
+    first, second = ring * _SIDES + side, ring * _SIDES + (side + 1) % _SIDES
+    faces = np.stack([first, second, first + _SIDES, second, second + _SIDES, first + _SIDES], axis=-1).reshape(-1, 3)
+    buffers = {
+        "position": points[:, None] + radius * normal,
+        "normal": normal,
+        "color": np.repeat(colours[:, None], _SIDES, axis=1),
+    }
+    attributes = {key: pack_numpy_array(each.reshape(-1, 3).T.astype(np.float32)) for key, each in buffers.items()}
+    index = pack_numpy_array(faces.T.astype(np.uint32))
+    path = f"{ROOT}/tendons/{name}"
+    shape = {"uuid": f"{path}:shape", "type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
+    look = {"uuid": f"{path}:look", "type": "MeshPhongMaterial", "vertexColors": True, "shininess": 40}
+    mesh = {"uuid": path, "type": "Mesh", "geometry": shape["uuid"], "material": look["uuid"]}
+    whole = {"metadata": {"version": 4.5, "type": "Object"}, "geometries": [shape], "materials": [look]}
+    matrix = placed(np.eye(3), np.zeros(3))
+    return {"type": "set_object", "path": path, "object": {**whole, "object": {**mesh, "matrix": matrix}}}
+
+
+@dataclass(frozen=True)
+class _Ready:
+    """A command in the form in which meshcat sends it."""
+
+    command: Command
+
+    def lower(self) -> Command:
+        return self.command
+
+
+def _send(visualizer: Any, command: Command) -> None:
+    visualizer.window.send(_Ready(command))

@@ -1,0 +1,201 @@
+"""A result as a film: the finger as the page shows it, projected and drawn by matplotlib, without a browser."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import scipy.spatial
+import xarray as xr
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import FingerPinError, InputError
+from finger_pin.files import replacing
+from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.views.plots.style import new_figure, styled
+from finger_pin.views.viewer.animation import Motion
+from finger_pin.views.viewer.drawing import tension_colours
+from finger_pin.views.viewer.scene import Scene, scale_above
+from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY
+
+_BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
+#: From the finger to the camera, in the scene, where z is up; the page's oblique view.
+_AWAY = (0.42, -1.0, 0.5)
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+#: Pixels of a film's width, and of that of a GIF, which is large for its size.
+_WIDTH, _GIF_WIDTH = 1200, 720
+_INCHES = (10.0, 6.0)
+#: Frames out of which the view is found.
+_FEW = 25
+
+
+@styled
+def write_video(
+    result: xr.Dataset, path: str | os.PathLike[str], *, speed: float = 1.0, rate: float | None = None
+) -> Path:
+    """Write a result as a film: MP4, for which the program ffmpeg must be at hand, or GIF.
+
+    The file appears whole or not at all; an earlier one is replaced.
+
+    Args:
+        result: What `simulate` returned or saved.
+        path: Of the film, ending in ``.mp4`` or ``.gif``.
+        speed: Simulated seconds per second of film.
+        rate: Frames per second of film; by default 30, of a GIF 20.
+
+    Returns:
+        The path of the film.
+
+    Raises:
+        InputError: If the result lacks something that is shown, or path, speed or rate are wrong.
+        FingerPinError: If ffmpeg is needed and not found.
+    """
+    target = Path(path)
+    gif = target.suffix == ".gif"
+    if target.suffix not in (".mp4", ".gif"):
+        raise InputError("path", "must end in .mp4 or .gif", str(path))
+    rate = (20.0 if gif else 30.0) if rate is None else rate
+    for name, value in (("speed", speed), ("rate", rate)):
+        if not 0.0 < value < np.inf:
+            raise InputError(name, "must be a number above 0", value)
+    writer = _writer(gif, rate)
+    motion = Motion.of(result, rate / speed)
+    figure = new_figure(*_INCHES)
+    film = _Film(figure, motion)
+    with replacing(target) as temporary, writer.saving(figure, temporary, (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]):
+        step, last = speed / rate, motion.time[-1]
+        for due in np.arange(motion.time[0], last + 0.5 * step, step):
+            film.show(int(np.argmin(np.abs(motion.time - due))))
+            writer.grab_frame(facecolor=_BACKGROUND)
+    return target
+
+
+def _writer(gif: bool, rate: float) -> AbstractMovieWriter:
+    if FFMpegWriter.isAvailable():
+        return FFMpegWriter(fps=rate)  # type: ignore[arg-type]
+    if gif:
+        return PillowWriter(fps=rate)  # type: ignore[arg-type]
+    raise FingerPinError("an MP4 needs the program ffmpeg, which is not found; a GIF does without")
+
+
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A convex solid: points whose hull it is, in the frame of its link, shape (p, 3), m, and its colour."""
+
+    link: int
+    corners: Array
+    colour: tuple[float, float, float, float]
+
+
+class _Film:
+    """A motion on a figure, a frame at a time."""
+
+    def __init__(self, figure: Figure, motion: Motion) -> None:
+        """Set the stage: camera, legend, and what stays."""
+        scene = motion.scene
+        self.motion = motion
+        self.poses = scene.geometry.poses(motion.position)
+        self.solids = tuple(_solids(scene))
+        self.scale = scale_above(motion.largest)
+        away = np.array(_AWAY) / np.linalg.norm(_AWAY)
+        right = np.cross([0.0, 0.0, 1.0], away)
+        right /= np.linalg.norm(right)
+        # Rows: to the right, up, and towards the camera, in the base frame.
+        self.camera = np.array([right, np.cross(away, right), away]) @ scene.view()
+        self.tips = scene.tips(self.poses) @ self.camera[:2].T
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
+        seen = np.concatenate([self.tips, *(self._outline(solid, frame) for frame in few for solid in self.solids)])
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        # Room for the legend at the left, and for the title above.
+        unit = float(np.max((high - low) / (np.array([0.76, 0.8]) * _INCHES)))
+        left, below = 0.5 * (low + high) - unit * np.array([0.58, 0.47]) * _INCHES
+        axes.set(xlim=(left, left + unit * _INCHES[0]), ylim=(below, below + unit * _INCHES[1]))
+        axes.text(0.025, 0.93, motion.title, color=_INK, transform=axes.transAxes, fontsize=13, parse_math=False)
+        self._legend(figure)
+        self.clock = axes.text(0.975, 0.05, "", color=_INK, transform=axes.transAxes, ha="right", fontsize=13)
+        self.bodies = PolyCollection([], linewidths=0.8)
+        axes.add_collection(self.bodies)
+        axes.plot(*self.tips.T, color=_TRACE, linewidth=1.0, alpha=0.3)
+        self.trace = axes.plot([], [], color=_TRACE, linewidth=2.0)[0]
+        width = 2.0 * 72.0 * scene.tube_radius / unit
+        self.tubes = LineCollection([], linewidths=width, capstyle="round")
+        axes.add_collection(self.tubes)
+
+    def show(self, frame: int) -> None:
+        """Move everything to where it is in a frame."""
+        motion, scene = self.motion, self.motion.scene
+        # What is farther away is drawn first.
+        depth = [float(self._placed(solid, frame).mean(axis=0) @ self.camera[2]) for solid in self.solids]
+        order = np.argsort(depth)
+        self.bodies.set_verts([self._outline(self.solids[index], frame) for index in order])
+        colours = [self.solids[index].colour for index in order]
+        self.bodies.set_facecolor(colours)
+        self.bodies.set_edgecolor([(0.8, 0.8, 0.8, 1.3 * opacity) for *_, opacity in colours])
+        poses = LinkPoses(self.poses.rotation[frame], self.poses.translation[frame])
+        tension = motion.tension[frame]
+        paths = scene.geometry.paths(motion.position[frame], scene.looseness(tension), poses)
+        lines = [path.points @ self.camera[:2].T for path in paths]
+        strands = np.concatenate([tendon["strand"][:-1] for tendon in scene.tendons])
+        self.tubes.set_segments([pair for line in lines for pair in np.stack([line[:-1], line[1:]], axis=1)])
+        self.tubes.set_color(tension_colours(tension, self.scale)[strands])
+        self.trace.set_data(*self.tips[: frame + 1].T)
+        self.clock.set_text(f"{motion.time[frame]:.2f} s")
+
+    def _placed(self, solid: _Solid, frame: int) -> Array:
+        rotation, translation = self.poses.rotation[frame, solid.link], self.poses.translation[frame, solid.link]
+        return np.asarray(solid.corners @ rotation.T + translation)
+
+    def _outline(self, solid: _Solid, frame: int) -> Array:
+        seen = self._placed(solid, frame) @ self.camera[:2].T
+        return np.asarray(seen[scipy.spatial.ConvexHull(seen).vertices])
+
+    def _legend(self, figure: Figure) -> None:
+        colours = ListedColormap(tension_colours(np.linspace(0.0, self.scale, 256), self.scale))
+        place = figure.add_axes((0.03, 0.3, 0.014, 0.4))
+        bar = figure.colorbar(ScalarMappable(Normalize(0.0, self.scale), colours), cax=place)
+        bar.set_ticks([0.0, 0.5 * self.scale, self.scale])
+        bar.ax.tick_params(colors=_DIM, labelcolor=_INK)
+        bar.set_label("tendon tension (N)", color=_INK)
+        bar.outline.set_visible(False)
+
+
+def _solids(scene: Scene) -> Iterator[_Solid]:
+    geometry = scene.geometry
+    for visual in pin.buildGeomFromUrdfString(geometry.model, scene.urdf, pin.GeometryType.VISUAL).geometryObjects:
+        turned = visual.placement.rotation
+        corners = _corners(visual.geometry) @ turned.T + visual.placement.translation
+        yield _Solid(visual.parentJoint, corners, (*visual.meshColor[:3], SOLID_OPACITY * visual.meshColor[3]))
+    for pulley in geometry.pulleys:
+        ring = _ring(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
+        yield _Solid(pulley.joint, ring + np.array([0.0, 0.0, pulley.offset]), (*GROOVE_COLOUR, SOLID_OPACITY))
+
+
+def _corners(shape: Any) -> Array:
+    """Return points whose hull is, or looks like, a shape that `solids` knows."""
+    kind = type(shape).__name__
+    if kind == "Cylinder":
+        return _ring(shape.radius, 2.0 * shape.halfLength)
+    if kind == "Box":
+        return np.array(list(product(*((-half, half) for half in shape.halfSide))))
+    turns = np.linspace(0.0, np.pi, 13)
+    points = np.array([_ring(np.sin(turn), 2.0 * np.cos(turn))[: len(_ROUND)] for turn in turns])
+    return np.asarray(shape.radius * points.reshape(-1, 3))
+
+
+def _ring(radius: float, height: float) -> Array:
+    """Return the two rims of a cylinder about z, shape (2 r, 3)."""
+    rim = radius * np.stack([np.cos(_ROUND), np.sin(_ROUND)], axis=-1)
+    return np.array([[x, y, z] for z in (-0.5 * height, 0.5 * height) for x, y in rim])

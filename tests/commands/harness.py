@@ -1,0 +1,42 @@
+"""What the tests of the command simulate share."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "simulate.py"
+ALL = {"scenario.toml", "trajectory.nc", "animation.html"}
+
+
+class Quick:
+    """In place of the process that draws."""
+
+    def start(self, folder):
+        (folder / "figures").mkdir()
+        for name in ("fig6", "energy"):
+            (folder / "figures" / f"{name}.png").write_text(name)
+
+    def wait(self):
+        pass
+
+
+def refused(answer, *says):
+    code, out, lines = answer
+    assert code == 2
+    assert out == ""
+    assert len(lines) == 1
+    assert lines[0].isprintable()
+    for each in says:
+        assert each in lines[0]
+
+
+def subprocess_of(*arguments, folder, **options):
+    return subprocess.Popen(
+        [sys.executable, str(SCRIPT), *map(str, arguments)],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        **options,
+    )

@@ -1,0 +1,113 @@
+"""One parser for all commands, as scripts, as a module, and in Python; and one list of public names."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import finger_pin as fp
+from finger_pin.commands import application
+from finger_pin.commands.options import folder_name
+
+ROOT = Path(__file__).resolve().parents[2]
+NAMES = [each.__name__ for each in application.COMMANDS]
+
+
+def told(function, capsys):
+    """Return the exit code of a command that does what a function does, and the lines of standard error."""
+    return application.run_function(function, []), capsys.readouterr().err.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (fp.InputError("a.b", "must be 1", 2), 2, "a.b = 2: must be 1"),
+        (fp.IntegrationError(0.5, "stuck", "less"), 3, "the integration stopped at t = 0.5 s: stuck; try less"),
+        (fp.Interrupted(0.5), 130, "interrupted at t = 0.5 s"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (fp.FingerPinError("no"), 1, "no"),
+        (OSError(28, "No space left on device", "a.nc"), 1, "the results cannot be written: a.nc: No space left on"),
+    ],
+)
+def test_what_is_raised_on_purpose_becomes_one_line_with_its_notes_and_an_exit_code(error, code, says, capsys):
+    error.add_note("a note\nof two lines")
+
+    def broken():
+        raise error
+
+    found, lines = told(broken, capsys)
+    assert found == code
+    (line,) = lines
+    assert line.startswith(f"broken.py: {says}")
+    assert line.endswith("; a note\\nof two lines")
+
+
+def test_a_defect_of_the_program_is_not_told_as_a_wrong_input(capsys):
+    def defective():
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        told(defective, capsys)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_command_tells_its_options_as_a_script_and_as_a_part_of_the_package(name, capsys):
+    script = ROOT / "scripts" / f"{name}.py"
+    assert len(script.read_text(encoding="utf-8").splitlines()) < 15
+    assert application.run(name, ["--help"]) == 0
+    alone = capsys.readouterr().out
+    assert application.run(None, [name.replace("_", "-"), "--help"]) == 0
+    assert capsys.readouterr().out.replace(f"finger-pin {name.replace('_', '-')}", f"{name}.py") == alone
+    assert alone.startswith(f"Usage: {name}.py [OPTIONS]") and "--output" in alone
+
+
+def test_without_a_command_all_of_them_are_listed_and_a_misspelt_one_is_told_the_nearest(capsys):
+    assert application.run(None, []) == 0
+    out = capsys.readouterr().out
+    assert all(name.replace("_", "-") in out for name in NAMES)
+    assert application.run(None, ["simulat"]) == 2
+    assert capsys.readouterr().err == "finger-pin: No such command 'simulat'. Did you mean 'simulate'?\n"
+
+
+def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed(tmp_path):
+    command = [sys.executable, "-m", "finger_pin", "simulate", "--list"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "fig6" in done.stdout
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    module, _, name = project["scripts"]["finger-pin"].partition(":")
+    assert getattr(sys.modules[module], name) is application.run
+
+
+def test_every_public_name_can_be_had_and_importing_the_package_alone_imports_nothing_heavy():
+    assert len(fp.__all__) <= 30
+    for name in fp.__all__:
+        assert getattr(fp, name) is not None
+    assert fp.plots.plot_fig6 is fp.plot_fig6 and fp.views.view is fp.view
+    code = "import sys, finger_pin; print({'numpy', 'pydantic', 'matplotlib', 'numba'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+    with pytest.raises(AttributeError, match="simulat"):
+        _ = fp.simulat
+
+
+@pytest.mark.parametrize(
+    ("variants", "name"),
+    [
+        ((), "fig6"),
+        (("controller.gain=2",), "fig6,controller.gain=2"),
+        (("controller.gain = [1.1, 0.7]", "duration=1"), "fig6,controller.gain=1.1,0.7,duration=1"),
+        (("controller.gain=0.5:2:7",), "fig6,controller.gain=0.5_2_7"),
+    ],
+)
+def test_a_folder_is_named_so_that_it_can_be_read(variants, name):
+    assert folder_name("fig6", *variants) == name
+
+
+def test_what_a_path_cannot_hold_is_told_apart_by_a_digest_and_no_name_is_too_long():
+    names = [
+        folder_name("fig6", each) for each in ("finger=a/b", "finger=a\\b", "title=é", "x=" + "1" * 400, "x\udcff")
+    ]
+    assert len({*names}) == len(names)
+    assert all(len(each) < 130 and each.isascii() and "/" not in each for each in names)

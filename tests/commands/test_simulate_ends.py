@@ -1,0 +1,241 @@
+"""The command simulate when something goes wrong on the way: how it ends, and that nothing is lost."""
+
+import os
+import re
+import signal
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness import ALL, Quick, subprocess_of
+from test_files import contents
+
+import finger_pin as fp
+from finger_pin.commands.drawing import Drawing, NotDrawn
+from finger_pin.description.loading import load_scenario
+from finger_pin.exceptions import IntegrationError
+
+
+def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, monkeypatch):
+    partial = fp.simulate(load_scenario("s.toml", {"simulation.duration": 0.002}))
+
+    def fail(scenario, **options):
+        raise IntegrationError(0.002, "the step size became too small", "a smaller simulation.rtol", partial)
+
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", fail)
+    code, out, lines = run("s.toml", "--output", "out")
+    assert code == 3
+    assert len(lines) == 1
+    for says in ("t = 0.002 s", "the step size became too small", "a smaller simulation.rtol", "is in out"):
+        assert says in lines[0]
+    assert fp.load_result("out/trajectory.nc").equals(partial)
+    assert "flexor_distal" in out
+
+
+#: A rope as stiff and a mass as small as may be, without friction, at a tolerance that rounding errors exceed.
+TOO_STIFF = {
+    "finger.passive_tendon.stiffness": 1e10,
+    "finger.passive_tendon.mass": 1e-18,
+    "finger.tendon_friction.coulomb": 0.0,
+    "finger.tendon_friction.viscous": 0.0,
+    "simulation.rtol": 1e-9,
+    "simulation.atol_scale": 1e-9,
+}
+
+
+def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_try_and_saves_what_it_has(
+    run, here, quick
+):
+    sets = [part for key, value in TOO_STIFF.items() for part in ("--set", f"{key}={value}")]
+    code, out, lines = run("fig6", "--output", "out", "--duration", "1", *sets)
+    assert (code, len(lines)) == (3, 1)
+    said = re.fullmatch(
+        r"simulate.py: the integration stopped at t = ([\d.e-]+) s: .* largest in passive_velocity\[T5\]; "
+        r"try a larger simulation.rtol and simulation.atol_scale, .*; what was computed is in out",
+        lines[0],
+    )
+    assert said
+    kept, scenario = fp.load_result("out/trajectory.nc"), load_scenario("out/scenario.toml")
+    assert 0.0 < kept.attrs["end_time"] < 1.0 == scenario.simulation.duration
+    assert kept.attrs["end_time"] == pytest.approx(float(said[1]), rel=1e-5)
+    assert len(kept.time) > 10 and kept.time[-1] <= kept.attrs["end_time"]
+    assert all(np.isfinite(values).all() for values in kept.data_vars.values())
+    assert "Tension" in out
+    # What it says helps.
+    loose = ("--set", "simulation.rtol=1e-7", "--set", "simulation.atol_scale=1e-7")
+    assert run("out/scenario.toml", "--output", "out", *loose)[::2] == (0, [])
+
+
+def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monkeypatch):
+    assert run("s.toml", "--output", "out")[0] == 0
+    before = contents(here)
+
+    def fail(scenario, **options):
+        raise IntegrationError(0.0, "not finite", "another method", None)
+
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", fail)
+    code, out, lines = run("s.toml", "--output", "out")
+    assert (code, out, len(lines)) == (3, "", 1)
+    assert "nothing was computed" in lines[0]
+    assert contents(here) == before
+
+
+def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monkeypatch):
+    assert run("s.toml", "--output", "out")[0] == 0
+
+    def fail(drawing):
+        raise NotDrawn("ValueError: axis limits cannot be NaN")
+
+    monkeypatch.setattr(Quick, "wait", fail)
+    code, _, lines = run("s.toml", "--output", "out", "--duration", "0.003")
+    assert code == 1
+    assert len(lines) == 1
+    assert "cannot be drawn: ValueError: axis limits cannot be NaN" in lines[0]
+    assert set(contents(here / "out")) == {"scenario.toml", "trajectory.nc"}
+    assert load_scenario("out/scenario.toml").simulation.duration == 0.003
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, monkeypatch, number):
+    simulate = fp.simulate
+
+    def interrupted(scenario, *, stop, **options):
+        asked = []
+
+        def counted():
+            asked.append(None)
+            if len(asked) == 2:
+                os.kill(os.getpid(), number)
+            return stop()
+
+        return simulate(scenario, stop=counted, **options)
+
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", interrupted)
+    handler = signal.getsignal(number)
+    code, out, lines = run("s.toml", "--output", "out", "--duration", "5")
+    assert signal.getsignal(number) is handler
+    assert code == 130
+    assert len(lines) == 1
+    assert re.search(r"interrupted at t = [\d.e-]+ s; what was computed is in out", lines[0])
+    assert set(contents(here / "out")) == {"scenario.toml", "trajectory.nc"}
+    assert fp.load_result("out/trajectory.nc").attrs["end_time"] < 5.0
+    assert load_scenario("out/scenario.toml").simulation.duration == 5.0
+    assert "Tension" in out
+
+
+def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quick, monkeypatch):
+    assert run("s.toml", "--output", "out")[0] == 0
+    before = contents(here)
+
+    def stubborn(scenario, **options):
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.0)
+        pytest.fail("went on")
+
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", stubborn)
+    code, out, lines = run("s.toml", "--output", "out")
+    assert (code, out, lines) == (130, "", ["simulate.py: interrupted"])
+    assert contents(here) == before
+
+
+def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_that_started_it(tmp_path):
+    with Drawing() as drawing:
+        drawing.start(tmp_path / "no\nwhere é")
+        with pytest.raises(FileNotFoundError):
+            drawing.wait()
+    with Drawing() as drawing:
+        (tmp_path / "trajectory.nc").write_text("no netCDF")
+        drawing.start(tmp_path)
+        with pytest.raises(NotDrawn, match="Unknown file format"):
+            drawing.wait()
+    with Drawing() as drawing:
+        os.kill(drawing.process.pid, signal.SIGKILL)
+        drawing.process.wait()
+        drawing.start(tmp_path)
+        with pytest.raises(NotDrawn, match="killed"):
+            drawing.wait()
+    with Drawing() as drawing:
+        pass
+    assert drawing.process.returncode == -signal.SIGKILL
+
+
+def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(run, here, quick, monkeypatch):
+    def slow(drawing):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.0)
+        pytest.fail("went on")
+
+    monkeypatch.setattr(Quick, "wait", slow)
+    code, _, lines = run("s.toml", "--output", "out")
+    assert code == 130
+    assert lines == ["simulate.py: interrupted; what was computed is in out"]
+    assert set(contents(here / "out")) == {"scenario.toml", "trajectory.nc"}
+
+
+@pytest.mark.parametrize("broken", ["saving", "drawing"])
+def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quick, monkeypatch, broken):
+    assert run("s.toml", "--output", "out")[0] == 0
+    before = contents(here)
+
+    def fail(*arguments):
+        raise OSError(28, "No space left on device")
+
+    if broken == "saving":
+        monkeypatch.setattr("finger_pin.simulation.results.save", fail)
+    else:
+        monkeypatch.setattr(Quick, "wait", fail)
+    code, out, lines = run("s.toml", "--output", "out", "--duration", "0.003")
+    assert (code, out, len(lines)) == (1, "", 1)
+    assert "No space left on device; earlier results are as they were" in lines[0]
+    assert contents(here) == before
+
+
+def test_a_reader_that_has_gone_is_no_error(here):
+    process = subprocess_of("--list", folder=here)
+    process.stdout.close()
+    assert (process.stderr.read(), process.wait(timeout=60)) == ("", 0)
+    process.stderr.close()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_output_that_cannot_be_printed_is_told_in_one_line_and_results_are_kept(run, here, quick, monkeypatch):
+    with open("/dev/full", "w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        code, _, lines = run("s.toml", "--output", "out")
+    assert (code, lines) == (0, ["standard output cannot be written: No space left on device"])
+    assert set(contents(here / "out")) >= ALL
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_in_a_real_run_ends_it_with_a_trajectory(here):
+    arguments = ("s.toml", "--duration", "1000", "--set", "simulation.sample_rate=100", "--output", "results/s")
+    with subprocess_of(*arguments, folder=here) as process:
+        # The stage appears when the simulation begins.
+        deadline = time.monotonic() + 60.0
+        while not list(here.glob("results/s/.unfinished-*")) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert re.fullmatch(r"simulate.py: interrupted at t = [\d.e-]+ s; what was computed is in results/s\n", err)
+    assert set(contents(here / "results" / "s")) == {"scenario.toml", "trajectory.nc"}
+    assert "Tracking error" in out
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+def test_a_disk_that_fills_up_in_a_real_run_is_told_in_one_line(here):
+    import resource
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    with subprocess_of("s.toml", folder=here, preexec_fn=limit) as process:
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "cannot be written" in err
+    assert set(contents(here)) == {"s.toml"}

@@ -1,0 +1,143 @@
+"""References, tensions and forces over time in TOML and CSV: what they become, and what is wrong with them."""
+
+import tomllib
+
+import pytest
+
+import finger_pin as fp
+from finger_pin.exceptions import InputError
+
+MOTION = "time,abduction,medial\n0.0,0.0,0.2\n0.5, 0.1, 0.3\n\n1.0,0.0,0.4\n"
+
+
+def write(folder, name, text):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_columns_of_a_file_beside_the_scenario_become_samples_of_their_joints(tmp_path):
+    write(tmp_path, "motion.csv", MOTION)
+    path = write(tmp_path, "mine.toml", 'extends = "fig6"\n[reference]\nfile = "motion.csv"\n')
+    joints = fp.load_scenario(path).reference.joints
+    assert joints["medial"].kind == "samples" and joints["medial"].times == (0.0, 0.5, 1.0)
+    assert joints["medial"].values == (0.2, 0.3, 0.4) and joints["medial"].offset == 0.0
+    assert joints["proximal"] == fp.load_scenario("fig6").reference.joints["proximal"]
+
+
+def test_a_path_in_an_override_is_relative_to_the_working_directory(tmp_path, monkeypatch):
+    write(tmp_path, "motion.csv", MOTION)
+    monkeypatch.chdir(tmp_path)
+    assert fp.load_scenario("fig6", {"reference.file": "motion.csv"}).reference.joints["medial"].kind == "samples"
+
+
+def test_the_written_scenario_needs_no_other_file(tmp_path):
+    motion = write(tmp_path, "motion.csv", MOTION)
+    pulls = write(tmp_path, "pulls.csv", "time,T1,T3\n0,1,4\n2,2,5\n")
+    force = write(tmp_path, "force.csv", "time,z\n0,0\n2,-0.5\n")
+    scenario = fp.load_scenario(
+        "fig6",
+        {
+            "reference.file": str(motion),
+            "controller": {"kind": "tensions", "file": str(pulls)},
+            "environment.fingertip_force_file": str(force),
+        },
+    )
+    for path in (motion, pulls, force):
+        path.unlink()
+    assert fp.load_scenario(write(tmp_path, "again.toml", fp.to_toml(scenario))) == scenario
+    assert scenario.controller.tensions["T3"].values == (4.0, 5.0)
+    assert scenario.environment.fingertip_force_signal["z"].values == (0.0, -0.5)
+
+
+def test_a_signal_of_another_kind_replaces_the_one_that_is_extended_and_keeps_nothing_of_it(tmp_path):
+    path = write(
+        tmp_path, "mine.toml", 'extends = "fig6"\n[reference.joints.medial]\nkind = "step"\ntime = 1.0\nheight = 0.2\n'
+    )
+    medial = fp.load_scenario(path).reference.joints["medial"]
+    assert (medial.amplitude, medial.offset, medial.height) == (0.0, 0.0, 0.2)
+
+
+def test_the_kind_may_be_overridden_before_or_after_what_belongs_to_it():
+    key = "reference.joints.medial"
+    overrides = {f"{key}.time": 1.0, f"{key}.height": 0.2, f"{key}.kind": "step", f"{key}.offset": 0.1}
+    medial = fp.load_scenario("fig6", overrides).reference.joints["medial"]
+    assert (medial.kind, medial.amplitude, medial.offset, medial.height) == ("step", 0.0, 0.1, 0.2)
+
+
+def test_what_is_not_asked_for_is_not_written():
+    written = tomllib.loads(fp.to_toml(fp.load_scenario("fig6")))
+    assert "tensions" not in written["controller"] and set(written["environment"]) == {"fingertip_force"}
+    assert set(written["reference"]["joints"]["medial"]) == {"kind", "offset", "amplitude", "frequency", "phase"}
+
+
+KEY = "reference.joints.medial"
+POINTS = {"kind": "points", "times": [0.0, 1.0], "values": [0.0, 0.5]}
+WRONG = [
+    ({KEY: {"kind": "step", "time": 1.0}}, f"{KEY}.height", 'is missing: kind = "step" needs time, height'),
+    ({KEY: {"kind": "sine", "duration": 1.0}}, f"{KEY}.duration", 'is for kind = "ramp", not "sine"'),
+    ({KEY: {"kind": "stop"}}, f"{KEY}.kind", "did you mean step?"),
+    ({KEY: POINTS | {"times": [0.0, 1.0, 2.0]}}, f"{KEY}.values", "must be 3 numbers, one for each of times"),
+    ({KEY: POINTS | {"times": [0.0, 0.0]}}, f"{KEY}.times[1]", "times must increase"),
+    ({KEY: POINTS | {"values": [0.0, 45.0]}}, f"{KEY}.values[1]", "is it in degrees?"),
+    ({KEY: POINTS | {"values": 0.5}}, f"{KEY}.values", "must be a list of numbers"),
+    ({KEY: POINTS | {"times": [0.0], "values": [0.5]}}, f"{KEY}.times", "must be 2 to 20000 numbers"),
+    ({"reference.joints.distal": POINTS}, "reference.joints.distal", "follows from the passive tendon (20)"),
+    ({"reference.joints.medail": POINTS}, "reference.joints.medail", "did you mean medial?"),
+    ({"controller.tensions.T1": {"offset": 1.0}}, "controller.tensions", 'are for controller.kind = "tensions"'),
+    ({"environment.fingertip_force_signal.w": {}}, "environment.fingertip_force_signal.w", "the axes are x, y, z"),
+    ({"reference.file": 3}, "reference.file", "must be the path of a CSV file"),
+    ({"simulation.initial.position.medail": 0.1}, "simulation.initial.position.medail", "did you mean medial?"),
+    ({"simulation.initial.position.medial": 30}, "simulation.initial.position.medial", "is it in degrees?"),
+    ({"simulation.initial.velocity.distal": "x"}, "simulation.initial.velocity.distal", "must be a number"),
+]
+
+
+@pytest.mark.parametrize(("overrides", "entry", "said"), WRONG, ids=[each[1] for each in WRONG])
+def test_a_wrong_entry_is_named_in_one_line(overrides, entry, said):
+    with pytest.raises(InputError) as caught:
+        fp.load_scenario("fig6", overrides)
+    assert caught.value.entry == entry
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+PULLS = [
+    ({"tensions": {"T5": {"offset": 1.0}}}, "controller.tensions.T5", "is a passive tendon, which nobody pulls"),
+    ({"tensions": {"T7": {"offset": 1.0}}}, "controller.tensions.T7", "no such tendon; actuated are T1, T2, T3, T4"),
+    ({"tensions": {"T1": {"offset": 1.0, "amplitude": 1.5}}}, "controller.tensions.T1", "not -0.5 N"),
+    ({"gain": 2.0}, "controller.gain", "has no effect"),
+]
+
+
+@pytest.mark.parametrize(("table", "entry", "said"), PULLS, ids=[each[1] for each in PULLS])
+def test_tensions_that_cannot_be_are_named_in_one_line(table, entry, said):
+    with pytest.raises(InputError) as caught:
+        fp.load_scenario("fig6", {"controller": {"kind": "tensions"} | table})
+    assert caught.value.entry == entry and said in str(caught.value)
+
+
+COLUMNS = [
+    ("", "the first line must name the columns"),
+    ("t,medial\n0,1\n1,2\n", "the first line must name the columns"),
+    ("time,medial,medial\n0,1,1\n1,2,2\n", "each once"),
+    ("time,medial\n0,1\n", "must have 2 to 20000 rows of numbers, not 1"),
+    ("time,medial\n0,1\n1,2,3\n", "line 3 has 3 values, the header names 2"),
+    ("time,medial\n0,1\n1,x\n", "line 3, column medial: must be a finite number"),
+    ("time,medial\n0,1\n1,nan\n", "line 3, column medial: must be a finite number"),
+    ("time,medial\n1,1\n\n1,1\n", "line 4: times must increase"),
+    ("time,distal\n0,1\n1,1\n", "follows from the passive tendon (20); leave it out"),
+    ("time,medail\n0,1\n1,1\n", "did you mean medial?"),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), COLUMNS)
+def test_what_is_wrong_in_a_file_of_columns_is_named_in_one_line(tmp_path, text, said):
+    path = write(tmp_path, "motion.csv", text)
+    with pytest.raises(InputError) as caught:
+        fp.load_scenario("fig6", {"reference.file": str(path)})
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_missing_file_of_columns_is_named():
+    with pytest.raises(InputError, match=r"reference.file .*nowhere.csv: there is no such file"):
+        fp.load_scenario("fig6", {"reference.file": "nowhere.csv"})

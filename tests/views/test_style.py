@@ -1,0 +1,67 @@
+"""What all figures share: colours that everybody tells apart, no windows, and a look that ends with the figure."""
+
+import itertools
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from finger_pin.views import plots
+from finger_pin.views.plots.style import BLUE, COLOURS, GREEN, PURPLE, VERMILLION
+
+
+def lab(rgb):
+    """CIELAB of linear sRGB under D65."""
+    xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) @ rgb
+    f = np.cbrt(xyz / [0.9505, 1.0, 1.089])
+    return np.array([116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])])
+
+
+# Machado, Oliveira and Fernandes (2009), severity 1.0, for linear RGB.
+BLINDNESS = {
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "none": np.eye(3),
+}
+
+
+@pytest.mark.parametrize("blindness", BLINDNESS.values(), ids=BLINDNESS.keys())
+def test_colour_blind_people_tell_the_joints_apart(blindness):
+    assert COLOURS[:4] == (BLUE, VERMILLION, GREEN, PURPLE)
+    seen = []
+    for colour in COLOURS[:4]:
+        srgb = np.array(to_rgb(colour))
+        linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+        seen.append(lab(np.clip(np.array(blindness) @ linear, 1e-6, 1.0)))
+    # Two points of CIELAB are just noticeable side by side; thin lines need ten or so.
+    assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 12.0
+
+
+def run_python(code):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+
+
+def test_importing_the_package_is_light_and_figures_open_no_windows_and_leave_settings_alone():
+    code = """
+import sys
+import finger_pin
+print("matplotlib" in sys.modules)
+import matplotlib
+
+def settings():
+    # Looking at the backend would choose one.
+    return {key: matplotlib.rcParams[key] for key in matplotlib.rcParams if key != "backend"}
+
+before = settings()
+from finger_pin.views import plots
+plots.plot_friction_law()
+print("matplotlib.pyplot" in sys.modules, "tkinter" in sys.modules, settings() == before)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False", "False", "True"]
+
+
+def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():
+    assert plots.plot_friction_law()._repr_png_().startswith(b"\x89PNG")

@@ -1,0 +1,77 @@
+"""The summary of a result: its numbers from the result's own variables."""
+
+import re
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.description.loading import load_scenario
+from finger_pin.views.summary import summarize
+
+
+@pytest.fixture(scope="module")
+def result():
+    return fp.simulate(load_scenario("fig6", {"simulation.duration": 0.02}))
+
+
+def test_the_summary_names_every_joint_and_tendon_and_fits_a_terminal(result):
+    lines = summarize(result).splitlines()
+    for name in ("abduction", "proximal", "medial", "distal", "T1", "T2", "T3", "T4", "T5, proximal half"):
+        assert any(line.startswith(f"  {name} ") for line in lines)
+    assert max(map(len, lines)) <= 80
+    assert all(line.isascii() for line in lines)
+
+
+def row(result, name):
+    line = next(line for line in summarize(result).splitlines() if line.startswith(f"  {name} "))
+    return [float(each) for each in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", line.removeprefix(f"  {name}"))]
+
+
+def test_the_summary_tells_rms_and_largest_error_in_degrees(result):
+    error = result["tracking_error"].sel(joint="medial").values * 180 / np.pi
+    np.testing.assert_allclose(row(result, "medial"), [np.sqrt(np.mean(error**2)), abs(error).max()], atol=5e-5)
+    assert "Tracking error, deg (whole run)" in summarize(result)
+
+
+def test_the_first_second_of_a_long_run_is_left_out_and_that_is_said(result):
+    long = result.isel(time=[0, 5, 10, 15, 20]).assign_coords(time=[0.0, 0.5, 1.0, 2.0, 3.0]).assign_attrs(end_time=3.0)
+    values = np.deg2rad([50.0, 40.0, 3.0, -4.0, 0.0])
+    long["tracking_error"] = long["tracking_error"].copy(data=np.repeat(values[:, None], 4, axis=1))
+    assert "Tracking error, deg (after the first 1 s)" in summarize(long)
+    np.testing.assert_allclose(row(long, "abduction"), [5.0 / np.sqrt(3.0), 4.0], atol=5e-5)
+
+
+def test_the_summary_tells_least_and_greatest_tensions(result):
+    tension = result["tendon_tension"].sel(tendon="T3")
+    np.testing.assert_allclose(row(result, "T3"), [tension.min(), tension.max()], atol=5e-4)
+    proximal = result["passive_tension_proximal"]
+    np.testing.assert_allclose(row(result, "T5, proximal half"), [proximal.min(), proximal.max()], atol=5e-4)
+
+
+def test_the_shares_of_the_energy_account_add_up(result):
+    lines = summarize(result).splitlines()
+    start = next(index for index, line in enumerate(lines) if line.startswith("Energy"))
+    end = lines.index("", start)
+    shares = {
+        re.split(r"\s{2,}", line.strip())[0]: float(line.removesuffix(" %").split()[-1])
+        for line in lines[start + 2 : end]
+    }
+    supplied = sum(share for name, share in shares.items() if name.startswith("supplied"))
+    gone = sum(share for name, share in shares.items() if not name.startswith("supplied"))
+    assert supplied == pytest.approx(gone, abs=0.05)
+    assert abs(shares["residual, not accounted for"]) < 0.1
+    assert {"lost by tendons sliding", "lost by joints sliding", "stored, end less start"} <= set(shares)
+
+
+def test_the_summary_tells_the_cost(result):
+    text, attributes = summarize(result), result.attrs
+    assert f"{attributes['solver_steps']} steps, {attributes['solver_evaluations']} evaluations" in text
+    factor = attributes["end_time"] / attributes["solver_wall_time"]
+    assert f"Wall time {attributes['solver_wall_time']:.3g} s, real-time factor {factor:.3g}" in text
+
+
+def test_the_summary_of_one_instant_and_of_a_saved_result(result, tmp_path):
+    assert "abduction" in summarize(result.isel(time=[0]).assign_attrs(end_time=0.0))
+    fp.save(result, tmp_path / "r.nc")
+    assert summarize(fp.load_result(tmp_path / "r.nc")) == summarize(result)

@@ -1,0 +1,65 @@
+"""The page on a phone and on a desk, and another result as a ghost."""
+
+import numpy as np
+import pytest
+from motion import fingertip, joint_position
+from pages import opened, seek
+
+from finger_pin.views.viewer import write_animation
+
+
+@pytest.fixture(scope="module")
+def other(result):
+    """The same motion, half as far."""
+    return result.assign(joint_position=0.5 * result["joint_position"])
+
+
+@pytest.fixture(scope="module")
+def both(browser, result, other, tmp_path_factory):
+    path = tmp_path_factory.mktemp("both") / "animation.html"
+    return opened(browser, write_animation(result, path, ghost=other).as_uri())
+
+
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (1400, 900)])
+def test_nothing_overflows_the_window_and_the_finger_is_clear_of_panel_and_bar(both, size):
+    width, height = size
+    both.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500},
+    )
+    try:
+        both.execute_script("window.dispatchEvent(new Event('resize')); fingerPlayer.scene.frame('oblique')")
+        places = both.execute_script("""
+        const inside = (selector) => [...document.querySelectorAll(selector)].map((e) => e.getBoundingClientRect());
+        const box = (r) => [r.left, r.top, r.right, r.bottom];
+        const { camera } = fingerPlayer.viewer;
+        camera.updateMatrixWorld(true);
+        const seen = fingerPlayer.config.inView.map(([x, y, z]) => {
+          const at = new MeshCat.THREE.Vector3(x, z, -y).project(camera);
+          return [((at.x + 1) / 2) * innerWidth, ((1 - at.y) / 2) * innerHeight];
+        });
+        return { panel: inside("#panel").map(box)[0], bar: inside("#bar").map(box)[0],
+                 ticks: inside("#ticks span").map(box),
+                 parts: inside("#bar *, #panel h1, #panel table").filter((r) => r.width).map(box), seen,
+                 window: [innerWidth, document.documentElement.scrollWidth] };""")
+    finally:
+        both.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    assert places["window"] == [width, width]
+    parts = np.array([*places["parts"], places["panel"], places["bar"]])
+    assert parts[:, 0].min() >= 0.0 and parts[:, 2].max() <= width
+    ticks = np.array(places["ticks"])
+    assert np.all(ticks[:-1, 2] + 4.0 < ticks[1:, 0])
+    x, y = np.array(places["seen"]).T
+    assert np.all((x > 0.0) & (x < width) & (y > 0.0) & (y < places["bar"][1]))
+    _, _, right, bottom = places["panel"]
+    assert np.all((x > right) | (y > bottom))
+
+
+def test_the_ghost_moves_as_the_other_result_does(both):
+    seek(both, 1.3)
+    x, y, z = fingertip(0.5 * joint_position(1.3))
+    tip = both.execute_script("""
+    fingerPlayer.viewer.scene.updateMatrixWorld(true);
+    return fingerPlayer.scene.ghostLinks.at(-1).localToWorld(new MeshCat.THREE.Vector3(0.0218, 0, 0)).toArray()""")
+    assert tip == pytest.approx([x, z, -y], abs=1e-5)
+    assert both.find_element("id", "ghost").text == "ghost: a <test> motion"

@@ -1,0 +1,59 @@
+"""A result as a film."""
+
+import subprocess
+
+import numpy as np
+import pytest
+from matplotlib.animation import FFMpegWriter
+from motion import fingertip, joint_position
+from PIL import Image
+
+import finger_pin as fp
+from finger_pin.views import write_video
+
+
+def pictures(path):
+    with Image.open(path) as film:
+        found = []
+        for index in range(film.n_frames):
+            film.seek(index)
+            found.append(np.asarray(film.convert("RGB"), dtype=float))
+        return found, film.info["duration"]
+
+
+@pytest.mark.parametrize("tool", ["ffmpeg", "pillow"])
+def test_a_gif_lasts_as_long_as_the_motion_and_traces_the_fingertip(result, tmp_path, monkeypatch, tool):
+    if tool == "pillow":
+        monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    elif not FFMpegWriter.isAvailable():
+        pytest.skip("needs ffmpeg")
+    part = result.sel(time=slice(0.0, 0.6))
+    frames, duration = pictures(write_video(part, tmp_path / "film.gif", rate=10.0))
+    assert len(frames) == 7 and duration == 100
+    # The trace is pink and bright where it is past, and the fingertip moves up all the time, by equation (1).
+    assert np.all(np.diff([fingertip(joint_position(t))[2] for t in np.arange(0.0, 0.65, 0.1)]) > 0.0)
+    tops = []
+    for frame in frames[3:]:
+        red, green, blue = np.moveaxis(frame, -1, 0)
+        pink = (red > 180.0) & (red - green > 60.0) & (blue - green > 10.0)
+        tops.append(np.flatnonzero(pink.any(axis=1)).min())
+    assert np.all(np.diff(tops) < 0)
+
+
+@pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="needs ffmpeg")
+def test_an_mp4_in_slow_motion_has_frames_for_all_of_its_time(result, tmp_path):
+    path = write_video(result.sel(time=slice(0.0, 0.2)), tmp_path / "film.mp4", speed=0.25, rate=20.0)
+    command = ["ffmpeg", "-i", str(path), "-f", "null", "-"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stderr
+    assert "frame=   17" in said and "1200x720" in said
+
+
+def test_what_cannot_be_filmed_is_said_before_anything_is_written(result, tmp_path, monkeypatch):
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with pytest.raises(fp.FingerPinError, match="ffmpeg"):
+        write_video(result, tmp_path / "film.mp4")
+    with pytest.raises(fp.InputError, match=r"\.mp4 or \.gif"):
+        write_video(result, tmp_path / "film.avi")
+    with pytest.raises(fp.InputError, match="speed"):
+        write_video(result, tmp_path / "film.gif", speed=0.0)
+    assert list(tmp_path.iterdir()) == []
