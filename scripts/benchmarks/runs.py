@@ -12,7 +12,7 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_control
+from finger_pin.control.compiled import compiled_control
 from finger_pin.core.compilation import entry
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.model import evaluate
@@ -79,8 +79,8 @@ def rms(difference: Array) -> float:
 
 def stepper(loop: ClosedLoop, method: str, rtol: float) -> Stepper:
     """Return a loop ready to be integrated by a compiled method."""
-    finger, controller, reference = loop.finger, loop.controller, loop.reference
-    control = build_control(controller, reference, finger.routing)
+    finger, control = loop.finger, compiled_control(loop)
+    assert control is not None
     atol, tableau = rtol * finger.layout.scales(), TABLEAUS[method]()
     return Stepper(finger.mechanism, control, loop.initial_state(), tableau, rtol, atol, loop.fingertip_force)
 

@@ -6,11 +6,10 @@ from typing import Any
 import kernels
 import numpy as np
 import pinocchio as pin
-from finger_pin.core.plant import build_work
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_control
+from finger_pin.control.compiled import compiled_control
 from finger_pin.core import rosenbrock
 from finger_pin.core.binding import block_for
 from finger_pin.core.inputs import held_control
@@ -158,9 +157,8 @@ class Case:
 
     @classmethod
     def of(cls, loop, control=None):
-        finger = loop.finger
-        control = control or build_control(loop.controller, loop.reference, finger.routing)
-        return cls(loop, control, Bound(finger.mechanism, control, loop.fingertip_force))
+        control = control or compiled_control(loop)
+        return cls(loop, control, Bound(loop.finger.mechanism, control, loop.fingertip_force))
 
     def held(self):
         """The same under tensions that are held: those that stand in its control."""

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from finger_pin.commands.validation.check import Check, Picture, Section, compare
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_control
+from finger_pin.control.compiled import compiled_control
 from finger_pin.core import rosenbrock
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.loading import load_scenario
@@ -43,9 +43,8 @@ class Smooth:
     def stepper(self, method: str, step: float) -> Stepper:
         """Return an integrator whose tolerances reject nothing, so that its steps can be imposed."""
         finger = self.loop.finger
-        controller: Any = self.loop.controller
-        reference: Any = self.loop.reference
-        control = build_control(controller, reference, finger.routing)
+        control = compiled_control(self.loop)
+        assert control is not None
         atol, force = 1e6 * finger.layout.scales(), self.loop.fingertip_force
         stepper = Stepper(finger.mechanism, control, self.start, TABLEAUS[method](), 1e6, atol, force)
         stepper.parts[0].memory[rosenbrock.STEP] = step
@@ -54,8 +53,9 @@ class Smooth:
     def largest(self, error: Array) -> float:
         """Return the largest error of a kind of state, each over the distance that it moves."""
         moved = self.exact(END) - self.start
-        kinds = vars(self.loop.finger.layout.unpack(np.arange(len(moved)))).values()
-        return max(float(np.abs(error[..., kind]).max() / np.linalg.norm(moved[kind])) for kind in kinds if len(kind))
+        layout = self.loop.finger.layout
+        kinds = zip(*(vars(layout.unpack(each)).values() for each in (error, moved)), strict=True)
+        return max(float(np.abs(off).max() / np.linalg.norm(far)) for off, far in kinds if far.size)
 
 
 def smooth_motion() -> Smooth:
