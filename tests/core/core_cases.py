@@ -211,6 +211,6 @@ class Case:
 
 
 def relative(found, expected):
-    """The largest distance between rows, each over the norm of the row that is expected."""
+    """The largest distance between rows, each over the norm of the row that is expected; zeros must be zeros."""
     found, expected = (np.reshape(each, (len(expected), -1)) for each in (found, expected))
-    return np.max(np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1))
+    return np.max(np.linalg.norm(found - expected, axis=1) / np.maximum(np.linalg.norm(expected, axis=1), 1e-300))
