@@ -38,7 +38,7 @@ def assert_same(found, expected, mechanism, tolerance=1e-12):
             strict=True,
         )
         for mine, other in pairs:
-            np.testing.assert_allclose(mine, other, rtol=1e-9, atol=tolerance * max(1.0, np.abs(other).max()))
+            np.testing.assert_allclose(mine, other, rtol=1e-9, atol=tolerance * np.abs(other).max(initial=1.0))
 
 
 def test_the_compiled_evaluation_is_the_readable_one(drawn):
