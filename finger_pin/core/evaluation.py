@@ -27,9 +27,13 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self._charts = Charts.of(mechanism)
         tables = build_tables(mechanism)
-        work = build_work(tables, [table.law for table in mechanism.rows], mechanism.channels)
+        laws = [table.law for table in mechanism.rows]
         control = held_control(mechanism.channels, mechanism.coordinates)
-        self._models = [BoundModel(tables._replace(loaded=loaded), control, work) for loaded in (False, True)]
+        # Each has work of its own: without loads, nothing writes where loads have left their torques.
+        self._models = [
+            BoundModel(tables._replace(loaded=loaded), control, build_work(tables, laws, mechanism.channels))
+            for loaded in (False, True)
+        ]
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
@@ -53,16 +57,18 @@ class CompiledMechanism:
         for part in parts:
             if len(tables.charts):
                 place_all(tables, attitudes[part][0])
+            filled = np.ascontiguousarray(rows[:, part])
             evaluate_many(
                 address,
                 states[part],
                 commands[part],
                 forces[part],
                 rates[part],
-                rows[:, part] if len(parts) == 1 else rows[:, part].copy(),
+                filled,
                 torques[part],
                 externals[part],
             )
+            rows[:, part] = filled
         return self._evaluation(np.ndim(x) == 1, packed, rates, rows, torques, externals)
 
     def _evaluation(
@@ -73,6 +79,10 @@ class CompiledMechanism:
         rate = rates
         if mechanism.positions != width:
             q, v, _ = mechanism.split(packed)
+            for i in self._charts.angles:
+                # From the second derivatives of the angles to the angular acceleration.
+                x, y, z = v[:, i], v[:, i + 1], v[:, i + 2]
+                acceleration[:, i : i + 3] += np.stack([y * z, -x * z, x * y], axis=1)
             moving = mechanism.body.position_rate(q[:, : mechanism.body.model.nq], v[:, :joints])
             rate = np.concatenate([moving, v[:, joints:], rates[:, width:]], axis=1)
         at = 0 if single else slice(None)

@@ -196,6 +196,7 @@ def build_tables(mechanism: Mechanism) -> Tables:
         last.append(above)
         turns.append(turn)
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
+    first_body = [*(int(joint.idx_v) for joint in model.joints[1:]), -1]
     tips = [model.frames[tip] for tip in body.tips]
     holders = [int(tip.parentJoint) for tip in tips]
     carriers = [body.carriers[joint] for joint in joint_of]
@@ -254,7 +255,7 @@ def build_tables(mechanism: Mechanism) -> Tables:
                     table.law.scale is not None,
                     np.any(table.bends),
                     bool(table.inputs) or np.any(table.channels >= 0),
-                    bool(table.loads),
+                    bool(table.loads) or np.any(table.pins >= 0),
                 )
                 for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
             ],
@@ -273,7 +274,7 @@ def build_tables(mechanism: Mechanism) -> Tables:
         load_start=np.array(starts[1], dtype=np.int64),
         terms=np.array(terms, dtype=np.int64),
         weights=np.array(weights, dtype=float),
-        pins=np.concatenate([np.zeros(0), *(table.pins for table in rows)]).astype(np.int64),
+        pins=np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
         carried=np.ascontiguousarray(body.supports[:, joint_of - 1]),
         bend_start=bend_start,
         bend_at=bend_at,

@@ -135,7 +135,7 @@ class Finger:
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
 
         Raises:
-            InputError: If the joints of the two differ.
+            InputError: If the joints of the two differ, or one has several coordinates.
         """
         if isinstance(description, str | Path):
             description = load_finger(description)
@@ -143,6 +143,9 @@ class Finger:
         self.rigid_body = rigid_body or build_rigid_body(description)
         if len(self.rigid_body.joints) != len(description.joints):
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
+        for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
+            if joint.nv != 1:
+                raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
         self.tendons = Tendons.from_description(description)
         self.routing = self.tendons.routing
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)

@@ -12,12 +12,11 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_control
+from finger_pin.control.compiled import compiled_control
 from finger_pin.core.compilation import entry
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.dynamics import evaluate
-from finger_pin.core.integrator import TABLEAUS, Stepper, integrate_compiled
-from finger_pin.core.plant import build_work
+from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.model import evaluate
+from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import integrate
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -78,17 +77,22 @@ def rms(difference: Array) -> float:
     return float(np.sqrt(np.mean(difference**2)))
 
 
+def stepper(loop: ClosedLoop, method: str, rtol: float) -> Stepper:
+    """Return a loop ready to be integrated by a compiled method."""
+    finger, control = loop.finger, compiled_control(loop)
+    assert control is not None
+    atol, tableau = rtol * finger.layout.scales(), TABLEAUS[method]()
+    return Stepper(finger.mechanism, control, loop.initial_state(), tableau, rtol, atol, loop.fingertip_force)
+
+
 def compiled(scenario: Scenario, method: str, rtol: float) -> Job:
     """Return a job that integrates with a compiled method; it gives joint positions and statistics."""
     loop = ClosedLoop.from_scenario(scenario)
-    plant = CompiledFinger(loop.finger, loop.fingertip_force).plant
-    control = build_control(loop.controller, loop.reference, plant.actuated)
     times, joints = scenario.sample_times(), len(loop.finger.routing.joints)
-    atol, names = rtol * loop.finger.layout.scales(), loop.finger.layout.names
+    start, names = stepper(loop, method, rtol), loop.finger.layout.names
 
     def job() -> tuple[Array, Any]:
-        stepper = Stepper(plant, control, loop.initial_state(), TABLEAUS[method](), rtol, atol)
-        trajectory = integrate_compiled(stepper, scenario.simulation.duration, names)
+        trajectory = integrate_compiled(start.copy(), scenario.simulation.duration, names)
         if trajectory.failure:
             raise Failed(trajectory.failure)
         return trajectory.interpolate(times)[:, :joints], trajectory.statistics
@@ -118,8 +122,8 @@ def has_sundials() -> bool:
 
 
 @entry
-def _rate(plant: Any, control: Any, time: Any, x: Any, work: Any, rate: Any) -> None:
-    evaluate(plant, control, time, x, work, rate)
+def _rate(block: Any, time: float, x: Any, rate: Any) -> None:
+    evaluate(block, time, x, rate)
 
 
 def sundials(scenario: Scenario, rtol: float) -> Job:
@@ -127,15 +131,14 @@ def sundials(scenario: Scenario, rtol: float) -> Job:
     from sksundae.cvode import CVODE
 
     loop = ClosedLoop.from_scenario(scenario)
-    plant = CompiledFinger(loop.finger, loop.fingertip_force).plant
-    control = build_control(loop.controller, loop.reference, plant.actuated)
-    work, times = build_work(plant), scenario.sample_times()
-    atol, joints = rtol * loop.finger.layout.scales(), len(loop.finger.routing.joints)
+    times, joints = scenario.sample_times(), len(loop.finger.routing.joints)
+    atol = rtol * loop.finger.layout.scales()
+    (part,) = stepper(loop, "Rodas5P", rtol).parts
     state = np.empty(loop.finger.layout.size)
 
     def rhs(time: float, x: Array, rate: Array) -> None:
         state[:] = x
-        _rate(plant, control, time, state, work, rate)
+        _rate(part.model, time, state, rate)
 
     def job() -> tuple[Array, Any]:
         solver = CVODE(rhs, method="BDF", rtol=rtol, atol=atol, max_num_steps=10**7)

@@ -141,10 +141,12 @@ def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     planned = np.array([1.0, 2.5, 3.0, 4.0, 5.0])
     for position, velocity in zip(*postures(4, 3), strict=True):
         command = feedforward.command(planned, position, velocity)
-        stiction = np.zeros(5)
+        x = finger.rest_state(position)
+        state = finger.layout.unpack(x)
+        state.velocity[:] = velocity
         for _ in range(10000):
-            forces = finger.tendons.forces(position, velocity, np.zeros(1), np.zeros(1), stiction, command[:4])
-            stiction = stiction + 1e-5 * forces.stiction_rate
+            forces = finger.evaluate(x, command[:4]).tendons
+            state.tendon_stiction[:] += 1e-5 * forces.stiction_rate
         np.testing.assert_allclose(forces.strands[:4], planned[:4], rtol=1e-7)
 
 

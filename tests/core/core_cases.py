@@ -6,14 +6,16 @@ from typing import Any
 import kernels
 import numpy as np
 import pinocchio as pin
-from finger_pin.core.plant import build_plant, build_work
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_control
+from finger_pin.control.compiled import compiled_control
 from finger_pin.core import rosenbrock
-from finger_pin.core.integrator import TABLEAUS, Stepper
-from finger_pin.core.linearisation import build_linear
+from finger_pin.core.inputs import held_control
+from finger_pin.core.model import BoundModel
+from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.tables import build_tables, build_work
+from finger_pin.mechanism.state import State
 
 BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
@@ -94,10 +96,13 @@ def none_passive():
 
 
 def lugre():
-    """`two_passive` with the micro-damping and the Stribeck exponent of the LuGre model."""
+    """`two_passive` with micro-damping and Stribeck exponents of its own for every tendon and joint."""
     table = two_passive().model_dump()
-    table["finger"]["tendon_friction"] |= {"micro_damping": 2.0, "stribeck_exponent": 2.0}
-    table["finger"]["joint_friction"] |= {"micro_damping": 1e-3, "stribeck_exponent": 2.0}
+    table["finger"]["tendon_friction"] |= {
+        "micro_damping": [2.0, 0.0, 1.0, 1.5, 0.5, 2.0],
+        "stribeck_exponent": [2, 1, 2, 1, 2, 1],
+    }
+    table["finger"]["joint_friction"] |= {"micro_damping": [2e-3, 1e-3, 0.0, 2.5e-3], "stribeck_exponent": [1, 2, 2, 1]}
     return fp.Scenario.model_validate(table)
 
 
@@ -112,21 +117,49 @@ def without_abduction_link(loop):
     return replace(loop, finger=finger, dynamics=finger)
 
 
+class Bound:
+    """A mechanism under inputs, compiled and bound to memory.
+
+    Attributes:
+        mechanism: The mechanism.
+        model: Its tables, inputs and memory.
+    """
+
+    def __init__(self, mechanism, control, force=None):
+        """Bind a mechanism; ``force`` acts at its tips."""
+        tables = build_tables(mechanism)
+        if force is not None and np.any(force):
+            tables.tip_force[:] = force
+            tables = tables._replace(loaded=True)
+        work = build_work(tables, [table.law for table in mechanism.rows], len(control.tension))
+        self.mechanism = mechanism
+        self._bound = BoundModel(tables, control, work)
+        self.model = self._bound.model
+
+    def solve(self, time, x, g):
+        """Return the rate, the matrix that solves (g - J) u = r + f_t s, by columns (r | s), and if there is one."""
+        rate = np.zeros(len(x))
+        solved = kernels.condensed(self._bound.address, time, x, g, rate)
+        return rate, self.model.linear.solution.copy(), solved
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """A closed loop, readable and compiled."""
 
     loop: ClosedLoop
-    plant: Any
     control: Any
-    work: Any
-    linear: Any
+    bound: Bound
 
     @classmethod
-    def of(cls, loop):
-        plant = build_plant(loop.finger, loop.fingertip_force)
-        control = build_control(loop.controller, loop.reference, plant.actuated)
-        return cls(loop, plant, control, build_work(plant), build_linear(plant))
+    def of(cls, loop, control=None):
+        control = control or compiled_control(loop)
+        return cls(loop, control, Bound(loop.finger.mechanism, control, loop.fingertip_force))
+
+    def held(self):
+        """The same under tensions that are held: those that stand in its control."""
+        mechanism = self.loop.finger.mechanism
+        return Case.of(self.loop, held_control(mechanism.channels, mechanism.coordinates))
 
     @property
     def layout(self):
@@ -135,42 +168,45 @@ class Case:
     @property
     def kinds(self):
         """Indices of every kind of state that there is: positions, velocities, ..."""
-        parts = np.split(np.arange(self.layout.size), np.cumsum(self.layout.sizes)[:-1])
-        return [part for part in parts if len(part)]
+        return [part for part in vars(self.layout.unpack(np.arange(self.layout.size))).values() if len(part)]
 
     def states(self, rng, count):
         """Random states beyond the ranges and between slack and tight, slow and fast."""
-        finger, size = self.loop.finger, count
-        sizes = self.layout.sizes
+        finger, tendons = self.loop.finger, len(self.layout.tendons)
         lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
 
-        def spread(kind, low, high):
-            return rng.normal(size=(size, sizes[kind])) * 10.0 ** rng.uniform(low, high, (size, 1))
+        def spread(size, low, high):
+            return rng.normal(size=(count, size)) * 10.0 ** rng.uniform(low, high, (count, 1))
 
-        q = rng.uniform(lower - 0.15 * (upper - lower), upper + 0.15 * (upper - lower), (size, sizes[0]))
-        p = finger.tendons.rest_position(q) + spread(2, -5.0, -3.0)
-        return np.concatenate(
-            [q, spread(1, -2.0, 1.0), p, spread(3, -4.0, -1.0), spread(4, -2.0, 0.8), spread(5, -5.0, -2.0)], axis=1
+        q = rng.uniform(lower - 0.15 * (upper - lower), upper + 0.15 * (upper - lower), (count, len(lower)))
+        state = State(
+            position=q,
+            passive_position=finger.tendons.rest_position(q) + spread(self.layout.passive, -5.0, -3.0),
+            velocity=spread(len(lower), -2.0, 1.0),
+            passive_velocity=spread(self.layout.passive, -4.0, -1.0),
+            tendon_stiction=spread(tendons, -2.0, 0.8),
+            joint_stiction=spread(len(lower), -5.0, -2.0),
         )
+        return self.layout.pack(state)
 
-    def solve(self, time, x, g, r):
-        """Return the compiled rate, the solution of (g - J) u = r, and whether there is one."""
-        scaled, rate, u = np.zeros((3, len(x)))
-        solved = kernels.linear_solution(
-            self.plant, self.control, time, x, g, r, self.work, self.linear, scaled, rate, u
-        )
-        return rate, u, solved
+    def solve(self, time, x, g):
+        """Return the compiled rate, and what solves (g - J) u = r; see `Bound.solve`."""
+        return self.bound.solve(time, x, g)
 
-    def stepper(self, method="Rodas5P", rtol=1e-6, atol=1e-6, x=None, step=None):
-        """A compiled integrator; by default at the start of the loop, with the first step that it takes itself."""
+    def part(self, method="Rodas5P", rtol=1e-6, atol=1e-6, x=None, step=None):
+        """A compiled integration; by default from the start of the loop, with the first step that it takes itself."""
         start = self.loop.initial_state() if x is None else x
-        stepper = Stepper(self.plant, self.control, start, TABLEAUS[method](), rtol, atol * self.layout.scales())
+        scales, force = self.layout.scales(), self.loop.fingertip_force
+        stepper = Stepper(
+            self.loop.finger.mechanism, self.control, start, TABLEAUS[method](), rtol, atol * scales, force
+        )
+        (part,) = stepper.parts
         if step is not None:
-            stepper.memory[rosenbrock.STEP] = step
-        return stepper
+            part.memory[rosenbrock.STEP] = step
+        return part
 
 
 def relative(found, expected):
-    """The largest distance between rows, each over the norm of the row that is expected."""
+    """The largest distance between rows, each over the norm of the row that is expected; zeros must be zeros."""
     found, expected = (np.reshape(each, (len(expected), -1)) for each in (found, expected))
-    return np.max(np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1))
+    return np.max(np.linalg.norm(found - expected, axis=1) / np.maximum(np.linalg.norm(expected, axis=1), 1e-300))

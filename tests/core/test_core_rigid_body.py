@@ -9,9 +9,9 @@ import pytest
 from core_cases import BODIES, relative
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.plant import build_plant, build_work
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.rigid_body import BY_POSITION, BY_VELOCITY, MASS_MATRIX
+from finger_pin.core.tables import build_tables, build_work
 from finger_pin.exceptions import InputError
 
 STATES = 200
@@ -33,15 +33,16 @@ class Found:
 def compared(request, bodies):
     """The same quantities of one body, compiled and from Pinocchio."""
     finger = bodies[request.param]
-    model, plant = finger.rigid_body.model, build_plant(finger, np.zeros(3))
-    data, work, size = model.createData(), build_work(plant), model.nv
+    model, tables = finger.rigid_body.model, build_tables(finger.mechanism)
+    laws = [table.law for table in finger.mechanism.rows]
+    data, work, size = model.createData(), build_work(tables, laws, finger.mechanism.channels), model.nv
     rng = np.random.default_rng(1)
     ours, theirs = Found(*([] for _ in fields(Found))), Found(*([] for _ in fields(Found)))
     for _ in range(STATES):
         q, v = rng.uniform(-3.0, 3.0, size), 10.0 * rng.normal(size=size)
         a, torque = 100.0 * rng.normal(size=size), 0.1 * rng.normal(size=size)
         bias, needed, acceleration = np.zeros((3, size))
-        kernels.rigid(plant, q, v, a, torque, work, bias, needed, acceleration)
+        kernels.rigid(tables, q, v, a, torque, work, bias, needed, acceleration)
         ours.mass.append(work.square[MASS_MATRIX].copy())
         ours.by_position.append(work.square[BY_POSITION].copy())
         ours.by_velocity.append(work.square[BY_VELOCITY].copy())

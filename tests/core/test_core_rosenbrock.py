@@ -1,6 +1,5 @@
 """The Rosenbrock methods: order conditions, stability, convergence on a finger, and what steps leave behind."""
 
-from dataclasses import replace
 from functools import cache
 from itertools import combinations_with_replacement
 
@@ -8,14 +7,14 @@ import kernels
 import numpy as np
 import pytest
 from core_cases import Case
-from finger_pin.core.plant import held_control
 from test_core_linearisation import pieces
 
 import finger_pin as fp
 from finger_pin.commands.validation.order import END, mean_order, smooth_motion, step_errors
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
-from finger_pin.core.integrator import TABLEAUS, _interpolant
+from finger_pin.core.integrator import _Recorder
+from finger_pin.core.stepper import TABLEAUS, failure
 
 METHODS = tuple(TABLEAUS)
 ORDER = {"Rodas4": 4, "Rodas5P": 5}
@@ -164,13 +163,13 @@ def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
     """Of one step from the same state: the error of an interpolant of order q is h^(q+1)."""
     x, errors = smooth.start, []
     for h in (2.5e-4, 1.25e-4, 6.25e-5):
-        stepper = smooth.stepper(method, step=h)
-        record = (np.zeros(1), np.zeros((1, len(x))), np.zeros((1, len(stepper.tableau.dense), len(x))))
-        assert stepper.advance(h, record) == (rosenbrock.DONE, 1)
-        between = _interpolant(np.array([0.0, h]), np.stack([x, stepper.x]), record[2])
+        (part,) = smooth.stepper(method, step=h).parts
+        recorder = _Recorder(part, 1)
+        assert recorder.advance(h) == rosenbrock.DONE and recorder.taken == 1
         times = np.linspace(0.0, h, 9)
-        np.testing.assert_allclose(between(times[[0, -1]]), [x, stepper.x], rtol=1e-15, atol=1e-18)
-        errors.append(smooth.largest(between(times) - smooth.exact(times).T))
+        found, _ = recorder.steps().interpolate(times)
+        np.testing.assert_allclose(found[[0, -1]], [x, part.x], rtol=1e-15, atol=1e-18)
+        errors.append(smooth.largest(found - smooth.exact(times).T))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - ORDER[method]) < 0.5), (errors, orders)
 
@@ -178,16 +177,16 @@ def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
 def test_a_rejected_step_leaves_no_trace(cases, method):
     """From a first step that is much too long, the one accepted is the same as if it had been the first tried."""
     case = cases["stick_slip"]
-    tried = case.stepper(method, step=0.5)
-    record = tuple(np.zeros(shape) for shape in ((1,), (1, 19), (1, len(tried.tableau.dense), 19)))
+    tried = case.part(method, step=0.5)
+    record = tried.room(1)
     assert tried.advance(1.0, record) == (rosenbrock.FULL, 1)
     assert tried.memory[rosenbrock.REJECTED] > 0
-    direct = case.stepper(method, step=tried.time)
-    again = tuple(np.zeros_like(each) for each in record)
+    direct = case.part(method, step=tried.time)
+    again = direct.room(1)
     assert direct.advance(1.0, again) == (rosenbrock.FULL, 1)
     assert direct.memory[rosenbrock.REJECTED] == 0
     np.testing.assert_array_equal(direct.x, tried.x)
-    for ours, theirs in zip(again, record, strict=True):
+    for ours, theirs in zip(vars(again).values(), vars(record).values(), strict=True):
         np.testing.assert_array_equal(ours, theirs)
 
 
@@ -195,16 +194,16 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
     """An absolute tolerance that no rounding can meet, for one number of the state alone."""
     case = cases["fig6"]
     for culprit in (6, 9):
-        stepper = case.stepper(method, rtol=0.0)
-        stepper.atol[:] = 1.0
-        stepper.atol[culprit] = 1e-60
-        start = stepper.x.copy()
-        status, _ = stepper.advance(1.0)
+        part = case.part(method, rtol=0.0)
+        part.atol[:] = 1.0
+        part.atol[culprit] = 1e-60
+        start = part.x.copy()
+        status, _ = part.advance(1.0)
         assert status == rosenbrock.UNDERFLOW
-        np.testing.assert_array_equal(stepper.x, start)
-        assert stepper.time == 0.0
+        np.testing.assert_array_equal(part.x, start)
+        assert part.time == 0.0
         name = case.layout.names[culprit]
-        assert stepper.failure(status, case.layout.names).endswith(f"the error is largest in {name}")
+        assert failure(part, status, case.layout.names).endswith(f"the error is largest in {name}")
 
 
 def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large():
@@ -221,14 +220,14 @@ def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large
 def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_names_the_culprit(cases, method):
     """An absolute tolerance that rounding meets only in steps far below a nanosecond."""
     case = cases["fig6"]
-    stepper = case.stepper(method, rtol=0.0)
-    stepper.atol[:] = 1.0
-    stepper.atol[9] = 1e-22
-    status, _ = stepper.advance(1.0)
+    part = case.part(method, rtol=0.0)
+    part.atol[:] = 1.0
+    part.atol[9] = 1e-22
+    status, _ = part.advance(1.0)
     assert status == rosenbrock.CREEPING
-    tries = stepper.memory[[rosenbrock.ACCEPTED, rosenbrock.REJECTED]].sum()
-    assert 0.0 < stepper.time < tries * rosenbrock.LEAST_MEAN_STEP
-    assert stepper.failure(status, case.layout.names).endswith("the error is largest in passive_velocity[T5]")
+    tries = part.memory[[rosenbrock.ACCEPTED, rosenbrock.REJECTED]].sum()
+    assert 0.0 < part.time < tries * rosenbrock.LEAST_MEAN_STEP
+    assert failure(part, status, case.layout.names).endswith("the error is largest in passive_velocity[T5]")
 
 
 def test_a_rate_that_is_not_finite_is_a_failure_that_keeps_the_state_and_names_the_culprit(scenarios, method):
@@ -241,22 +240,20 @@ def test_a_rate_that_is_not_finite_is_a_failure_that_keeps_the_state_and_names_t
     with np.errstate(over="ignore"):
         rate = case.loop.rhs(0.0, x)
     assert list(np.flatnonzero(~np.isfinite(rate))) == [9]
-    stepper = case.stepper(method, x=x)
-    status, _ = stepper.advance(1.0)
+    part = case.part(method, x=x)
+    status, _ = part.advance(1.0)
     assert status == rosenbrock.NOT_FINITE
-    np.testing.assert_array_equal(stepper.x, x)
-    assert stepper.failure(status, case.layout.names) == "the rate of passive_velocity[T5] is not finite"
+    np.testing.assert_array_equal(part.x, x)
+    assert failure(part, status, case.layout.names) == "the rate of passive_velocity[T5] is not finite"
 
 
-def recorded(stepper, end, size):
+def recorded(part, end, size):
     """Advance with a record of some size; return the times, states and interpolants of all steps."""
-    width = len(stepper.x)
-    record = (np.zeros(size), np.zeros((size, width)), np.zeros((size, len(stepper.tableau.dense), width)))
-    kept = []
-    while stepper.time < end:
-        status, steps = stepper.advance(end, record)
+    record, kept = part.room(size), []
+    while part.time < end:
+        status, steps = part.advance(end, record)
         assert status in (rosenbrock.DONE, rosenbrock.FULL)
-        kept.append([each[:steps].copy() for each in record])
+        kept.append([each[:steps].copy() for each in vars(record).values()])
     return [np.concatenate(each) for each in zip(*kept, strict=True)]
 
 
@@ -267,11 +264,11 @@ def test_steps_do_not_depend_on_the_size_of_the_record_nor_on_the_run(cases, met
     for size in (1, 4, 7, 10_000, 10_000):
         case = cases["stick_slip"]
         if held:
-            case = replace(case, control=held_control(case.plant))
-        stepper, kept = case.stepper(method), []
+            case = case.held()
+        part, kept = case.part(method), []
         for period in range(5):
             case.control.tension[:] = [6.0 + period, 6.0, 14.0 - period, 10.0]
-            kept.append(recorded(stepper, 2e-3 * (period + 1), size))
+            kept.append(recorded(part, 2e-3 * (period + 1), size))
         runs.append([np.concatenate(each) for each in zip(*kept, strict=True)])
     assert len(runs[0][0]) > 40
     for run in runs[1:]:
@@ -280,10 +277,10 @@ def test_steps_do_not_depend_on_the_size_of_the_record_nor_on_the_run(cases, met
 
 
 def test_an_advance_ends_exactly_where_it_is_told(cases, method):
-    stepper = cases["fig6"].stepper(method)
+    part = cases["fig6"].part(method)
     for end in (1e-9, 1e-3, 1e-3 + 1e-15, 0.1, 1.0 / 3.0):
-        stepper.advance(end)
-        assert stepper.time == end
+        part.advance(end)
+        assert part.time == end
 
 
 @pytest.mark.parametrize("held", [False, True], ids=["continuous", "held"])
@@ -291,13 +288,13 @@ def test_an_advance_by_next_to_nothing_costs_one_step(cases, method, held):
     """And the step size that was found before is not forgotten."""
     case, taken = cases["fig6"], []
     if held:
-        case = replace(case, control=held_control(case.plant))
+        case = case.held()
         case.control.tension[:] = [2.0, 2.0, 6.0, 4.0]
     for gap in (0.0, 1e-12):
-        stepper = case.stepper(method)
+        part = case.part(method)
         for period in range(1, 40):
-            stepper.advance(1e-3 * period)
+            part.advance(1e-3 * period)
             if period == 10 and gap > 0.0:
-                stepper.advance(stepper.time + gap)
-        taken.append(stepper.memory[rosenbrock.ACCEPTED])
+                part.advance(part.time + gap)
+        taken.append(part.memory[rosenbrock.ACCEPTED])
     assert taken[1] <= taken[0] + 2

@@ -73,7 +73,7 @@ def desired(time):
 
 def tensions(finger, time, x):
     """A controller of one's own: springs and dampers on the joints, least squares plus internal tension."""
-    q, v = x[:4], x[4:8]
+    q, v = x[:4], x[5:9]
     torque = GAIN * (desired(time) - q) - 0.02 * v
     shortest = np.linalg.lstsq(finger.coupling.T, torque, rcond=None)[0]
     internal = finger.routing.force_closure().tension
@@ -131,7 +131,7 @@ def test_along_the_motion_the_whole_hand_needs_just_the_torques_that_the_finger_
     for time, row in zip(times, x, strict=True):
         s = finger.evaluate(row, tensions(finger, time, row))
         q, v, a = whole(posture, [row[:4]])[0], np.zeros(16), np.zeros(16)
-        v[:4], a[:4] = row[4:8], s.acceleration
+        v[:4], a[:4] = row[5:9], s.acceleration
         net = s.tendon_torque - s.joints.friction - s.limiter_torque
         np.testing.assert_allclose(pin.rnea(hand, data, q, v, a)[:4], net, rtol=1e-8, atol=1e-9)
 
@@ -140,7 +140,7 @@ def test_the_energy_account_of_the_motion_closes(finger, motion):
     times, x, net = motion
     commands = np.array([tensions(finger, time, row) for time, row in zip(times, x, strict=True)])
     signals = finger.evaluate(x, commands)
-    stored = energies(finger, signals, finger.rigid_body.kinematics(x[:, :4], x[:, 4:8])).total
+    stored = energies(finger, signals, finger.rigid_body.kinematics(x[:, :4], x[:, 5:9])).total
     assert np.ptp(stored) > 1e-3
     np.testing.assert_allclose(stored - stored[0], net, atol=1e-4 * np.ptp(stored))
 
@@ -148,9 +148,9 @@ def test_the_energy_account_of_the_motion_closes(finger, motion):
 def test_the_mechanical_energy_is_the_whole_hand_s(finger, hand, posture, motion):
     _, x, _ = motion
     data = hand.createData()
-    found = finger.rigid_body.kinematics(x[:, :4], x[:, 4:8])
+    found = finger.rigid_body.kinematics(x[:, :4], x[:, 5:9])
     velocity = np.zeros((len(x), 16))
-    velocity[:, :4] = x[:, 4:8]
+    velocity[:, :4] = x[:, 5:9]
     q = whole(posture, x[:, :4])
     kinetic = [pin.computeKineticEnergy(hand, data, *row) for row in zip(q, velocity, strict=True)]
     potential = np.array([pin.computePotentialEnergy(hand, data, row) for row in q])

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from exerted import pin_forces
 
 import finger_pin as fp
 from finger_pin.laws.reaction import joint_reaction
@@ -41,8 +42,8 @@ def test_links_point_where_table_i_turns_them(finger):
 
 def test_without_external_force_the_reaction_is_the_sum_of_the_crossing_tensions(joints):
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-    forces = joints.forces(np.zeros(4), np.zeros(4), strands, np.zeros((4, 3)), np.zeros(3))
-    np.testing.assert_allclose(forces.reaction, [15.0, 15.0, 28.0, 40.0], rtol=1e-14)
+    forces = pin_forces(joints, np.zeros(4), np.zeros(4), strands)
+    np.testing.assert_allclose(forces.normal_force, [15.0, 15.0, 28.0, 40.0], rtol=1e-14)
 
 
 def test_reaction_is_the_norm_of_tendon_pull_and_external_force_at_random_postures(finger):
@@ -71,19 +72,19 @@ def test_joint_friction_is_law_9_loaded_by_the_reaction(joints):
     for _ in range(50):
         velocity, stiction = draw.normal(0.0, 0.5, 4), draw.normal(0.0, 2e-3, 4)
         strands = draw.uniform(0.0, 5.0, 6)
-        forces = joints.forces(velocity, stiction, strands, np.zeros((4, 3)), np.zeros(3))
+        forces = pin_forces(joints, velocity, stiction, strands)
         for j, load in enumerate(loads(strands)):
             v, s = float(velocity[j]), float(stiction[j])
             level = max(load * (COULOMB + (STICTION - COULOMB) * math.exp(-abs(v) / STRIBECK)), FLOOR)
             assert forces.level[j] == pytest.approx(level, rel=1e-12)
             assert forces.friction[j] == pytest.approx(s + VISCOUS * v, rel=1e-12)
-            assert forces.stiction_rate[j] == pytest.approx(STIFFNESS * (v - s * abs(v) / level), rel=1e-10)
+            assert forces.rate[j] == pytest.approx(STIFFNESS * (v - s * abs(v) / level), rel=1e-10)
 
 
 def test_an_unloaded_joint_slides_at_the_floor(joints):
-    forces = joints.forces(np.ones(4), np.full(4, FLOOR), np.zeros(6), np.zeros((4, 3)), np.zeros(3))
+    forces = pin_forces(joints, np.ones(4), np.full(4, FLOOR), np.zeros(6))
     np.testing.assert_array_equal(forces.level, FLOOR)
-    np.testing.assert_allclose(forces.stiction_rate, 0.0, atol=1e-12)
+    np.testing.assert_allclose(forces.rate, 0.0, atol=1e-12)
 
 
 def test_coefficients_can_differ_from_joint_to_joint(routing):
@@ -93,5 +94,5 @@ def test_coefficients_can_differ_from_joint_to_joint(routing):
     )
     joints = JointFriction.from_description(description, routing.loads)
     strands = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-    forces = joints.forces(np.zeros(4), np.zeros(4), strands, np.zeros((4, 3)), np.zeros(3))
+    forces = pin_forces(joints, np.zeros(4), np.zeros(4), strands)
     np.testing.assert_allclose(forces.level, np.array(stiction) * [15.0, 15.0, 28.0, 40.0], rtol=1e-12)

@@ -7,8 +7,8 @@ import pytest
 import scipy.integrate
 
 import finger_pin as fp
-from finger_pin.exceptions import InputError
-from finger_pin.laws.spring import spring_energy, spring_loss, spring_slopes, spring_torque
+from finger_pin.analysis import tension_for_force
+from finger_pin.laws.spring import spring_torque
 
 K, REST, C = 0.02, -1.0, 3e-4
 SPRINGS = {
@@ -25,22 +25,6 @@ def sprung():
 def test_the_torque_drives_the_joint_to_where_the_spring_is_relaxed():
     assert spring_torque(0.5, 0.0, K, REST, C) == pytest.approx(0.03, rel=1e-14)
     assert spring_torque(REST, 2.0, K, REST, C) == pytest.approx(6e-4, rel=1e-14)
-
-
-def test_slopes_are_the_derivatives_of_the_torque():
-    step = 1e-30
-    found = spring_slopes(K, C)
-    assert found[0] == pytest.approx(spring_torque(0.3 + 1j * step, 0.7, K, REST, C).imag / step, rel=1e-14)
-    assert found[1] == pytest.approx(spring_torque(0.3, 0.7 + 1j * step, K, REST, C).imag / step, rel=1e-14)
-
-
-def test_the_power_of_the_torque_is_the_change_of_energy_and_the_loss():
-    for position, velocity in np.random.default_rng(3).normal(size=(20, 2)):
-        step = 1e-30
-        change = velocity * spring_energy(position + 1j * step, K, REST).imag / step
-        power = spring_torque(position, velocity, K, REST, C) * velocity
-        assert power == pytest.approx(change + spring_loss(velocity, C), rel=1e-12)
-        assert spring_energy(position, K, REST) >= 0.0 and spring_loss(velocity, C) >= 0.0
 
 
 def test_springs_enter_the_equation_of_motion_as_a_torque_against_the_joint(sprung):
@@ -110,15 +94,10 @@ def test_mujoco_has_the_same_springs(sprung):
     np.testing.assert_allclose(data.qfrc_passive, -expected, rtol=1e-10)
 
 
-def test_what_is_compiled_refuses_springs_by_name(sprung):
-    with pytest.raises(InputError, match="springs are for the methods Radau, BDF and LSODA"):
-        fp.Simulator(sprung)
-
-
 def test_the_tensions_that_a_fingertip_force_needs_hold_the_springs_too(sprung):
     """H_c^T f = J^T E + G + k (theta - theta_0), free of friction."""
     theta, force = np.array([0.5, 0.8]), np.array([0.1, -0.2, 0.0])
-    found = fp.tension_for_force(sprung, theta, force, minimum=0.5)
+    found = tension_for_force(sprung, theta, force, minimum=0.5)
     body = sprung.rigid_body
     springs = [K * (theta[0] - REST), 0.01 * (theta[1] - 0.4)]
     needed = body.jacobian(theta).T @ force + body.gravity_torque(theta) + springs

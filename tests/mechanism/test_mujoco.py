@@ -12,6 +12,7 @@ from finger_pin.commands.validation import mujoco_motion
 from finger_pin.description.loading import list_fingers
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mjcf import to_mjcf
+from finger_pin.mechanism.state import State
 from finger_pin.mechanism.urdf import to_urdf
 
 mujoco = pytest.importorskip("mujoco")
@@ -78,8 +79,8 @@ def test_mujoco_finds_the_accelerations_of_our_equation_18_at_any_state(name, ov
     assert (model.nq, model.nu) == (len(finger.routing.joints) + finger.routing.passive, finger.routing.actuated)
     seen = set()
     for position, velocity, passive, rate, command in random_states(finger, 200, slack=1e-3):
-        stiction = np.zeros(len(finger.routing.tendons) + len(position))
-        ours = finger.evaluate(np.concatenate([position, velocity, passive, rate, stiction]), command)
+        state = State(position, passive, velocity, rate, np.zeros(len(finger.routing.tendons)), np.zeros(len(position)))
+        ours = finger.evaluate(finger.layout.pack(state), command)
         data = forward(model, np.append(position, passive), np.append(velocity, rate), command)
         expected = np.append(ours.acceleration, ours.tendons.passive_acceleration)
         for found, wanted in zip(np.split(data.qacc, [4]), np.split(expected, [4]), strict=True):

@@ -231,14 +231,14 @@ def test_the_two_link_finger_has_the_textbook_equations_of_motion():
 
 @pytest.mark.parametrize(
     "joint",
-    [pin.JointModelFreeFlyer(), pin.JointModelSpherical(), pin.JointModelRUBX()],
-    ids=["free-flyer", "spherical", "unbounded revolute"],
+    [pin.JointModelFreeFlyer(), pin.JointModelPlanar(), pin.JointModelRUBX()],
+    ids=["free-flyer", "planar", "unbounded revolute"],
 )
-def test_a_joint_with_more_than_one_coordinate_is_an_error_that_names_it(joint):
+def test_a_joint_that_the_core_does_not_know_is_an_error_that_names_it(joint):
     model = pin.Model()
     model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "hinge")
     model.addJoint(1, joint, pin.SE3.Identity(), "odd_one")
-    with pytest.raises(InputError, match="only revolute and prismatic joints") as caught:
+    with pytest.raises(InputError, match="only revolute, prismatic, translation and spherical joints") as caught:
         RigidBody(model, "odd_one")
     assert caught.value.entry == "joint odd_one"
 

@@ -21,8 +21,8 @@ def layout(request):
 def test_the_paper_s_finger_has_nineteen_numbers_in_the_order_of_the_model():
     layout = LAYOUTS["paper"]
     assert layout.size == 19
-    state = State(*(np.full(size, float(index)) for index, size in enumerate((4, 4, 1, 1, 5, 4))))
-    np.testing.assert_array_equal(layout.pack(state), [0.0] * 4 + [1.0] * 4 + [2.0, 3.0] + [4.0] * 5 + [5.0] * 4)
+    state = State(*(np.full(size, float(index)) for index, size in enumerate((4, 1, 4, 1, 5, 4))))
+    np.testing.assert_array_equal(layout.pack(state), [0.0] * 4 + [1.0] + [2.0] * 4 + [3.0] + [4.0] * 5 + [5.0] * 4)
 
 
 @pytest.mark.parametrize("lead", [(), (7,), (2, 3)])
@@ -31,7 +31,7 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     state = layout.unpack(x)
     np.testing.assert_array_equal(layout.pack(state), x)
     n, t, p = len(layout.joints), len(layout.tendons), layout.passive
-    for name, size in zip(State.__annotations__, (n, n, p, p, t, n), strict=True):
+    for name, size in zip(State.__annotations__, (n, p, n, p, t, n, 0), strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 
 

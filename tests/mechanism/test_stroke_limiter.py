@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from exerted import exert
 
 from finger_pin.laws.limiter import limiter_energy, limiter_loss, limiter_torque, penetration
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
@@ -100,4 +101,6 @@ def test_limiters_read_the_ranges_of_table_and_their_own_constants(ub):
     velocity = np.array([-0.1, 5.0, 0.2, 0.4])
     expected = [by_hand(*row) for row in zip(position, velocity, limiter.lower, limiter.upper, strict=True)]
     assert expected[1] == 0.0 and all(expected[i] != 0.0 for i in (0, 2, 3))
-    np.testing.assert_allclose(limiter.torque(limiter.depth(position), velocity), expected, rtol=1e-10)
+    table = limiter.rows(tuple(ub.joints), 4)
+    force = exert([table], position, velocity, {}, np.zeros(0))["limiter"].force
+    np.testing.assert_allclose(-force @ table.arm, expected, rtol=1e-10)

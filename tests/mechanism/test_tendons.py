@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from exerted import tendon_forces
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
@@ -29,7 +30,7 @@ def at_rest(layer, position, passive=None, stiction=None, command=None):
     passive = layer.rest_position(position) if passive is None else np.array([passive])
     stiction = np.zeros(5) if stiction is None else stiction
     command = np.zeros(4) if command is None else command
-    return layer.forces(position, np.zeros(4), passive, np.zeros(1), stiction, command)
+    return tendon_forces(layer, position, np.zeros(4), passive, np.zeros(1), stiction, command)
 
 
 def test_coefficient_is_the_printed_exponential_form_of_equation_16():
@@ -54,10 +55,10 @@ def test_steady_sliding_delivers_the_tension_of_the_capstan_law(dry, direction, 
         velocity = direction * 0.5 * row / (row @ row)
 
         def rate(_, stiction, velocity=velocity):
-            return dry.forces(position, velocity, np.zeros(1), np.zeros(1), stiction, command).stiction_rate
+            return tendon_forces(dry, position, velocity, np.zeros(1), np.zeros(1), stiction, command).stiction_rate
 
         settled = solve_ivp(rate, (0.0, 0.01), np.zeros(5), method="LSODA", rtol=1e-10, atol=1e-10).y[:, -1]
-        forces = dry.forces(position, velocity, np.zeros(1), np.zeros(1), settled, command)
+        forces = tendon_forces(dry, position, velocity, np.zeros(1), np.zeros(1), settled, command)
         t1, t2, t3 = np.abs(position[:3])
         curvature = (1.0 + t1, 1.0 + t1, 0.28 + t2, 0.51 + t2 + t3)[tendon]
         expected = math.exp(sign * 0.11 * curvature)
@@ -75,7 +76,7 @@ def test_a_sliding_passive_tendon_obeys_the_capstan_law_between_its_halves(dry):
     position[3] = (passive - distal / (2.0 * K_T)) / R45
     mu = (1.0 - ratio) / (1.0 + ratio)
     stiction = np.array([0.0, 0.0, 0.0, 0.0, mu * (proximal + distal)])
-    forces = dry.forces(position, np.zeros(4), np.array([passive]), np.array([0.5]), stiction, np.zeros(4))
+    forces = tendon_forces(dry, position, np.zeros(4), np.array([passive]), np.array([0.5]), stiction, np.zeros(4))
     np.testing.assert_allclose(forces.strands[4:], [proximal, distal], rtol=1e-9)
     assert forces.normal[4] == pytest.approx(proximal + distal, rel=1e-9)
     assert forces.stiction_rate[4] / (5e4 * 0.5) == pytest.approx(0.0, abs=1e-9)
@@ -134,7 +135,8 @@ def test_no_tension_is_ever_negative(layer):
     count = 500
     position = draw.uniform(-0.2, 1.7, (count, 4))
     passive = layer.rest_position(position) + draw.normal(0.0, 5e-5, (count, 1))
-    forces = layer.forces(
+    forces = tendon_forces(
+        layer,
         position,
         draw.normal(0.0, 5.0, (count, 4)),
         passive,
@@ -150,7 +152,7 @@ def test_delivered_tension_is_the_command_less_friction_until_slack(layer):
     stiction = np.array([0.5, -0.5, 4.0, 0.0, 0.0])
     velocity = np.array([0.1, 0.2, 0.3, 0.4])
     command = np.array([2.0, 2.0, 2.0, 2.0])
-    forces = layer.forces(np.array([0.0, 0.3, 0.3, 0.2]), velocity, np.zeros(1), np.zeros(1), stiction, command)
+    forces = tendon_forces(layer, np.array([0.0, 0.3, 0.3, 0.2]), velocity, np.zeros(1), np.zeros(1), stiction, command)
     sliding = [8e-3 * 0.1 + 8e-3 * 0.2, -8e-3 * 0.1 + 8e-3 * 0.2, 6.3e-3 * 0.3, -5.3e-3 * 0.9]
     np.testing.assert_allclose(forces.velocity[:4], sliding, rtol=1e-12)
     expected = [2.0 - 0.5 - sliding[0], 2.0 + 0.5 - sliding[1], 0.0, 2.0 - sliding[3]]
@@ -171,8 +173,8 @@ def test_friction_brakes_the_middle_of_the_passive_tendon(layer):
     position = np.array([0.0, 0.3, 0.6, 0.3])
     middle = layer.rest_position(position)
     for velocity in (0.2, -0.2):
-        forces = layer.forces(
-            position, np.zeros(4), middle, np.array([velocity]), np.array([0, 0, 0, 0, velocity]), np.zeros(4)
+        forces = tendon_forces(
+            layer, position, np.zeros(4), middle, np.array([velocity]), np.array([0, 0, 0, 0, velocity]), np.zeros(4)
         )
         # f5^f = F^s + b v with b = 1: twice the velocity, as a number.
         assert forces.passive_acceleration[0] * MASS == pytest.approx(-2.0 * velocity, rel=1e-9)
@@ -214,9 +216,9 @@ def test_forces_of_a_batch_are_those_of_each_row(layer):
     draw = np.random.default_rng(8)
     rows = [draw.normal(0.0, scale, (6, size)) for scale, size in ((0.5, 4), (2.0, 4), (1e-3, 1), (0.1, 1), (1.0, 5))]
     rows.append(draw.uniform(0.0, 4.0, (6, 4)))
-    batch = layer.forces(*rows)
+    batch = tendon_forces(layer, *rows)
     for index in range(6):
-        single = layer.forces(*(block[index] for block in rows))
+        single = tendon_forces(layer, *(block[index] for block in rows))
         for name, value in vars(single).items():
             np.testing.assert_allclose(getattr(batch, name)[index], value, rtol=1e-12, atol=1e-15, err_msg=name)
 
@@ -231,7 +233,7 @@ def test_several_passive_tendons_each_follow_their_own_joints_stiffness_and_mass
     )
     layer = Tendons.from_description(description)
     position, passive = np.array([0.9, 0.5, 0.2]), np.array([2.3e-3, 0.85e-3])
-    forces = layer.forces(position, np.zeros(3), passive, np.zeros(2), np.zeros(4), np.ones(2))
+    forces = tendon_forces(layer, position, np.zeros(3), passive, np.zeros(2), np.zeros(4), np.ones(2))
     p3, p4 = 2e4 * (2.7e-3 - 2.3e-3), 2e4 * (2.3e-3 - 2.0e-3)
     q3, q4 = 6e4 * (1.0e-3 - 0.85e-3), 6e4 * (0.85e-3 - 0.6e-3)
     np.testing.assert_allclose(forces.strands, [1.0, 1.0, p3, p4, q3, q4], rtol=1e-9)
@@ -246,7 +248,7 @@ def test_a_passive_tendon_fixed_to_the_base_is_a_one_sided_spring_on_its_joint(n
     for angle in (0.5, -0.5):
         position = np.array([angle])
         none, middle = np.zeros(1), layer.rest_position(position)
-        forces = layer.forces(position, none, middle, none, np.zeros(2), none)
+        forces = tendon_forces(layer, position, none, middle, none, np.zeros(2), none)
         # Negative radius: extending (negative rotation) stores nothing, flexing stretches it by r theta.
         tension = max(0.0, 2e3 * 4e-3 * angle)
         np.testing.assert_allclose(forces.strands[1:], [tension, tension], rtol=1e-9, atol=1e-15)
@@ -255,6 +257,6 @@ def test_a_passive_tendon_fixed_to_the_base_is_a_one_sided_spring_on_its_joint(n
 
 def test_a_finger_without_passive_tendons_has_none_of_their_forces():
     layer = Tendons.from_description(fp.load_finger("planar"))
-    forces = layer.forces(np.zeros(2), np.zeros(2), np.zeros(0), np.zeros(0), np.zeros(3), np.array([1.0, 2.0, 3.0]))
+    forces = tendon_forces(layer, *np.zeros((2, 2)), *np.zeros((2, 0)), np.zeros(3), np.array([1.0, 2.0, 3.0]))
     np.testing.assert_array_equal(forces.strands, [1.0, 2.0, 3.0])
     assert forces.passive_acceleration.shape == (0,)

@@ -12,10 +12,9 @@ from finger_pin.control import proportional as controller_block
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import integrate
 from finger_pin.description.scenario import METHODS
-from finger_pin.mechanism import joint_friction as joint_block
-from finger_pin.mechanism import tendons as tendon_block
+from finger_pin.laws import capstan
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.simulation import account as account_module
 from finger_pin.simulation.account import account
 from finger_pin.simulation.energy import Energies, Powers, energies, powers
 
@@ -152,7 +151,7 @@ def test_energies_at_a_state_are_those_written_out(finger):
     theta, velocity = np.array([0.2, 0.5, 0.9, 0.4]), draw.normal(0.0, 2.0, 4)
     p5, p5_rate = 0.5 * (3.5e-3 * 0.9 + 5e-3 * 0.4) + 1e-5, 0.3
     tendon, joint = draw.normal(0.0, 0.5, 5), draw.normal(0.0, 1e-3, 4)
-    x = np.concatenate([theta, velocity, [p5, p5_rate], tendon, joint])
+    x = np.concatenate([theta, [p5], velocity, [p5_rate], tendon, joint])
     signals = finger.evaluate(x, np.ones(4))
     stored = energies(finger, signals, finger.rigid_body.kinematics(theta, velocity))
     mass = finger.rigid_body.mass_matrix(theta)
@@ -169,7 +168,7 @@ def test_energies_at_a_state_are_those_written_out(finger):
 def test_slack_is_booked_only_where_a_tension_is_cut(finger):
     """T1 is commanded 1 N and loses 3 N, so 2 N of friction have nowhere to go; T2 to T4 deliver."""
     velocity = np.array([0.5, 0.2, -0.3, 0.4])
-    x = np.concatenate([[0.0, 0.4, 0.5, 0.3], velocity, [0.002, 0.0], [3.0, 0.1, -0.2, 0.3, 0.0], np.zeros(4)])
+    x = np.concatenate([[0.0, 0.4, 0.5, 0.3], [0.002], velocity, [0.0], [3.0, 0.1, -0.2, 0.3, 0.0], np.zeros(4)])
     booked = powers(finger, finger.evaluate(x, np.ones(4)))
     sliding = 8e-3 * 0.5 + 8e-3 * 0.2
     assert booked.slack == pytest.approx((1.0 - 3.0 - sliding) * sliding, rel=1e-9)
@@ -184,13 +183,13 @@ def test_net_power_is_supply_less_losses_and_the_rate_of_stored_energy(finger):
 
     def total(x):
         signals = finger.evaluate(x, command, force)
-        return energies(finger, signals, finger.rigid_body.kinematics(x[:4], x[4:8])).total
+        return energies(finger, signals, finger.rigid_body.kinematics(x[:4], x[5:9])).total
 
     for _ in range(30):
         theta = np.append(draw.uniform(-0.25, 0.25), draw.uniform(-0.1, 1.7, 3))
         p5 = 0.5 * (3.5e-3 * theta[2] + 5e-3 * theta[3]) + draw.normal(0.0, 1e-5)
         stiction = draw.normal(0.0, 0.8, 5), draw.normal(0.0, 2e-3, 4)
-        x = np.concatenate([theta, draw.normal(0.0, 3.0, 4), [p5, draw.normal(0.0, 0.02)], *stiction])
+        x = np.concatenate([theta, [p5], draw.normal(0.0, 3.0, 4), [draw.normal(0.0, 0.02)], *stiction])
         command = draw.uniform(0.0, 3.0, 4)
         signals = finger.evaluate(x, command, force)
         exchanged = powers(finger, signals)
@@ -263,44 +262,57 @@ def test_the_account_of_the_loop_to_be_tampered_with_closes(loop):
     assert share_left_open(loop) < 1e-5
 
 
-def wrong_delivery(monkeypatch):
-    monkeypatch.setattr(tendon_block, "delivered_tension", lambda f, loss: np.maximum(0.0, f + loss))
+def tampered(loop, monkeypatch, group, wrong):
+    """Let the law of a table of rows return something else: `wrong` maps what the rows see and the law returns."""
+    rows = []
+    for table in loop.finger.mechanism.rows:
+        if table.group == group:
+
+            def value(row, p, right=table.law.value):
+                return wrong(row, *right(row, p))
+
+            table = replace(table, law=replace(table.law, value=value))
+        rows.append(table)
+    monkeypatch.setattr(loop.finger.mechanism, "rows", tuple(rows))
 
 
-def wrong_passive_friction(monkeypatch):
-    monkeypatch.setattr(tendon_block, "passive_acceleration", lambda near, far, loss, mass: (near - far + loss) / mass)
+def wrong_delivery(loop, monkeypatch):
+    def pushed(row, force, rate, friction, *others):
+        return np.maximum(0.0, row.command + friction), rate, friction, *others
+
+    tampered(loop, monkeypatch, "driven_tendons", pushed)
 
 
-def wrong_passive_spring(monkeypatch):
-    monkeypatch.setattr(tendon_block, "passive_acceleration", lambda near, far, loss, mass: (far - near - loss) / mass)
+def wrong_passive_friction(loop, monkeypatch):
+    tampered(loop, monkeypatch, "passive_tendons", lambda row, force, *others: (-force, *others))
 
 
-def wrong_joint_friction(monkeypatch):
-    original = joint_block.JointFriction.forces
-
-    def flipped(*arguments):
-        forces = original(*arguments)
-        return replace(forces, friction=-forces.friction)
-
-    monkeypatch.setattr(joint_block.JointFriction, "forces", flipped)
+def wrong_passive_spring(loop, monkeypatch):
+    tampered(loop, monkeypatch, "passive_halves", lambda row, force, *others: (-force, *others))
 
 
-def wrong_stiction_rate(monkeypatch):
+def wrong_joint_friction(loop, monkeypatch):
+    tampered(loop, monkeypatch, "joint_friction", lambda row, force, *others: (-force, *others))
+
+
+def wrong_stiction_rate(loop, monkeypatch):
     def halved(stiction, velocity, level, stiffness):
         return stiffness * (velocity - 0.5 * stiction * np.abs(velocity) / level)
 
-    monkeypatch.setattr(tendon_block.friction, "stiction_rate", halved)
+    monkeypatch.setattr(capstan, "stiction_rate", halved)
 
 
-def wrong_gravity(monkeypatch):
+def wrong_gravity(loop, monkeypatch):
+    original = Finger.motion
+
     def flipped(*arguments):
-        found = energies(*arguments)
-        return replace(found, gravity=-found.gravity)
+        found = original(*arguments)
+        return replace(found, potential_energy=-found.potential_energy)
 
-    monkeypatch.setattr(account_module, "energies", flipped)
+    monkeypatch.setattr(Finger, "motion", flipped)
 
 
-def wrong_external_torque(monkeypatch):
+def wrong_external_torque(loop, monkeypatch):
     original = RigidBody.forward_dynamics
     lever = np.array([1e-3, 0.0, 0.0, 0.0])
     monkeypatch.setattr(RigidBody, "forward_dynamics", lambda self, q, v, torque: original(self, q, v, torque + lever))
@@ -323,7 +335,7 @@ def wrong_command(monkeypatch):
     ],
 )
 def test_the_account_exposes_a_wrong_law(plant, loop, monkeypatch):
-    plant(monkeypatch)
+    plant(loop, monkeypatch)
     assert share_left_open(loop) > 1e-3
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from scipy.special import ellipj, ellipk
 
 from finger_pin.commands.validation.check import Check, Comparison, Picture, Section, compare
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger

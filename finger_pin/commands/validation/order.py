@@ -11,10 +11,9 @@ from scipy.integrate import solve_ivp
 
 from finger_pin.commands.validation.check import Check, Picture, Section, compare
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_control
+from finger_pin.control.compiled import compiled_control
 from finger_pin.core import rosenbrock
-from finger_pin.core.integrator import TABLEAUS, Stepper
-from finger_pin.core.plant import build_plant
+from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -43,20 +42,20 @@ class Smooth:
 
     def stepper(self, method: str, step: float) -> Stepper:
         """Return an integrator whose tolerances reject nothing, so that its steps can be imposed."""
-        plant = build_plant(self.loop.finger, self.loop.fingertip_force)
-        controller: Any = self.loop.controller
-        reference: Any = self.loop.reference
-        control = build_control(controller, reference, plant.actuated)
-        atol = 1e6 * self.loop.finger.layout.scales()
-        stepper = Stepper(plant, control, self.start, TABLEAUS[method](), 1e6, atol)
-        stepper.memory[rosenbrock.STEP] = step
+        finger = self.loop.finger
+        control = compiled_control(self.loop)
+        assert control is not None
+        atol, force = 1e6 * finger.layout.scales(), self.loop.fingertip_force
+        stepper = Stepper(finger.mechanism, control, self.start, TABLEAUS[method](), 1e6, atol, force)
+        stepper.parts[0].memory[rosenbrock.STEP] = step
         return stepper
 
     def largest(self, error: Array) -> float:
         """Return the largest error of a kind of state, each over the distance that it moves."""
-        moved, sizes = self.exact(END) - self.start, self.loop.finger.layout.sizes
-        kinds = np.split(np.arange(len(moved)), np.cumsum(sizes)[:-1])
-        return max(float(np.abs(error[..., kind]).max() / np.linalg.norm(moved[kind])) for kind in kinds if len(kind))
+        moved = self.exact(END) - self.start
+        layout = self.loop.finger.layout
+        kinds = zip(*(vars(layout.unpack(each)).values() for each in (error, moved)), strict=True)
+        return max(float(np.abs(off).max() / np.linalg.norm(far)) for off, far in kinds if far.size)
 
 
 def smooth_motion() -> Smooth:
@@ -75,8 +74,9 @@ def smooth_motion() -> Smooth:
     table["environment"]["fingertip_force"] = [2.0, -3.0, 2.0]
     loop = ClosedLoop.from_scenario(Scenario.model_validate(table))
     x = loop.finger.rest_state(np.array([0.06, 0.3, 0.5, 0.15]))
-    x[4:8] = [1.0, 2.0, 3.0, 5.0]
-    x[9] = 0.5 * (3.5e-3 * x[6] + 5e-3 * x[7])
+    state = loop.finger.layout.unpack(x)
+    state.velocity[:] = [1.0, 2.0, 3.0, 5.0]
+    state.passive_velocity[:] = 0.5 * (3.5e-3 * 3.0 + 5e-3 * 5.0)
     exact = solve_ivp(loop.rhs, (0.0, END), x, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=True)
     return Smooth(loop, x, exact.sol)
 
@@ -87,9 +87,9 @@ def step_errors(smooth: Smooth, method: str) -> Array:
     for count in COUNTS:
         stepper = smooth.stepper(method, step=END)
         for k in range(count):
-            if stepper.advance(END * (k + 1) / count)[0] != rosenbrock.DONE:
+            if stepper.advance(END * (k + 1) / count) != rosenbrock.DONE:
                 raise RuntimeError("an imposed step failed")
-        if stepper.memory[rosenbrock.ACCEPTED] != count:
+        if stepper.parts[0].memory[rosenbrock.ACCEPTED] != count:
             raise RuntimeError("an imposed step was divided")
         errors.append(smooth.largest(stepper.x - smooth.exact(END)))
     return np.array(errors)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.commands.validation.check import Check, Comparison, Section, compare
-from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -51,12 +51,11 @@ def states(finger: Finger) -> tuple[Array, Array]:
     """Return random packed states, shape (1000, size), and tensions, shape (1000, a)."""
     rng, layout, size = np.random.default_rng(2), finger.layout, STATES
     x = np.zeros((size, layout.size))
-    joints = len(finger.routing.joints)
-    x[:, :joints] = rng.uniform(-3.0, 3.0, (size, joints))
-    x[:, joints : 2 * joints] = 10.0 * rng.normal(size=(size, joints))
-    x[:, 2 * joints + 2 * finger.routing.passive :] = 1e-2 * rng.normal(
-        size=(size, len(finger.routing.tendons) + joints)
-    )
+    state = layout.unpack(x)
+    state.position[:] = rng.uniform(-3.0, 3.0, state.position.shape)
+    state.velocity[:] = 10.0 * rng.normal(size=state.velocity.shape)
+    state.tendon_stiction[:] = 1e-2 * rng.normal(size=state.tendon_stiction.shape)
+    state.joint_stiction[:] = 1e-2 * rng.normal(size=state.joint_stiction.shape)
     return x, rng.uniform(0.0, 5.0, (size, finger.routing.actuated))
 
 

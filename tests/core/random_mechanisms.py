@@ -1,0 +1,99 @@
+"""Mechanisms that nobody would build: random trees, lumps and rows of all laws, wired at random; all of order one."""
+
+import numpy as np
+import pinocchio as pin
+from law_cases import every_law, random_parameters
+
+from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rows import Rows
+
+KINDS = (
+    pin.JointModelRX,
+    pin.JointModelRZ,
+    pin.JointModelPY,
+    lambda: pin.JointModelRevoluteUnaligned(np.array([0.48, -0.6, 0.64])),
+    lambda: pin.JointModelPrismaticUnaligned(np.array([-0.6, 0.0, 0.8])),
+)
+
+
+def random_placement(rng):
+    """A rotation of any size and a shift of about one."""
+    return pin.SE3(pin.exp3(rng.normal(size=3)), 0.5 * rng.normal(size=3))
+
+
+def random_inertia(rng):
+    """That of an ellipsoid of about one, its mass centre beside the joint."""
+    ellipsoid = pin.Inertia.FromEllipsoid(rng.uniform(1.0, 3.0), *rng.uniform(0.5, 1.5, 3))
+    return random_placement(rng).act(ellipsoid)
+
+
+def random_body(rng, free=False):
+    """A tree of 1 to 8 joints in the order of a walk through it, with 1 to 3 tips; perhaps a free body in front."""
+    model, walk = pin.Model(), [0]
+    model.gravity.linear[:] = rng.normal(size=3)
+    if free:
+        for kind in (pin.JointModelTranslation(), pin.JointModelSpherical()):
+            walk.append(model.addJoint(walk[-1], kind, random_placement(rng), f"free{len(walk)}"))
+        model.appendBodyToJoint(walk[-1], random_inertia(rng), pin.SE3.Identity())
+    for j in range(rng.integers(1, 9)):
+        # A new branch leaves the way back to the base.
+        walk = walk[: rng.integers(1, len(walk) + 1)] if rng.random() < 0.4 else walk
+        walk.append(model.addJoint(walk[-1], KINDS[rng.integers(len(KINDS))](), random_placement(rng), f"joint{j}"))
+        model.appendBodyToJoint(walk[-1], random_inertia(rng), pin.SE3.Identity())
+    tips = [f"tip{t}" for t in range(rng.integers(1, 4))]
+    for tip in tips:
+        holder = int(rng.integers(0, model.njoints))
+        model.addFrame(pin.Frame(tip, holder, 0, random_placement(rng), pin.FrameType.OP_FRAME))
+    return RigidBody(model, tips)
+
+
+def random_mechanism(rng, free=False):
+    """Tables of rows of all laws in any order, each fed and pressed by some of those before."""
+    body = random_body(rng, free)
+    lumps = tuple(f"lump{i}" for i in range(rng.integers(0, 3)))
+    width, joints = body.model.nv + len(lumps), body.model.njoints - 1
+
+    def weights(count, others):
+        return np.where(rng.random((count, others)) < 0.6, rng.normal(size=(count, others)), 0.0)
+
+    tables, channels = [], int(rng.integers(1, 4))
+    laws = list(every_law().values())
+    for index in rng.permutation(len(laws)):
+        law, count = laws[index], int(rng.integers(1, 4))
+        earlier = {table.group: weights(count, len(table.names)) for table in tables if rng.random() < 0.4}
+        pressing = {table.group: weights(count, len(table.names)) for table in tables if rng.random() < 0.5}
+        tables.append(
+            Rows(
+                group=f"table{len(tables)}",
+                law=law,
+                names=tuple(f"row{k}" for k in range(count)),
+                parameters=random_parameters(law, rng, count),
+                arm=weights(count, width),
+                measure=weights(count, width) if rng.random() < 0.4 else None,
+                offset=0.3 * rng.normal(size=count),
+                channels=rng.integers(-1, channels, count),
+                inputs=earlier,
+                loads=pressing,
+                pins=rng.integers(0, joints, count) if rng.random() < 0.5 else None,
+                bends=np.abs(weights(count, width)) if rng.random() < 0.5 else None,
+                curvature_offset=rng.uniform(0.1, 1.0, count),
+            )
+        )
+    return Mechanism(body, tables, lumps, rng.uniform(0.5, 2.0, len(lumps)))
+
+
+def random_states(mechanism, rng, count):
+    """Packed states of order one, with unit quaternions."""
+    x = rng.normal(size=(count, mechanism.size))
+    for joint in mechanism.body.model.joints[1:]:
+        if joint.nq != joint.nv:
+            part = x[:, joint.idx_q : joint.idx_q + joint.nq]
+            part /= np.linalg.norm(part, axis=1, keepdims=True)
+    return x
+
+
+def kinds_of(mechanism):
+    """Indices of positions, velocities of joints and of lumps, and states in a packed state, by kind."""
+    q, v, z = mechanism.split(np.arange(mechanism.size))
+    return [each for each in (q, *np.split(v, [mechanism.body.model.nv]), z) if len(each)]

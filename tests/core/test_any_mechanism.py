@@ -1,0 +1,102 @@
+"""The compiled core against the readable evaluation, on random mechanisms of rows of every law."""
+
+import numpy as np
+import pytest
+from core_cases import Bound, relative
+from random_mechanisms import kinds_of, random_mechanism, random_states
+
+from finger_pin.core.evaluation import CompiledMechanism
+from finger_pin.core.inputs import held_control
+
+#: Sixth-order central differences: where to look, in steps, and weights.
+OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+SEEDS = range(16)
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def drawn(request):
+    """A mechanism, its generator, inputs and forces at its tips; without forces for every third."""
+    rng = np.random.default_rng(request.param)
+    mechanism = random_mechanism(rng)
+    force = rng.normal(size=(len(mechanism.body.tips), 3)) * (request.param % 3 != 0)
+    return mechanism, rng, rng.uniform(-0.5, 3.0, mechanism.channels), force
+
+
+def assert_same(found, expected, mechanism, tolerance=1e-12):
+    """Compare evaluations at many states: rates by kind, and what every row sees, does and shows."""
+    for kind in kinds_of(mechanism):
+        assert relative(found.rate[:, kind], expected.rate[:, kind]) < tolerance
+    for name in ("torque", "external", "acceleration"):
+        largest = np.abs(getattr(expected, name)).max()
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=tolerance * largest, rtol=1e-9)
+    for group, theirs in expected.rows.items():
+        ours = found.rows[group]
+        pairs = zip(
+            (*ours.row, ours.force, ours.rate, *ours.signals),
+            (*theirs.row, theirs.force, theirs.rate, *theirs.signals),
+            strict=True,
+        )
+        for mine, other in pairs:
+            np.testing.assert_allclose(mine, other, rtol=1e-9, atol=tolerance * max(1.0, np.abs(other).max()))
+
+
+def test_the_compiled_evaluation_is_the_readable_one(drawn):
+    mechanism, rng, command, force = drawn
+    x = random_states(mechanism, rng, 40)
+    compiled = CompiledMechanism(mechanism)
+    assert_same(compiled.evaluate(x, command, force), mechanism.evaluate(x, command, force), mechanism)
+    assert_same(compiled.evaluate(x, command), mechanism.evaluate(x, command), mechanism)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mechanism_with_a_free_body_evaluates_alike(seed):
+    rng = np.random.default_rng(100 + seed)
+    mechanism = random_mechanism(rng, free=True)
+    x, command = random_states(mechanism, rng, 10), rng.uniform(-0.5, 3.0, mechanism.channels)
+    force = rng.normal(size=(len(mechanism.body.tips), 3))
+    compiled = CompiledMechanism(mechanism)
+    assert_same(compiled.evaluate(x, command, force), mechanism.evaluate(x, command, force), mechanism)
+
+
+def jacobian(mechanism, x, command, force):
+    """Return the Jacobian by differences of the readable evaluation, or None where it has a kink nearby."""
+    found = []
+    for step in (1e-3, 5e-4):
+        near = (x + step * OFFSETS[:, None, None] * np.eye(len(x))).reshape(-1, len(x))
+        rates = mechanism.evaluate(near, command, force).rate.reshape(len(OFFSETS), len(x), len(x))
+        found.append(np.tensordot(WEIGHTS, rates, axes=1).T / step)
+    return found[1] if np.abs(found[0] - found[1]).max() < 1e-6 * np.abs(found[1]).max() else None
+
+
+@pytest.fixture(scope="module")
+def linearised(drawn):
+    """States with their Jacobians by differences, and what is compiled."""
+    mechanism, rng, command, force = drawn
+    control = held_control(mechanism.channels, mechanism.coordinates)
+    control.tension[:] = command
+    states = random_states(mechanism, rng, 12)
+    found = [(x, jacobian(mechanism, x, command, force)) for x in states]
+    return Bound(mechanism, control, force), [each for each in found if each[1] is not None]
+
+
+def test_the_compiled_jacobian_is_that_of_differences_of_the_readable_evaluation(linearised):
+    bound, states = linearised
+    assert len(states) > 2
+    for x, expected in states:
+        _, solution, solved = bound.solve(0.0, x, 30.0)
+        found = 30.0 * np.eye(len(x)) - np.linalg.inv(solution[:, :-1])
+        assert solved
+        for rows in kinds_of(bound.mechanism):
+            for columns in kinds_of(bound.mechanism):
+                block = np.ix_(rows, columns)
+                assert np.abs(found - expected)[block].max() < 1e-7 * np.abs(expected[rows]).max() + 1e-9
+
+
+@pytest.mark.parametrize("g", [3.0, 1e2, 1e4])
+def test_the_condensed_solution_is_that_of_the_dense_system(linearised, g):
+    bound, states = linearised
+    for x, expected in states:
+        _, solution, _ = bound.solve(0.0, x, g)
+        dense = np.linalg.inv(g * np.eye(len(x)) - expected)
+        assert np.abs(solution[:, :-1] - dense).max() < 1e-6 * np.abs(dense).max()

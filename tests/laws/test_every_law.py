@@ -1,0 +1,90 @@
+"""What every law promises, of all laws that there are: exact slopes, and an account of every power."""
+
+import numpy as np
+import pytest
+from law_cases import every_law, for_complex, random_parameters, random_rows
+
+from finger_pin.laws.law import Law, Row
+
+LAWS, COUNT, STEP = every_law(), 3000, 1e-30
+
+
+@pytest.fixture(params=LAWS.values(), ids=LAWS.keys())
+def drawn(request):
+    """A law with random rows and parameters."""
+    rng = np.random.default_rng(21)
+    return request.param, random_rows(rng, COUNT), random_parameters(request.param, rng, COUNT)
+
+
+def along(function, row, name):
+    """The derivative of what a function of a row returns by one number of the row, by a step into the complex."""
+    stepped = function(row._replace(**{name: getattr(row, name) + STEP * 1j}))
+    return [np.imag(np.broadcast_to(each, COUNT)) / STEP for each in stepped]
+
+
+def test_the_laws_of_the_paper_are_found():
+    assert {"PIN_FRICTION", "DRIVEN_TENDON", "PASSIVE_FRICTION", "TENDON_HALF", "STROKE_LIMITER"} <= set(LAWS)
+
+
+def test_slopes_are_the_derivatives_of_the_value(drawn):
+    """That of the force by the rate of its own state counts through the rate."""
+    law, row, p = drawn
+    signals = law.value(row, p)[2:]
+    of_force, of_rate = law.slopes(row, p, signals)
+    of_force, by_rate = [*of_force[:3], *of_force[4:]], of_force[3]
+    value = for_complex(law.value)
+    for name, direct, rate in zip(Row._fields, of_force, of_rate, strict=True):
+        force_slope, rate_slope, *_ = along(lambda moved: value(moved, p), row, name)
+        size = np.abs(direct) + np.abs(by_rate * rate) + 1e-3
+        assert np.all(np.abs(direct + by_rate * rate - force_slope) < 1e-12 * size), name
+        assert np.all(np.abs(rate - rate_slope) <= 1e-11 * np.abs(rate_slope)), name
+
+
+def test_value_slopes_and_account_return_what_the_law_declares(drawn):
+    law, row, p = drawn
+    force, rate, *signals = law.value(row, p)
+    of_force, of_rate = law.slopes(row, p, signals)
+    stored = law.account(row, p, force, rate, signals)
+    assert len(signals) == len(law.signals) and (len(of_force), len(of_rate)) == (7, 6)
+    assert len(stored) == 1 + len(law.supplies) + len(law.losses)
+    if law.scale is None:
+        assert not np.any(rate) and not any(np.any(slope) for slope in of_rate)
+
+
+def test_the_account_explains_the_power_of_every_row(drawn):
+    """Force times speed is what is supplied, less what is lost, less the change of what is stored."""
+    law, row, p = drawn
+    force, rate, *signals = law.value(row, p)
+    _, *powers = law.account(row, p, force, rate, signals)
+    signs = [1.0] * len(law.supplies) + [-1.0] * len(law.losses)
+    value, account = for_complex(law.value), for_complex(law.account)
+
+    def stored(moved):
+        force, rate, *signals = value(moved, p)
+        return account(moved, p, force, rate, signals)[:1]
+
+    ((by_length,), (by_state,)) = along(stored, row, "length"), along(stored, row, "state")
+    change = by_length * row.speed + by_state * rate
+    explained = sum((s * each for s, each in zip(signs, powers, strict=True)), -change)
+    size = np.abs(force * row.speed) + np.abs(change) + sum(np.abs(each) for each in powers)
+    assert np.all(np.abs(force * row.speed - explained) <= 1e-12 * size)
+    for name in ("speed", "load", "command", "curvature"):
+        assert not np.any(along(stored, row, name)), name
+
+
+def test_a_wrong_slope_or_a_power_that_is_not_booked_is_found(drawn):
+    """The two tests above fail for a law that is a little wrong."""
+    law, row, p = drawn
+
+    def wrong_slopes(row, p, signals):
+        of_force, of_rate = law.slopes(row, p, signals)
+        return (of_force[0], of_force[1] + 1e-6, *of_force[2:]), of_rate
+
+    def wrong_account(row, p, force, rate, signals):
+        stored, *powers = law.account(row, p, force, rate, signals)
+        return stored + 1e-6 * row.length**2, *powers
+
+    other = Law(**{**vars(law), "slopes": wrong_slopes, "account": wrong_account})
+    for test in (test_slopes_are_the_derivatives_of_the_value, test_the_account_explains_the_power_of_every_row):
+        with pytest.raises(AssertionError):
+            test((other, row, p))
