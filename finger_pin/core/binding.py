@@ -10,8 +10,12 @@ from collections.abc import Callable
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
+from llvmlite import ir
 from numba import errors, types
-from numba.extending import intrinsic
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import intrinsic, models, register_model
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
@@ -74,12 +78,93 @@ def put(_typing: Any, block: Any, value: Any, kind: Any) -> Any:
     return types.void(block, value, kind), generate
 
 
+class Bound(types.Type):
+    """Where a table that `put` has written lies: a pointer whose attributes are the fields of the table.
+
+    Passing a pointer instead of some hundred numbers is what compiling quickly depends on.
+    """
+
+    def __init__(self, kind: Any) -> None:
+        """Point to a table of a type."""
+        self.kind = kind
+        super().__init__(name=f"Bound[{kind.instance_class.__name__}]")  # type: ignore[no-untyped-call]
+
+
+@register_model(Bound)
+class _BoundModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.IntType(8).as_pointer())  # type: ignore[no-untyped-call]
+
+
+@infer_getattr
+class _BoundFields(AttributeTemplate):
+    key = Bound
+
+    def generic_resolve(self, bound: Any, name: str) -> Any:  # type: ignore[override]
+        if name not in bound.kind.fields:
+            return None
+        kind = bound.kind[bound.kind.fields.index(name)]
+        return Bound(kind) if isinstance(kind, types.NamedTuple) else kind
+
+
+@lower_getattr_generic(Bound)
+def _field(context: Any, builder: Any, bound: Any, value: Any, name: str) -> Any:
+    """Load a field; that it never changes lets the optimiser load it once, whatever is stored meanwhile."""
+    index = bound.kind.fields.index(name)
+    kind, place = bound.kind[index], _WORD * sum(map(_words, bound.kind.types[:index]))
+
+    def at(offset: int) -> Any:
+        return builder.gep(value, [ir.Constant(ir.IntType(64), offset)])
+
+    def load(offset: int, to: Any) -> Any:
+        loaded = builder.load(builder.bitcast(at(offset), to.as_pointer()))
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    if isinstance(kind, types.NamedTuple):
+        return at(place)
+    if not isinstance(kind, types.Array):
+        return load(place, context.get_value_type(kind))
+    array, number = context.make_array(kind)(context, builder), ir.IntType(64)
+    # The words of an array: owner, parent, number of items, size of an item, address, sizes, strides.
+    array.meminfo = cgutils.get_null_value(array.meminfo.type)
+    array.parent = cgutils.get_null_value(array.parent.type)
+    array.nitems, array.itemsize = load(place + 2 * _WORD, number), load(place + 3 * _WORD, number)
+    array.data = load(place + 4 * _WORD, array.data.type)
+    words = [load(place + (5 + word) * _WORD, number) for word in range(2 * kind.ndim)]
+    array.shape = cgutils.pack_array(builder, words[: kind.ndim], number)
+    array.strides = cgutils.pack_array(builder, words[kind.ndim :], number)
+    return array._getvalue()
+
+
 @_built_in
 def get(_typing: Any, block: Any, kind: Any) -> Any:
-    """Read the value of a type from a block that `put` has filled."""
-    target = kind.instance_type
+    """Return the table in a block that `put` has filled; its attributes are read where they are used."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.load(_pointer(context, builder, signature.args[0], arguments[0], target))
+        return context.make_array(signature.args[0])(context, builder, arguments[0]).data
 
-    return target(block, kind), generate
+    return Bound(kind.instance_type)(block, kind), generate
+
+
+@_built_in
+def bound_at(_typing: Any, address: Any, kind: Any) -> Any:
+    """Return the table at the address of a block that `put` has filled."""
+    target = Bound(kind.instance_type)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(target))
+
+    return target(types.int64, kind), generate
+
+
+@_built_in
+def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
+    """Call the function at an address with the address of a block and a number; return an integer."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        integer = ir.IntType(64)
+        kind = ir.FunctionType(integer, [integer, ir.DoubleType()])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.int64(types.int64, types.int64, types.float64), generate

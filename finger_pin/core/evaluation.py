@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.binding import block_for
 from finger_pin.core.charts import Charts, place_all
 from finger_pin.core.inputs import held_control
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
-from finger_pin.core.linearisation import build_linear
-from finger_pin.core.model import MODEL, Model, bind
+from finger_pin.core.model import BoundModel
 from finger_pin.core.signals import evaluate_many, motion_many
 from finger_pin.core.tables import build_tables, build_work
 from finger_pin.description.routing import Array
@@ -31,20 +29,15 @@ class CompiledMechanism:
         tables = build_tables(mechanism)
         laws = [table.law for table in mechanism.rows]
         control = held_control(mechanism.channels, mechanism.coordinates)
-        linear = build_linear(tables)
-        # Blocks hold addresses: what they were made of lives as long as they do.
         # Each has work of its own: without loads, nothing writes where loads have left their torques.
         self._models = [
-            Model(tables._replace(loaded=loaded), control, build_work(tables, laws, mechanism.channels), linear)
+            BoundModel(tables._replace(loaded=loaded), control, build_work(tables, laws, mechanism.channels))
             for loaded in (False, True)
         ]
-        self._blocks = [block_for(MODEL) for _ in self._models]
-        for model, block in zip(self._models, self._blocks, strict=True):
-            bind(model, block)
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
-        mechanism, tables = self.mechanism, self._models[0].tables
+        mechanism, tables = self.mechanism, self._models[0].model.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
         packed = _rows(x, np.atleast_2d(x).shape)
@@ -57,16 +50,16 @@ class CompiledMechanism:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
         states, attitudes = self._charts.to_core(packed)
-        rates, rows = np.zeros_like(states), np.zeros((len(self._models[0].work.rows), count, len(tables.state)))
+        rates, rows = np.zeros_like(states), np.zeros((len(self._models[0].model.work.rows), count, len(tables.state)))
         torques, externals = np.zeros((2, count, width))
-        block = self._blocks[loaded]
+        address = self._models[loaded].address
         parts = [slice(None)] if not len(tables.charts) else [slice(m, m + 1) for m in range(count)]
         for part in parts:
             if len(tables.charts):
                 place_all(tables, attitudes[part][0])
             filled = np.ascontiguousarray(rows[:, part])
             evaluate_many(
-                block,
+                address,
                 states[part],
                 commands[part],
                 forces[part],
@@ -105,10 +98,10 @@ class CompiledMechanism:
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n)."""
-        tables = self._models[0].tables
+        tables = self._models[0].model.tables
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
-        motion_many(self._blocks[0], _rows(position, shape), _rows(velocity, shape), tips, kinetic, potential)
+        motion_many(self._models[0].address, _rows(position, shape), _rows(velocity, shape), tips, kinetic, potential)
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at, 0] if np.ndim(position) == 1 else tips[:, 0], kinetic[at], potential[at])
 

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Block, Matrix, Vector, get, kind_of, put
+from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of, put
 from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
 from finger_pin.core.inputs import HELD
-from finger_pin.core.model import MODEL, condense, evaluate, linearise
+from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau
 
 # Entries of the memory that outlives a call.
@@ -29,7 +29,7 @@ class Integration(NamedTuple):
     """All that an integration works on, from its start to its end.
 
     Attributes:
-        model: Block of the bound `Model`.
+        model: Address of the bound `Model`.
         tableau: The method.
         x: State, changed in place, shape (size,); the angles of free bodies are those since the last step.
         attitude: Unit quaternions of the free bodies, changed in place, shape (f, 4).
@@ -37,11 +37,11 @@ class Integration(NamedTuple):
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters; kept between calls.
         k: Scratch for the stages, shape (s, size).
-        scratch: Scratch, shape (3, size).
+        start: Scratch, f(t, x) at the start of a step, shape (size,).
         r: Scratch, shape (size + 1,).
     """
 
-    model: Block
+    model: int
     tableau: Tableau
     x: Vector
     attitude: Matrix
@@ -49,7 +49,7 @@ class Integration(NamedTuple):
     atol: Vector
     memory: Vector
     k: Matrix
-    scratch: Matrix
+    start: Vector
     r: Vector
 
 
@@ -57,22 +57,20 @@ INTEGRATION = kind_of(Integration)
 
 
 @compiled
-def _step(
-    block: Any, linear: Any, tableau: Any, time: float, h: float, fresh: bool, x: Any, k: Any, scratch: Any, r: Any
-) -> int:
-    """Try one step: fill the increments k and, in scratch[1], the state at its end.
+def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> int:
+    """Try one step: fill the increments k and, in model.state, the state at its end.
 
-    What depends on the start alone, f(t, x) in scratch[0] and the linearisation, is kept for a second try.
+    What depends on the start alone, f(t, x) and the linearisation, is kept for a second try.
 
     Returns:
         0 if tried, 1 if g - J is singular, 2 if f(t, x) is not finite.
     """
-    size = x.size
-    state, rate = scratch[1], scratch[2]
+    tableau, x, k, r, start = integration.tableau, integration.x, integration.k, integration.r, integration.start
+    size, state, rate = x.size, model.state, model.rate
     g = 1.0 / (h * tableau.gamma)
     for i in range(tableau.nodes.size):
         for c in range(size):
-            r[c], rate[c], state[c] = 0.0, scratch[0, c], x[c]
+            r[c], rate[c], state[c] = 0.0, start[c], x[c]
         # Whole rows at a time, so that the compiler can use vector instructions.
         for j in range(i):
             of_stage, of_coupling = tableau.stage[i, j], tableau.coupling[i, j] / h
@@ -80,20 +78,20 @@ def _step(
                 state[c] += of_stage * k[j, c]
                 r[c] += of_coupling * k[j, c]
         if i > 0 or fresh:
-            evaluate(block, time + tableau.nodes[i] * h, state, rate)
+            call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
                 for c in range(size):
-                    scratch[0, c] = rate[c]
+                    start[c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return 2
-                linearise(block, time, x)
-            if not condense(block, g):
+                call_at(model.linearise, integration.model, time)
+            if call_at(model.condense, integration.model, g) == 0:
                 return 1
         for c in range(size):
             r[c] += rate[c]
         r[size] = h * tableau.time[i]
-        solve(linear, r, k[i])
+        solve(model.linear, r, k[i])
     for c in range(size):
         state[c] += k[tableau.nodes.size - 1, c]
     return 0
@@ -149,10 +147,10 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         dense: Record of the interpolants of the steps, shape (m, rows of the tableau's dense, size).
     """
     integration = get(block, INTEGRATION)
-    model = get(integration.model, MODEL)
-    tables, control, linear, tableau = model.tables, model.control, model.linear, integration.tableau
+    model = bound_at(integration.model, MODEL)
+    tables, control, tableau = model.tables, model.control, integration.tableau
     x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
-    k, scratch, r = integration.k, integration.scratch, integration.r
+    k, start, reached = integration.k, integration.start, model.state
     size, count = x.size, tableau.nodes.size
     recorded = 0
     exponent = 1.0 / tableau.order
@@ -181,10 +179,10 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if last:
             h = end - time
         error = np.inf
-        outcome = _step(integration.model, linear, tableau, time, h, fresh, x, k, scratch, r)
+        outcome = _step(integration, model, time, h, fresh)
         if outcome == 2:
             for c in range(size - 1, -1, -1):
-                if not np.isfinite(scratch[0, c]):
+                if not np.isfinite(start[c]):
                     memory[CULPRIT] = c
             return NOT_FINITE, recorded
         if fresh:
@@ -192,7 +190,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         memory[FACTORISATIONS] += 1
         memory[EVALUATIONS] += count if fresh else count - 1
         if outcome == 0:
-            error = _error(x, scratch[1], k[count - 1], rtol, atol)
+            error = _error(x, reached, k[count - 1], rtol, atol)
         fresh = False
         if not error <= 1e30:
             factor = 0.1
@@ -219,7 +217,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False
             for c in range(size):
-                x[c] = scratch[1, c]
+                x[c] = reached[c]
             memory[TIME] = end if last else time + h
             memory[LAST_STEP], memory[LAST_ERROR] = h, max(error, 1e-2)
             memory[ACCEPTED] += 1

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.core.binding import get
+from finger_pin.core.binding import bound_at, call_at
 from finger_pin.core.compilation import entry
-from finger_pin.core.model import MODEL, evaluate
+from finger_pin.core.model import MODEL
 from finger_pin.core.rigid_body import MOTION, move
 
 
 @entry
 def evaluate_many(
-    block: Any, states: Any, commands: Any, forces: Any, rates: Any, rows: Any, torques: Any, externals: Any
+    address: int, states: Any, commands: Any, forces: Any, rates: Any, rows: Any, torques: Any, externals: Any
 ) -> None:
     """Evaluate states of one island under given inputs; its control must hold them.
 
     Args:
-        block: Of a bound `Model`.
+        address: Of a bound `Model`.
         states: Shape (m, size).
         commands: Shape (m, u).
         forces: At the tips, shape (m, t, 3).
@@ -26,7 +26,7 @@ def evaluate_many(
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
     """
-    model = get(block, MODEL)
+    model = bound_at(address, MODEL)
     tables, control, work = model.tables, model.control, model.work
     for m in range(states.shape[0]):
         for i in range(commands.shape[1]):
@@ -34,7 +34,11 @@ def evaluate_many(
         for t in range(forces.shape[1]):
             for r in range(3):
                 tables.tip_force[t, r] = forces[m, t, r]
-        evaluate(block, 0.0, states[m], rates[m])
+        for c in range(states.shape[1]):
+            model.state[c] = states[m, c]
+        call_at(model.evaluate, address, 0.0)
+        for c in range(states.shape[1]):
+            rates[m, c] = model.rate[c]
         for c in range(rows.shape[0]):
             for k in range(rows.shape[2]):
                 rows[c, m, k] = work.rows[c, k]
@@ -44,9 +48,9 @@ def evaluate_many(
 
 
 @entry
-def motion_many(block: Any, positions: Any, velocities: Any, tips: Any, kinetic: Any, potential: Any) -> None:
+def motion_many(address: int, positions: Any, velocities: Any, tips: Any, kinetic: Any, potential: Any) -> None:
     """Fill positions of the tips (m, t, 3) and energies (m,) at positions and velocities of the bodies (m, n)."""
-    model = get(block, MODEL)
+    model = bound_at(address, MODEL)
     tables, work = model.tables, model.work
     for m in range(positions.shape[0]):
         move(tables, positions[m], velocities[m], work)

@@ -17,8 +17,7 @@ from finger_pin.core.binding import block_for
 from finger_pin.core.charts import Charts, place_all
 from finger_pin.core.inputs import Control
 from finger_pin.core.islands import Island, find_islands, select, select_control
-from finger_pin.core.linearisation import build_linear
-from finger_pin.core.model import MODEL, Model, bind
+from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables, build_work
 from finger_pin.description.routing import Array
@@ -88,11 +87,10 @@ class Part:
         """Bind everything; arrays are taken as they are, not copied."""
         self.island, self._laws = island, laws
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
-        self._model = Model(tables, control, build_work(tables, laws, len(control.tension)), build_linear(tables))
-        self.model = block_for(MODEL)
-        bind(self._model, self.model)
+        self.work = build_work(tables, laws, len(control.tension))
+        self.model = BoundModel(tables, control, self.work)
         self._bound = core.Integration(
-            model=self.model,
+            model=self.model.address,
             tableau=tableau,
             x=x,
             attitude=attitude,
@@ -100,7 +98,7 @@ class Part:
             atol=atol,
             memory=memory,
             k=np.zeros((len(tableau.nodes), len(x))),
-            scratch=np.zeros((3, len(x))),
+            start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
         )
         self._block = block_for(core.INTEGRATION)
@@ -108,7 +106,6 @@ class Part:
         place_all(tables, attitude)
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
-        self.work = self._model.work
         self._nothing = self.room(0)
 
     def room(self, count: int) -> Record:

@@ -11,10 +11,8 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
 from finger_pin.core import rosenbrock
-from finger_pin.core.binding import block_for
 from finger_pin.core.inputs import held_control
-from finger_pin.core.linearisation import build_linear
-from finger_pin.core.model import MODEL, Model, bind
+from finger_pin.core.model import BoundModel
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables, build_work
 from finger_pin.mechanism.state import State
@@ -125,7 +123,6 @@ class Bound:
     Attributes:
         mechanism: The mechanism.
         model: Its tables, inputs and memory.
-        block: What compiled code calls.
     """
 
     def __init__(self, mechanism, control, force=None):
@@ -136,14 +133,13 @@ class Bound:
             tables = tables._replace(loaded=True)
         work = build_work(tables, [table.law for table in mechanism.rows], len(control.tension))
         self.mechanism = mechanism
-        self.model = Model(tables, control, work, build_linear(tables))
-        self.block = block_for(MODEL)
-        bind(self.model, self.block)
+        self._bound = BoundModel(tables, control, work)
+        self.model = self._bound.model
 
     def solve(self, time, x, g):
         """Return the rate, the matrix that solves (g - J) u = r + f_t s, by columns (r | s), and if there is one."""
         rate = np.zeros(len(x))
-        solved = kernels.condensed(self.block, time, x, g, rate)
+        solved = kernels.condensed(self._bound.address, time, x, g, rate)
         return rate, self.model.linear.solution.copy(), solved
 
 

@@ -1,7 +1,8 @@
 """Doors into the compiled core, whose inner functions have no Python face of their own."""
 
+from finger_pin.core.binding import bound_at, call_at
 from finger_pin.core.compilation import entry
-from finger_pin.core.model import condense, evaluate, linearise
+from finger_pin.core.model import MODEL
 from finger_pin.core.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.rosenbrock import _worst
@@ -28,8 +29,11 @@ def worst(x, difference, rtol, atol):
 
 
 @entry
-def condensed(block, time, x, g, rate):
+def condensed(address, time, x, g, rate):
     """Fill the state rate, and the solution of (g - J) u = r for all r; return false if there is none."""
-    evaluate(block, time, x, rate)
-    linearise(block, time, x)
-    return condense(block, g)
+    model = bound_at(address, MODEL)
+    model.state[:] = x
+    call_at(model.evaluate, address, time)
+    rate[:] = model.rate
+    call_at(model.linearise, address, time)
+    return call_at(model.condense, address, g) == 1
