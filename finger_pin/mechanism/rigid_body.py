@@ -124,13 +124,13 @@ class RigidBody:
                 parent = int(own.parents[index])
                 joint, placement = own.joints[index], own.jointPlacements[index]
                 at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
-                # Appending a body would round.
+                # Appending bodies, or frames with theirs, would round.
                 model.inertias[at] = own.inertias[index]
             for tip in body.tips:
                 frame = own.frames[tip]
                 holder = frame.parentJoint and frame.parentJoint + shift
                 tips.append(f"{part}.{frame.name}")
-                model.addFrame(pin.Frame(tips[-1], holder, 0, frame.placement, pin.FrameType.OP_FRAME))
+                model.addFrame(pin.Frame(tips[-1], holder, 0, frame.placement, pin.FrameType.OP_FRAME), False)
             axes += body.proximal_axes[1:]
             carriers += [carrier and carrier + shift for carrier in body.carriers[1:]]
         joined = cls(model, tips)
