@@ -20,6 +20,7 @@ from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import AXES, Scenario
 from finger_pin.description.signals import ForceSignal
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
 
@@ -35,6 +36,9 @@ class Dynamics(Protocol):
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
         """Return all signals at packed states under given tensions."""
+
+    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+        """Return powers of the rows, and J^T F."""
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return fingertip and energies of the rigid body."""
@@ -78,6 +82,7 @@ class ClosedLoop:
         controller: Controller | Samples | None = None,
         reference: Reference | Samples | None = None,
         fingertip_force: Samples | None = None,
+        finger: Finger | None = None,
     ) -> ClosedLoop:
         """Build the loop that a scenario describes, with a controller or reference of one's own if given.
 
@@ -87,11 +92,19 @@ class ClosedLoop:
             reference: Replaces its reference: an object, or times (m,), s, and angles (m, k), rad, one column for each
                 of the k joints that no passive tendon drives.
             fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame.
+            finger: Replaces the finger that its description makes, such as one with rows of its own.
 
         Raises:
-            InputError: If samples have the wrong shape, are not finite, or tensions are negative.
+            InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape or are
+                not finite, or tensions are negative.
         """
-        finger, start = Finger(scenario.finger), scenario.simulation.start_time
+        finger, start = finger or Finger(scenario.finger), scenario.simulation.start_time
+        for kind, own, described in (
+            ("joints", finger.routing.joints, scenario.finger.joints),
+            ("tendons", finger.routing.tendons, scenario.finger.tendons),
+        ):
+            if own != tuple(described):
+                raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
         loop = cls(
             finger=finger,
             controller=_controller(controller, scenario, finger),
@@ -143,6 +156,16 @@ class ClosedLoop:
         control = self.controller.command(time, reference, state.position, state.velocity)
         command = control.tension[..., : self.finger.routing.actuated]
         return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
+
+    def powers(self, time: Array, x: Array) -> Array:
+        """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
+        state, reference = self.finger.layout.unpack(x), self.reference.at(time)
+        control = self.controller.command(time, reference, state.position, state.velocity)
+        command = control.tension[..., : self.finger.routing.actuated]
+        rows, external = self.dynamics.powers(x, command, self.force(time))
+        joints = state.velocity.shape[-1]
+        fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
+        return np.concatenate([rows, fingertip[:, None]], axis=1)
 
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""

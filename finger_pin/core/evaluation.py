@@ -10,6 +10,7 @@ from finger_pin.core.inputs import held_control
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.model import BoundModel
 from finger_pin.core.signals import evaluate_many, motion_many
+from finger_pin.core.stepper import in_threads
 from finger_pin.core.tables import build_tables, build_work
 from finger_pin.description.routing import Array
 from finger_pin.laws.law import Row
@@ -17,6 +18,9 @@ from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
+
+# Fewer states than this are not worth a second thread.
+_FEW = 1000
 
 
 class CompiledMechanism:
@@ -26,66 +30,33 @@ class CompiledMechanism:
         """Read a mechanism."""
         self.mechanism = mechanism
         self._charts = Charts.of(mechanism)
-        tables = build_tables(mechanism)
-        laws = [table.law for table in mechanism.rows]
-        control = held_control(mechanism.channels, mechanism.coordinates)
+        self._tables = build_tables(mechanism)
         # Each has work of its own: without loads, nothing writes where loads have left their torques.
-        self._models = [
-            BoundModel(tables._replace(loaded=loaded), control, build_work(tables, laws, mechanism.channels))
-            for loaded in (False, True)
-        ]
+        self._models = [self._bound(loaded) for loaded in (False, True)]
+
+    def _bound(self, loaded: bool) -> BoundModel:
+        """Return a model with memory of its own, that minds forces at the tips or not."""
+        mechanism, tables = self.mechanism, self._tables
+        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy())
+        work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
+        return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work)
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
-        mechanism, tables = self.mechanism, self._models[0].model.tables
-        # Compiled code checks no sizes.
-        mechanism.split(np.asarray(x))
-        packed = _rows(x, np.atleast_2d(x).shape)
-        count, width = len(packed), mechanism.coordinates
-        commands = _rows(command, (count, mechanism.channels))
-        tips = len(tables.tip_body)
-        loaded = force is not None and bool(np.any(force))
-        forces = np.zeros((count, tips, 3))
-        if loaded:
-            given = np.asarray(force, dtype=float)
-            forces[...] = given[..., None, :] if tips == 1 else given
-        states, attitudes = self._charts.to_core(packed)
-        rates, rows = np.zeros_like(states), np.zeros((len(self._models[0].model.work.rows), count, len(tables.state)))
-        torques, externals = np.zeros((2, count, width))
-        address = self._models[loaded].address
-        parts = [slice(None)] if not len(tables.charts) else [slice(m, m + 1) for m in range(count)]
-        for part in parts:
-            if len(tables.charts):
-                place_all(tables, attitudes[part][0])
-            filled = np.ascontiguousarray(rows[:, part])
-            evaluate_many(
-                address,
-                states[part],
-                commands[part],
-                forces[part],
-                rates[part],
-                filled,
-                torques[part],
-                externals[part],
-            )
-            rows[:, part] = filled
-        return self._evaluation(np.ndim(x) == 1, packed, rates, rows, torques, externals)
-
-    def _evaluation(
-        self, single: bool, packed: Array, rates: Array, rows: Array, torques: Array, externals: Array
-    ) -> Evaluation:
-        mechanism, width = self.mechanism, self.mechanism.coordinates
-        acceleration, joints = rates[:, width : 2 * width], mechanism.body.model.nv
-        rate = rates
+        mechanism, several = self.mechanism, np.ndim(x) > 1
+        packed, filled = self._filled(x, command, force, len(self._models[0].model.work.rows))
+        rates, rows, torques, externals, booked = filled
+        width, joints = mechanism.coordinates, mechanism.body.model.nv
+        acceleration, rate = rates[:, width : 2 * width], rates
         if mechanism.positions != width:
             q, v, _ = mechanism.split(packed)
             for i in self._charts.angles:
                 # From the second derivatives of the angles to the angular acceleration.
-                x, y, z = v[:, i], v[:, i + 1], v[:, i + 2]
-                acceleration[:, i : i + 3] += np.stack([y * z, -x * z, x * y], axis=1)
+                a, b, c = v[:, i], v[:, i + 1], v[:, i + 2]
+                acceleration[:, i : i + 3] += np.stack([b * c, -a * c, a * b], axis=1)
             moving = mechanism.body.position_rate(q[:, : mechanism.body.model.nq], v[:, :joints])
             rate = np.concatenate([moving, v[:, joints:], rates[:, width:]], axis=1)
-        at = 0 if single else slice(None)
+        at = slice(None) if several else 0
         found, begin = {}, 0
         for table in mechanism.rows:
             end = begin + len(table.names)
@@ -94,7 +65,56 @@ class CompiledMechanism:
             shown = tuple(own[SIGNALS + i] for i in range(len(table.law.signals)))
             found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE], shown)
             begin = end
-        return Evaluation(found, torques[at], externals[at], acceleration[at], rate[at])
+        return Evaluation(mechanism.books, found, torques[at], externals[at], acceleration[at], rate[at], booked[at])
+
+    def powers(self, x: Array, command: Array, force: Array | None = None) -> tuple[Array, Array]:
+        """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
+        _, (_, _, _, externals, booked) = self._filled(x, command, force, 0)
+        return booked[:, len(self.mechanism.books.stored) :], externals
+
+    def _filled(self, x: Array, command: Array, force: Array | None, columns: int) -> tuple[Array, tuple[Array, ...]]:
+        """Return packed states, and what `evaluate_many` fills for them, with so many columns of the rows."""
+        mechanism, tables = self.mechanism, self._models[0].model.tables
+        # Compiled code checks no sizes.
+        mechanism.split(np.asarray(x))
+        packed = _rows(x, np.atleast_2d(x).shape)
+        count, width, tips = len(packed), mechanism.coordinates, len(tables.tip_body)
+        commands = _rows(command, (count, mechanism.channels))
+        loaded = force is not None and bool(np.any(force))
+        forces = np.zeros((count, tips, 3))
+        if loaded:
+            given = np.asarray(force, dtype=float)
+            forces[...] = given[..., None, :] if tips == 1 else given
+        states, attitudes = self._charts.to_core(packed)
+        books = len(mechanism.books.stored) + len(mechanism.books.powers)
+        rates, rows = np.zeros_like(states), np.zeros((count, columns, len(tables.state)))
+        torques, externals, booked = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, books))
+
+        def fill(model: BoundModel, part: slice) -> None:
+            evaluate_many(
+                model.address,
+                states[part],
+                commands[part],
+                forces[part],
+                rates[part],
+                rows[part],
+                torques[part],
+                externals[part],
+                booked[part],
+            )
+
+        if len(tables.charts):
+            # Free bodies are placed state by state.
+            for m in range(count):
+                place_all(tables, attitudes[m])
+                fill(self._models[loaded], slice(m, m + 1))
+        elif count < _FEW:
+            fill(self._models[loaded], slice(None))
+        else:
+            half = count // 2
+            models = (self._models[loaded], self._bound(loaded))
+            in_threads(lambda each: fill(*each), list(zip(models, (slice(half), slice(half, None)), strict=True)))
+        return packed, (rates, np.moveaxis(rows, 1, 0), torques, externals, booked)
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n)."""
@@ -122,6 +142,10 @@ class CompiledFinger:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
         found = self._mechanism.evaluate(x, command, fingertip_force)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
+
+    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+        """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
+        return self._mechanism.powers(x, command, fingertip_force)
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""

@@ -116,6 +116,7 @@ def select(tables: Tables, island: Island) -> Tables:
         directions=tables.directions[bodies],
         groups=np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]]),
         laws=tables.laws[present],
+        books=tables.books[present],
         parameters=np.ascontiguousarray(tables.parameters[:, rows]),
         offset=tables.offset[rows],
         arm_start=arm_start,

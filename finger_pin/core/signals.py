@@ -5,14 +5,38 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.core.binding import bound_at, call_at
-from finger_pin.core.compilation import entry
+from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.law_code import call_filling
 from finger_pin.core.model import MODEL
 from finger_pin.core.rigid_body import MOTION, move
+from finger_pin.core.tables import END, FIRST
+
+
+@compiled
+def _book(tables: Any, work: Any, totals: Any) -> None:
+    """Sum up stored energies and powers of all rows after an evaluation."""
+    for c in range(totals.size):
+        totals[c] = 0.0
+    for g in range(tables.groups.shape[0]):
+        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
+        for i in range(tables.books.shape[1]):
+            if tables.books[g, i] >= 0:
+                for k in range(begin, end):
+                    totals[tables.books[g, i]] += work.powers[i, k]
 
 
 @entry
 def evaluate_many(
-    address: int, states: Any, commands: Any, forces: Any, rates: Any, rows: Any, torques: Any, externals: Any
+    address: int,
+    states: Any,
+    commands: Any,
+    forces: Any,
+    rates: Any,
+    rows: Any,
+    torques: Any,
+    externals: Any,
+    booked: Any,
 ) -> None:
     """Evaluate states of one island under given inputs; its control must hold them.
 
@@ -22,9 +46,10 @@ def evaluate_many(
         commands: Shape (m, u).
         forces: At the tips, shape (m, t, 3).
         rates: Filled with the rates, shape (m, size).
-        rows: Filled with the table of rows, shape (columns, m, K).
+        rows: Filled with the table of rows, shape (m, columns, K), or of no columns.
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
+        booked: Filled with energies and powers, shape (m, books).
     """
     model = bound_at(address, MODEL)
     tables, control, work = model.tables, model.control, model.work
@@ -39,12 +64,13 @@ def evaluate_many(
         call_at(model.evaluate, address, 0.0)
         for c in range(states.shape[1]):
             rates[m, c] = model.rate[c]
-        for c in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
             for k in range(rows.shape[2]):
-                rows[c, m, k] = work.rows[c, k]
+                rows[m, c, k] = work.rows[c, k]
         for j in range(torques.shape[1]):
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]
+        _book(tables, work, booked[m])
 
 
 @entry

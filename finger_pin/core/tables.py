@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -54,6 +55,7 @@ class Tables(NamedTuple):
         directions: That link's unit vector in its frame, shape (n, 3).
         groups: First and last + 1 row of each, and whether it has states, bends, inputs, loads, shape (G, 6).
         laws: Addresses of value, slopes and account, shape (G, 3).
+        books: Where stored energy and powers of each group are booked, -1 for none, shape (G, 1 + most powers).
         parameters: Shape (most parameters, K).
         offset: Shape (K,).
         arm_start: Where the row's arm begins among what follows, shape (K + 1,).
@@ -89,6 +91,7 @@ class Tables(NamedTuple):
     directions: Matrix
     groups: IndexTable
     laws: IndexTable
+    books: IndexTable
     parameters: Matrix
     offset: Vector
     arm_start: Indices
@@ -161,7 +164,22 @@ class _Body(NamedTuple):
     axis: Array
 
 
+_KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
+
+
 def build_tables(mechanism: Mechanism) -> Tables:
+    """Return the arrays of a mechanism; those that change in place are the caller's own.
+
+    Raises:
+        InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
+    """
+    if mechanism not in _KNOWN:
+        _KNOWN[mechanism] = _read(mechanism)
+    known = _KNOWN[mechanism]
+    return known._replace(bodies=known.bodies.copy(), tip_force=known.tip_force.copy())
+
+
+def _read(mechanism: Mechanism) -> Tables:
     """Read a mechanism into arrays; Pinocchio's model is the source of the rigid body.
 
     Raises:
@@ -262,6 +280,7 @@ def build_tables(mechanism: Mechanism) -> Tables:
             dtype=np.int64,
         ).reshape(-1, 6),
         laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
+        books=_books(mechanism),
         parameters=parameters,
         offset=np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
         arm_start=arm_start,
@@ -321,6 +340,16 @@ def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
         acceleration=np.zeros(width),
         command=np.zeros(channels),
     )
+
+
+def _books(mechanism: Mechanism) -> NDArray[np.int64]:
+    stored, powers = mechanism.books.stored, mechanism.books.powers
+    wide = 1 + max((len(table.powers) for table in mechanism.rows), default=0)
+    books = np.full((len(mechanism.rows), wide), -1, dtype=np.int64)
+    for row, table in zip(books, mechanism.rows, strict=True):
+        row[0] = stored.index(table.stored)
+        row[1 : 1 + len(table.powers)] = [len(stored) + powers.index(name) for name in table.powers]
+    return books
 
 
 def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

@@ -87,7 +87,7 @@ class FingerSignals:
         external_torque: J^T F, shape (..., n), N m, (6).
         acceleration: theta'', shape (..., n), rad/s2, (18).
         rate: Time derivative of the packed state, shape (..., size).
-        rows: What every row of the mechanism does, by table.
+        mechanism: The same of the mechanism, with what every row does.
     """
 
     state: State
@@ -102,7 +102,7 @@ class FingerSignals:
     external_torque: Array
     acceleration: Array
     rate: Array
-    rows: dict[str, RowSignals]
+    mechanism: Evaluation
 
 
 class Finger:
@@ -118,6 +118,7 @@ class Finger:
         springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
+        further: Tables of rows that were added.
     """
 
     def __init__(
@@ -151,6 +152,7 @@ class Finger:
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
+        self.further = tuple(rows)
         self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows))
         joints, passive = self.routing.joints, self.routing.passive
         width = len(joints) + passive
@@ -285,8 +287,13 @@ class Finger:
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
-            rows=found.rows,
+            mechanism=found,
         )
+
+    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+        """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
+        found = self.mechanism.evaluate(x, command, fingertip_force)
+        return np.stack(list(found.account()[1].values()), axis=-1), found.external
 
     def static_torque(self, position: Array) -> Array:
         """Return what tendons have to exert at rest at theta, shape (n,): G and the springs' torque, N m."""

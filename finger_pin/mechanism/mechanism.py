@@ -27,22 +27,68 @@ from finger_pin.mechanism.rows import Rows, RowSignals
 
 
 @dataclass(frozen=True, eq=False)
+class Books:
+    """Names under which the rows' energies and powers are booked; some tables share a name.
+
+    Attributes:
+        stored: Energies.
+        powers: Powers, supplied and lost.
+        supplies: Those of them that are supplied.
+    """
+
+    stored: tuple[str, ...]
+    powers: tuple[str, ...]
+    supplies: frozenset[str]
+
+    @classmethod
+    def of(cls, rows: Sequence[Rows]) -> Books:
+        """Collect the names of tables."""
+        return cls(
+            stored=tuple(dict.fromkeys(table.stored for table in rows)),
+            powers=tuple(dict.fromkeys(name for table in rows for name in table.powers)),
+            supplies=frozenset(name for table in rows for name in table.powers[: len(table.law.supplies)]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Everything at one state or at many; leading dimensions are kept.
 
     Attributes:
+        books: Names of energies and powers.
         rows: What the rows do, by table.
         torque: Sum of A^T phi, shape (..., N).
         external: J^T F, shape (..., N).
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
+        booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
     """
 
+    books: Books
     rows: dict[str, RowSignals]
     torque: Array
     external: Array
     acceleration: Array
     rate: Array
+    booked: Array | None = None
+
+    def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return the energies that the rows store, J, and their powers, W, by name; shapes (...,)."""
+        if self.booked is not None:
+            columns = np.moveaxis(self.booked, -1, 0)
+            count = len(self.books.stored)
+            return (
+                dict(zip(self.books.stored, columns[:count], strict=True)),
+                dict(zip(self.books.powers, columns[count:], strict=True)),
+            )
+        nothing = np.zeros(self.rate.shape[:-1])
+        energies, powers = dict.fromkeys(self.books.stored, nothing), dict.fromkeys(self.books.powers, nothing)
+        for signals in self.rows.values():
+            stored, flows = signals.account()
+            energies[signals.rows.stored] = energies[signals.rows.stored] + stored
+            for name, value in flows.items():
+                powers[name] = powers[name] + value
+        return energies, powers
 
 
 class Mechanism:
@@ -54,6 +100,7 @@ class Mechanism:
         inertia: Of the lumps, shape (l,), kg or kg m2.
         rows: The tables, in the order of evaluation.
         states: For every table the range of its states in z.
+        books: Names under which energies and powers of the rows are booked.
         channels: Number of inputs from outside.
     """
 
@@ -65,6 +112,7 @@ class Mechanism:
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
+        self.books = Books.of(self.rows)
         self.channels = max((int(table.channels.max(initial=-1)) + 1 for table in self.rows), default=0)
         self.states: list[slice] = []
         end = 0
@@ -190,6 +238,7 @@ class Mechanism:
         moving = self.body.position_rate(turning, v[..., :joints])
         rates = [found[t.group].rate for t in self.rows if t.law.scale is not None]
         return Evaluation(
+            books=self.books,
             rows=found,
             torque=torque,
             external=external,

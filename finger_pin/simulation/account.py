@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.textbook import Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.simulation.energy import Energies, Powers, energies, powers
+from finger_pin.simulation.energy import Flows, energies, powers
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
 # tensions at the ends of steps, where a node would see those of the next one.
@@ -33,9 +33,9 @@ class Account:
         residual: Stored less its start, less the net work, J; zero for an exact integration.
     """
 
-    stored: Energies
-    powers: Powers
-    works: Powers
+    stored: dict[str, Array]
+    powers: Flows
+    works: Flows
     residual: Array
 
 
@@ -49,40 +49,34 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         signals: The signals at those times.
         motion: Fingertip and energies of the rigid body at those times.
     """
-    finger = loop.finger
-    works = _works(loop, trajectory, times)
-    stored = energies(finger, signals.finger, motion)
-    return Account(
-        stored=stored,
-        powers=powers(finger, signals.finger),
-        works=works,
-        residual=stored.total - stored.total[0] - works.net,
-    )
+    booked = powers(signals.finger)
+    works = Flows(_works(loop, trajectory, times, len(booked.names)), booked.names, booked.supplies)
+    stored = energies(loop.finger, signals.finger, motion)
+    total = np.sum(list(stored.values()), axis=0)
+    return Account(stored=stored, powers=booked, works=works, residual=total - total[0] - works.net)
 
 
-def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array) -> Powers:
-    """Return the integrals of all powers from the start to the saved times.
+def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array, count: int) -> Array:
+    """Return the integrals of all powers from the start to the saved times, shape (m, count).
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
     """
     begin, length = trajectory.breakpoints[:-1], np.diff(trajectory.breakpoints)
-    works = np.zeros((len(times), len(fields(Powers))))
+    works, reached = np.zeros((len(times), count)), np.zeros(count)
     if len(length) == 0:
-        return Powers(*works.T)
+        return works
     inside = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, len(begin) - 1)
-    reached = np.zeros(works.shape[1])
     for first in range(0, len(begin), _CHUNK):
         part = slice(first, first + _CHUNK)
         nodes = (begin[part, None] + length[part, None] * _NODES).ravel()
-        signals = loop.evaluate(nodes, trajectory.interpolate(nodes))
-        values = np.stack(list(vars(powers(loop.finger, signals.finger)).values()), axis=-1)
-        values = values.reshape(-1, len(_NODES), works.shape[1]) * length[part, None, None]
-        steps = np.einsum("k,skp->sp", _WEIGHTS, values)
+        values = loop.powers(nodes, trajectory.interpolate(nodes))
+        values = values.reshape(-1, len(_NODES), count) * length[part, None, None]
+        steps = np.tensordot(values, _WEIGHTS, axes=(1, 0))
         before = reached + np.cumsum(steps, axis=0) - steps
         rows = slice(*np.searchsorted(inside, (first, first + _CHUNK)))
         step = inside[rows] - first
         share = np.vander((times[rows] - begin[inside[rows]]) / length[inside[rows]], 4)[:, :3] @ _PARABOLAS
-        works[rows] = before[step] + np.einsum("mk,mkp->mp", share, values[step])
+        works[rows] = before[step] + np.matmul(share[:, None, :], values[step])[:, 0]
         reached = before[-1] + steps[-1]
-    return Powers(*works.T)
+    return works

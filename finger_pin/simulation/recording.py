@@ -18,7 +18,9 @@ from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
+from finger_pin.mechanism.mechanism import Evaluation
 from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
@@ -59,7 +61,8 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
     motion = loop.dynamics.motion(state.position, state.velocity)
     kept = account(loop, trajectory, times, signals, motion)
     routing = loop.finger.routing
-    variables = _signals(loop, signals, motion) | _energies(kept)
+    further = loop.finger.further
+    variables = _signals(loop, signals, motion) | _further(further, signals.finger.mechanism) | _energies(kept)
     dataset = xr.Dataset(
         {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
         coords={
@@ -70,6 +73,7 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
         },
         attrs=_attributes(scenario, trajectory, method),
     )
+    dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
     if routing.passive > 1:
         dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
     return dataset
@@ -153,13 +157,29 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     return table
 
 
+def _further(tables: tuple[Rows, ...], found: Evaluation) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+    """Return what rows of a user's own see and show, by table."""
+    shown = {}
+    for table in tables:
+        own, dims = found.rows[table.group], ("time", table.group)
+        values = {"force": own.force, "length": own.row.length, "speed": own.row.speed}
+        values |= dict(zip(table.law.signals, own.signals, strict=True))
+        if table.law.scale is not None:
+            values["state"] = own.row.state
+        for name, value in values.items():
+            shown[f"{table.group}_{name}"] = _entry(dims, value, "SI", f"{name} of {table.law.name}")
+    return shown
+
+
 def _energies(kept: Account) -> dict[str, tuple[Any, Array, dict[str, str]]]:
     table = {}
-    for name, text in _STORED.items():
-        table[f"energy_{name}"] = _entry("time", getattr(kept.stored, name), "J", text)
-    for name, text in _EXCHANGED.items():
-        table[f"power_{name}"] = _entry("time", getattr(kept.powers, name), "W", f"power {text}")
-        table[f"energy_exchanged_{name}"] = _entry("time", getattr(kept.works, name), "J", f"energy {text}")
+    for name, values in kept.stored.items():
+        table[f"energy_{name}"] = _entry("time", values, "J", _STORED.get(name, f"energy stored in {name}"))
+    for name in sorted(kept.works.names, key=[*_EXCHANGED, *kept.works.names].index):
+        other = f"supplied by {name}" if name in kept.works.supplies else f"lost in {name}"
+        text = _EXCHANGED.get(name, other)
+        table[f"power_{name}"] = _entry("time", kept.powers[name], "W", f"power {text}")
+        table[f"energy_exchanged_{name}"] = _entry("time", kept.works[name], "J", f"energy {text}")
     text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
     table["energy_residual"] = _entry("time", kept.residual, "J", text)
     return table

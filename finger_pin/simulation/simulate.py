@@ -31,6 +31,7 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, MicroDampingWarning
+from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -49,6 +50,7 @@ def simulate(
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
     fingertip_force: Samples | None = None,
+    finger: Finger | None = None,
     initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -73,6 +75,8 @@ def simulate(
             follow (20). Between samples the motion is a monotone cubic.
         fingertip_force: Replaces what acts on the fingertip: times, shape (m,), s, and forces, shape (m, 3), N, base
             frame.
+        finger: Replaces the finger that the scenario describes: one with rows of its own, or on a model
+            (`Finger.from_model`), with the same joints and tendons.
         initial: The packed state to start from, shape (size,), or a result to continue from its last saved state. Time
             begins at zero again; ``simulation.start_time`` says what the clock of references shows then.
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
@@ -99,10 +103,10 @@ def simulate(
     if isinstance(scenario, str | Path):
         scenario = load_scenario(scenario)
     method = scenario.simulation.method
-    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force)
+    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
-    own = own_parts(controller, reference, fingertip_force, initial)
+    own = own_parts(controller, reference, fingertip_force, initial, finger)
     # The margin is that of the paper's controller on the scenario's reference.
     judged = controller is None and reference is None and scenario.controller.kind == "proportional"
     judged = judged and loop.finger.routing.force_closure().holds
@@ -158,8 +162,12 @@ def simulate(
 def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
     """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
     length, excess = result.sizes["time"], ""
-    for name, values in result.data_vars.items():
-        finite = np.isfinite(values.to_numpy())
+    for name in result.data_vars:
+        values = result.variables[name]
+        # The sum alone tells in most cases.
+        if np.isfinite(np.sum(values.values)):
+            continue
+        finite = np.isfinite(values.values)
         if not finite.all():
             first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
             if first < length:

@@ -22,7 +22,9 @@ _PARTS = {
 }
 
 
-def own_parts(controller: object, reference: object, fingertip_force: object, initial: object) -> str:
+def own_parts(
+    controller: object, reference: object, fingertip_force: object, initial: object, finger: object = None
+) -> str:
     """Return what of a simulation is a user's own, such as ``controller, reference``; empty for nothing.
 
     Args:
@@ -30,8 +32,15 @@ def own_parts(controller: object, reference: object, fingertip_force: object, in
         reference: As for `simulate`.
         fingertip_force: As for `simulate`.
         initial: As for `simulate`.
+        finger: As for `simulate`.
     """
-    given = {"controller": controller, "reference": reference, "force": fingertip_force, "initial state": initial}
+    given = {
+        "controller": controller,
+        "reference": reference,
+        "force": fingertip_force,
+        "initial state": initial,
+        "finger": finger,
+    }
     return ", ".join(name for name, each in given.items() if each is not None)
 
 

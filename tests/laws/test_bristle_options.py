@@ -38,16 +38,16 @@ def test_micro_damping_is_booked_so_that_every_power_is_accounted_for(optional):
     """At any state: friction's power on tendons and joints is that of the bristles plus the booked losses."""
     x, command = random_states(optional, 200, seed=3)
     signals = optional.evaluate(x, command)
-    booked, state = powers(optional, signals), signals.state
+    booked, state = powers(signals), signals.state
     tendons = np.sum(signals.tendons.friction * signals.tendons.velocity, axis=-1)
     stored = np.sum(state.tendon_stiction * signals.tendons.stiction_rate / optional.tendons.stiffness, axis=-1)
-    losses = booked.tendon_coulomb + booked.tendon_viscous + booked.tendon_micro_damping
+    losses = booked["tendon_coulomb"] + booked["tendon_viscous"] + booked["tendon_micro_damping"]
     np.testing.assert_allclose(tendons, stored + losses, rtol=1e-10, atol=1e-12 * np.max(np.abs(stored)))
     joints = np.sum(signals.joints.friction * state.velocity, axis=-1)
     stored = np.sum(state.joint_stiction * signals.joints.stiction_rate / optional.joint_friction.stiffness, axis=-1)
-    losses = booked.joint_coulomb + booked.joint_viscous + booked.joint_micro_damping
+    losses = booked["joint_coulomb"] + booked["joint_viscous"] + booked["joint_micro_damping"]
     np.testing.assert_allclose(joints, stored + losses, rtol=1e-10, atol=1e-12 * np.max(np.abs(stored)))
-    assert np.any(booked.tendon_micro_damping != 0.0) and np.any(booked.joint_micro_damping != 0.0)
+    assert np.any(booked["tendon_micro_damping"] != 0.0) and np.any(booked["joint_micro_damping"] != 0.0)
 
 
 def test_tension_on_a_sticking_tendon_is_damped_by_sigma_1_and_the_normal_force_is_the_papers(optional):
