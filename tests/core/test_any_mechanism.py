@@ -29,12 +29,17 @@ def drawn(request):
 
 
 def assert_same(found, expected, mechanism, tolerance=1e-12):
-    """Compare evaluations at many states: rates by kind, and what every row sees, does and shows."""
+    """Compare evaluations at many states: rates by kind, the account, and what every row sees, does and shows."""
     for kind in kinds_of(mechanism):
         assert relative(found.rate[:, kind], expected.rate[:, kind]) < tolerance
     for name in ("torque", "external", "acceleration"):
         largest = np.abs(getattr(expected, name)).max()
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=tolerance * largest, rtol=1e-9)
+    for booked, wanted in zip(found.account(), expected.account(), strict=True):
+        assert list(booked) == list(wanted) and wanted
+        for name, amount in wanted.items():
+            little = tolerance * np.abs(amount).max(initial=1.0)
+            np.testing.assert_allclose(booked[name], amount, rtol=1e-9, atol=little)
     for group, theirs in expected.rows.items():
         ours = found.rows[group]
         pairs = zip(

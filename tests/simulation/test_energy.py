@@ -1,21 +1,13 @@
-"""The energy account: it closes on correct runs, follows known works, and exposes planted errors."""
+"""The energy account: it closes on correct runs and follows known works."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
-from finger_pin.control import proportional as controller_block
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.textbook import integrate
 from finger_pin.description.scenario import METHODS
-from finger_pin.laws import capstan
-from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.simulation.account import account
 from finger_pin.simulation.energy import energies, powers
 
 LOSSES = ("tendon_coulomb", "tendon_viscous", "joint_coulomb", "joint_viscous", "limiter")
@@ -31,30 +23,6 @@ def turnover(result):
     """The energy that went through the account, J: everything supplied and lost, by magnitude."""
     works = [values for name, values in result.items() if name.startswith("energy_exchanged_")]
     return float(sum(abs(work).max() for work in works))
-
-
-def share_left_open(loop, duration=0.03):
-    """Integrate the Python right-hand side, keep its account, and return the residual over the turnover.
-
-    A wrong law can make the system unstable; then the account of the first steps must do.
-    """
-    steps = []
-    trajectory = integrate(
-        loop.rhs,
-        loop.initial_state(),
-        duration,
-        method="BDF",
-        rtol=1e-6,
-        atol=1e-6 * loop.finger.layout.scales(),
-        watch=lambda time, x: steps.append(time),
-        stop=lambda: len(steps) == 600,
-    )
-    times = np.linspace(0.0, trajectory.breakpoints[-1], 101)
-    x = trajectory.interpolate(times)
-    state = loop.finger.layout.unpack(x)
-    motion = loop.dynamics.motion(state.position, state.velocity)
-    kept = account(loop, trajectory, times, loop.evaluate(times, x), motion)
-    return np.abs(kept.residual).max() / sum(np.abs(work).max() for work in vars(kept.works).values())
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +164,7 @@ def test_net_power_is_supply_less_losses_and_the_rate_of_stored_energy(finger):
         assert exchanged.net == pytest.approx(by_hand, rel=1e-12, abs=1e-15)
         step = 1e-9
         slope = (total(x + step * signals.rate) - total(x - step * signals.rate)) / (2.0 * step)
-        size = sum(abs(value) for value in vars(exchanged).values())
+        size = np.abs(exchanged.values).sum()
         assert float(slope) == pytest.approx(float(by_hand), abs=1e-5 * float(size))
 
 
@@ -244,101 +212,3 @@ def test_with_everything_off_the_planar_finger_is_a_double_pendulum_that_keeps_i
     assert np.ptp(stored["kinetic"]) > 1e-3
     total = sum(stored.values())
     np.testing.assert_allclose(total, total[0], atol=1e-8 * np.ptp(stored["kinetic"]))
-
-
-@pytest.fixture(scope="module")
-def loop():
-    """The finger of fig6, pushed at its tip and driven a little into its lower limits."""
-    settings = {
-        "environment.fingertip_force": [0.2, 0.3, -0.3],
-        "reference.joints.medial.offset": 0.42,
-        "reference.joints.proximal.offset": 0.42,
-    }
-    return ClosedLoop.from_scenario(fp.load_scenario("fig6", settings))
-
-
-def test_the_account_of_the_loop_to_be_tampered_with_closes(loop):
-    assert share_left_open(loop) < 1e-5
-
-
-def tampered(loop, monkeypatch, group, wrong):
-    """Let the law of a table of rows return something else: `wrong` maps what the rows see and the law returns."""
-    rows = []
-    for table in loop.finger.mechanism.rows:
-        if table.group == group:
-
-            def value(row, p, right=table.law.value):
-                return wrong(row, *right(row, p))
-
-            table = replace(table, law=replace(table.law, value=value))
-        rows.append(table)
-    monkeypatch.setattr(loop.finger.mechanism, "rows", tuple(rows))
-
-
-def wrong_delivery(loop, monkeypatch):
-    def pushed(row, force, rate, friction, *others):
-        return np.maximum(0.0, row.command + friction), rate, friction, *others
-
-    tampered(loop, monkeypatch, "driven_tendons", pushed)
-
-
-def wrong_passive_friction(loop, monkeypatch):
-    tampered(loop, monkeypatch, "passive_tendons", lambda row, force, *others: (-force, *others))
-
-
-def wrong_passive_spring(loop, monkeypatch):
-    tampered(loop, monkeypatch, "passive_halves", lambda row, force, *others: (-force, *others))
-
-
-def wrong_joint_friction(loop, monkeypatch):
-    tampered(loop, monkeypatch, "joint_friction", lambda row, force, *others: (-force, *others))
-
-
-def wrong_stiction_rate(loop, monkeypatch):
-    def halved(stiction, velocity, level, stiffness):
-        return stiffness * (velocity - 0.5 * stiction * np.abs(velocity) / level)
-
-    monkeypatch.setattr(capstan, "stiction_rate", halved)
-
-
-def wrong_gravity(loop, monkeypatch):
-    original = Finger.motion
-
-    def flipped(*arguments):
-        found = original(*arguments)
-        return replace(found, potential_energy=-found.potential_energy)
-
-    monkeypatch.setattr(Finger, "motion", flipped)
-
-
-def wrong_external_torque(loop, monkeypatch):
-    original = RigidBody.forward_dynamics
-    lever = np.array([1e-3, 0.0, 0.0, 0.0])
-    monkeypatch.setattr(RigidBody, "forward_dynamics", lambda self, q, v, torque: original(self, q, v, torque + lever))
-
-
-def wrong_command(monkeypatch):
-    monkeypatch.setattr(controller_block, "proportional_torque", lambda gain, reference, q: gain * (q - reference))
-
-
-@pytest.mark.parametrize(
-    "plant",
-    [
-        wrong_delivery,
-        wrong_passive_friction,
-        wrong_passive_spring,
-        wrong_joint_friction,
-        wrong_stiction_rate,
-        wrong_gravity,
-        wrong_external_torque,
-    ],
-)
-def test_the_account_exposes_a_wrong_law(plant, loop, monkeypatch):
-    plant(loop, monkeypatch)
-    assert share_left_open(loop) > 1e-3
-
-
-def test_the_account_does_not_judge_the_controller(loop, monkeypatch):
-    """Whatever the actuators are told, the books balance: the account is about the finger."""
-    wrong_command(monkeypatch)
-    assert share_left_open(loop) < 1e-5
