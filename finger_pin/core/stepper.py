@@ -195,10 +195,7 @@ class Stepper:
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
         tables = build_tables(mechanism)
-        varying = len(control.force.harmonics) > 0
-        if varying or (force is not None and np.any(force)):
-            tables.tip_force[:] = 0.0 if force is None else force
-            tables = tables._replace(loaded=True)
+        tables.tip_force[:] = 0.0 if force is None else force
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         laws = [table.law for table in mechanism.rows]
         self._width = mechanism.coordinates
@@ -207,6 +204,9 @@ class Stepper:
         for island in islands:
             whole = len(islands) == 1
             own = tables if whole else select(tables, island)
+            inputs = control if whole else select_control(control, island)
+            # An island that nothing pushes computes as it does alone.
+            own = own._replace(loaded=bool(len(inputs.force.harmonics) or np.any(own.tip_force)))
             memory = np.zeros(core.MEMORY_SIZE)
             memory[core.STEP] = _FIRST_STEP
             at = self._places(island)
@@ -216,7 +216,7 @@ class Stepper:
                     island,
                     laws if whole else [laws[g] for g in _groups_of(tables, island)],
                     own,
-                    control if whole else select_control(control, island),
+                    inputs,
                     start[at].copy(),
                     attitude[free].copy(),
                     tableau,
@@ -270,7 +270,7 @@ class Stepper:
 
     def load(self, force: Array) -> None:
         """Set the forces at the tips, shape (3,) or (t, 3), N, base frame."""
-        forces = np.broadcast_to(force, (sum(len(part.island.tips) for part in self.parts), 3))
+        forces = np.broadcast_to(force, (len(self.mechanism.body.tips), 3))
         for index, part in enumerate(self.parts):
             part.tables.tip_force[:] = forces[part.island.tips]
             if np.any(part.tables.tip_force) and not part.tables.loaded:

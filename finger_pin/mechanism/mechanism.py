@@ -14,10 +14,11 @@ whose four numbers in q are a unit quaternion (x, y, z, w).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.laws.law import Row
@@ -119,6 +120,42 @@ class Mechanism:
             begin, end = end, end + (0 if table.law.scale is None else len(table.names))
             self.states.append(slice(begin, end))
         self.state_count = end
+
+    @classmethod
+    def join(cls, parts: Mapping[str, Mechanism]) -> Mechanism:
+        """Return several mechanisms on one base, such as the fingers of a hand.
+
+        Coordinates are the joints of all parts, then the lumps of all. Names of joints, tips, lumps and tables begin
+        with that of their part and a dot; inputs follow each other.
+
+        Raises:
+            InputError: If gravity is not the same for all.
+        """
+        body = RigidBody.join({name: part.body for name, part in parts.items()})
+        width = int(body.model.nv) + sum(len(part.lumps) for part in parts.values())
+        joint = coordinate = channel = 0
+        lump, rows = int(body.model.nv), []
+        for name, part in parts.items():
+            size = int(part.body.model.nv)
+            places = np.append(coordinate + np.arange(size), lump + np.arange(len(part.lumps)))
+            for table in part.rows:
+                rows.append(
+                    replace(
+                        table,
+                        group=f"{name}.{table.group}",
+                        arm=_spread(table.arm, places, width),
+                        measure=_spread(table.measure, places, width),
+                        bends=_spread(table.bends, places, width),
+                        channels=np.where(table.channels >= 0, table.channels + channel, -1),
+                        pins=np.where(table.pins >= 0, table.pins + joint, -1),
+                        inputs={f"{name}.{group}": weights for group, weights in table.inputs.items()},
+                        loads={f"{name}.{group}": weights for group, weights in table.loads.items()},
+                    )
+                )
+            joint, coordinate = joint + part.body.model.njoints - 1, coordinate + size
+            lump, channel = lump + len(part.lumps), channel + part.channels
+        lumps = [f"{name}.{each}" for name, part in parts.items() for each in part.lumps]
+        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]))
 
     @property
     def coordinates(self) -> int:
@@ -229,3 +266,10 @@ class Mechanism:
         beyond = self.body.supports[:, table.pins].T @ forces
         total: Array = beyond - load[..., None] * directions
         return np.asarray(np.sqrt(np.sum(total * total, axis=-1)))
+
+
+def _spread(matrix: Array, places: NDArray[np.int64], width: int) -> Array:
+    """Return a matrix with its columns at some places among more."""
+    wide = np.zeros((len(matrix), width))
+    wide[:, places] = matrix
+    return wide

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +105,37 @@ class RigidBody:
             shared = parent == 0 or length == 0.0
             self.carriers.append(self.carriers[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
+
+    @classmethod
+    def join(cls, parts: Mapping[str, RigidBody]) -> RigidBody:
+        """Return several bodies on one base; names of joints and tips begin with that of their part and a dot.
+
+        Raises:
+            InputError: If gravity is not the same for all.
+        """
+        model, tips = pin.Model(), []
+        axes, carriers = [np.array([1.0, 0.0, 0.0])], [0]
+        model.gravity = next(iter(parts.values())).model.gravity
+        for part, body in parts.items():
+            own, shift = body.model, model.njoints - 1
+            if own.gravity != model.gravity:
+                raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", own.gravity.linear)
+            for index in range(1, own.njoints):
+                parent = int(own.parents[index])
+                joint, placement = own.joints[index], own.jointPlacements[index]
+                at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
+                # Appending bodies, or frames with theirs, would round.
+                model.inertias[at] = own.inertias[index]
+            for tip in body.tips:
+                frame = own.frames[tip]
+                holder = frame.parentJoint and frame.parentJoint + shift
+                tips.append(f"{part}.{frame.name}")
+                model.addFrame(pin.Frame(tips[-1], holder, 0, frame.placement, pin.FrameType.OP_FRAME), False)
+            axes += body.proximal_axes[1:]
+            carriers += [carrier and carrier + shift for carrier in body.carriers[1:]]
+        joined = cls(model, tips)
+        joined.proximal_axes, joined.carriers = axes, carriers
+        return joined
 
     def position_rate(self, q: Array, v: Array) -> Array:
         """Return q' = E(q) v, shape (..., nq)."""

@@ -32,8 +32,10 @@ def worst(x, difference, rtol, atol):
 def condensed(address, time, x, g, rate):
     """Fill the state rate, and the solution of (g - J) u = r for all r; return false if there is none."""
     model = bound_at(address, MODEL)
-    model.state[:] = x
+    for c in range(x.size):
+        model.state[c] = x[c]
     call_at(model.evaluate, address, time)
-    rate[:] = model.rate
+    for c in range(x.size):
+        rate[c] = model.rate[c]
     call_at(model.linearise, address, time)
     return call_at(model.condense, address, g) == 1

@@ -22,7 +22,7 @@ def value(row, p):
     linear, cubic, stiffness, level = p
     elastic = linear * row.length + cubic * row.length**3
     rate = hysteresis_rate(row.state, row.speed, stiffness, level)
-    return -elastic - row.state, rate, elastic
+    return -elastic - row.state, rate, elastic, row.state
 
 
 def slopes(row, p, signals):
@@ -45,7 +45,7 @@ RUBBER = Law(
     value=value,
     slopes=slopes,
     account=account,
-    signals=("elastic",),
+    signals=("elastic", "hysteresis"),
     losses=("hysteresis",),
     scale=1e-2,
 )
@@ -114,3 +114,38 @@ def test_its_jacobian_is_exact(rubber):
         arms = np.eye(4)[:, 1:3]
         expected = -np.linalg.solve(rubber.rigid_body.mass_matrix(x[:4]), arms)
         np.testing.assert_allclose(found[5:9, own], expected, rtol=1e-6, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.fixture(scope="module")
+def simulated(rubber):
+    """The start of `fig6` with the law at two joints, by the compiled core and by scipy on the readable evaluation."""
+    found = {}
+    for method in ("Rodas5P", "Radau"):
+        settings = {"duration": 0.03, "method": method, "rtol": 1e-8, "atol_scale": 1e-8, "sample_rate": 2000.0}
+        scenario = fp.load_scenario("fig6", {f"simulation.{name}": value for name, value in settings.items()})
+        found[method] = fp.simulate(scenario, finger=rubber)
+    return found
+
+
+@pytest.mark.parametrize("method", ["Rodas5P", "Radau"])
+def test_a_simulation_shows_its_signals_and_books_its_energy_and_its_loss(simulated, method):
+    result = simulated[method]
+    assert list(result["rubber"].values) == ["proximal", "medial"]
+    q, v = (result[f"joint_{name}"].values[:, 1:3] for name in ("position", "velocity"))
+    z = result["rubber_hysteresis"].values
+    assert result["rubber_elastic"].dims == ("time", "rubber") and np.abs(z).max() > 1e-4
+    np.testing.assert_allclose(result["rubber_elastic"], NUMBERS[0] * q + NUMBERS[1] * q**3, rtol=1e-12)
+    stored = NUMBERS[0] * q**2 / 2.0 + NUMBERS[1] * q**4 / 4.0 + z**2 / (2.0 * NUMBERS[2])
+    np.testing.assert_allclose(result["energy_rubber"], stored.sum(axis=1), rtol=1e-12)
+    power = np.sum(z**2 * np.abs(v) / NUMBERS[3], axis=1)
+    np.testing.assert_allclose(result["power_rubber_hysteresis"], power, rtol=1e-12)
+    lost = float(np.trapezoid(power, result["time"]))
+    assert float(result["energy_exchanged_rubber_hysteresis"][-1]) == pytest.approx(lost, rel=1e-2)
+    assert float(abs(result["energy_residual"]).max()) < 1e-6 * float(abs(result["energy_rubber"]).max())
+
+
+def test_both_integrators_give_the_motion_with_the_law_and_it_is_another_one(simulated):
+    for name, little in (("joint_position", 1e-7), ("rubber_hysteresis", 1e-7)):
+        assert float(abs(simulated["Rodas5P"][name] - simulated["Radau"][name]).max()) < little
+    bare = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.03, "simulation.sample_rate": 2000.0}))
+    assert float(abs(simulated["Rodas5P"]["joint_position"] - bare["joint_position"]).max()) > 1e-3
