@@ -95,8 +95,8 @@ class ClosedLoop:
             finger: Replaces the finger that its description makes, such as one with rows of its own.
 
         Raises:
-            InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape or are
-                not finite, or tensions are negative.
+            InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
+                or are not finite, or tensions are negative.
         """
         finger, start = finger or Finger(scenario.finger), scenario.simulation.start_time
         for kind, own, described in (

@@ -72,11 +72,11 @@ def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array, count: int) -
         nodes = (begin[part, None] + length[part, None] * _NODES).ravel()
         values = loop.powers(nodes, trajectory.interpolate(nodes))
         values = values.reshape(-1, len(_NODES), count) * length[part, None, None]
-        steps = np.tensordot(values, _WEIGHTS, axes=(1, 0))
+        steps = sum(weight * values[:, node] for node, weight in enumerate(_WEIGHTS))
         before = reached + np.cumsum(steps, axis=0) - steps
         rows = slice(*np.searchsorted(inside, (first, first + _CHUNK)))
         step = inside[rows] - first
         share = np.vander((times[rows] - begin[inside[rows]]) / length[inside[rows]], 4)[:, :3] @ _PARABOLAS
-        works[rows] = before[step] + np.matmul(share[:, None, :], values[step])[:, 0]
+        works[rows] = before[step] + sum(share[:, node, None] * values[step, node] for node in range(len(_NODES)))
         reached = before[-1] + steps[-1]
     return works

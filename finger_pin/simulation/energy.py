@@ -51,7 +51,7 @@ class Flows:
     @property
     def net(self) -> Array:
         """Supplied less lost, shape (...,)."""
-        net: Array = self.values @ np.array([1.0 if name in self.supplies else -1.0 for name in self.names])
+        net: Array = np.sum(self.values * [1.0 if name in self.supplies else -1.0 for name in self.names], axis=-1)
         return net
 
 

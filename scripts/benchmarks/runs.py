@@ -13,9 +13,10 @@ import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
+from finger_pin.core.binding import bound_at, call_at
 from finger_pin.core.compilation import entry
 from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.model import evaluate
+from finger_pin.core.model import MODEL
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import integrate
 from finger_pin.description.routing import Array
@@ -122,8 +123,13 @@ def has_sundials() -> bool:
 
 
 @entry
-def _rate(block: Any, time: float, x: Any, rate: Any) -> None:
-    evaluate(block, time, x, rate)
+def _rate(address: int, time: float, x: Any, rate: Any) -> None:
+    model = bound_at(address, MODEL)
+    for c in range(x.size):
+        model.state[c] = x[c]
+    call_at(model.evaluate, address, time)
+    for c in range(x.size):
+        rate[c] = model.rate[c]
 
 
 def sundials(scenario: Scenario, rtol: float) -> Job:
@@ -138,7 +144,7 @@ def sundials(scenario: Scenario, rtol: float) -> Job:
 
     def rhs(time: float, x: Array, rate: Array) -> None:
         state[:] = x
-        _rate(part.model, time, state, rate)
+        _rate(part.model.address, time, state, rate)
 
     def job() -> tuple[Array, Any]:
         solver = CVODE(rhs, method="BDF", rtol=rtol, atol=atol, max_num_steps=10**7)

@@ -101,7 +101,11 @@ def test_open_loop_tensions_need_no_force_closure():
     assert fp.simulate(scenario).sizes["time"] == 21
 
 
-def test_a_varying_force_beside_a_sampled_controller_is_refused_in_one_line():
-    force = {"environment.fingertip_force_signal.z": {"offset": 0.1}, "controller.sampling.period": 1e-3}
-    with pytest.raises(InputError, match="a sampled controller needs a constant fingertip force"):
-        fp.simulate(fp.load_scenario("fig6", STILL | force))
+def test_a_varying_force_beside_a_sampled_controller_varies_between_its_samples_too():
+    force = {"offset": 0.1, "amplitude": 0.2, "frequency": 40.0}
+    settings = {"environment.fingertip_force_signal.z": force, "controller.sampling.period": 5e-3}
+    result = fp.simulate(fp.load_scenario("fig6", STILL | settings))
+    expected = 0.1 + 0.2 * np.sin(2.0 * np.pi * 40.0 * result.time)
+    np.testing.assert_allclose(result.fingertip_force.sel(axis="z"), expected, atol=1e-12)
+    turned_over = float(abs(result.energy_exchanged_actuators).max() + abs(result.energy_exchanged_fingertip).max())
+    assert float(abs(result.energy_residual).max()) < 1e-5 * turned_over

@@ -164,7 +164,7 @@ def test_net_power_is_supply_less_losses_and_the_rate_of_stored_energy(finger):
         assert exchanged.net == pytest.approx(by_hand, rel=1e-12, abs=1e-15)
         step = 1e-9
         slope = (total(x + step * signals.rate) - total(x - step * signals.rate)) / (2.0 * step)
-        size = np.abs(exchanged.values).sum()
+        size = np.sum(np.abs(exchanged.values))
         assert float(slope) == pytest.approx(float(by_hand), abs=1e-5 * float(size))
 
 
