@@ -139,8 +139,8 @@ def said(caplog):
     compilation._say.cache_clear()
 
 
-def test_the_first_compilation_is_announced_once(said, monkeypatch):
-    monkeypatch.setattr(compilation, "CACHE_FOLDER", "somewhere")
+def test_the_first_compilation_is_announced_once(said, monkeypatch, tmp_path):
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", str(tmp_path))
     double = doubled()
     assert said() == []
     double(1.0)
