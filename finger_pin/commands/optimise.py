@@ -67,7 +67,7 @@ def optimise(
     Without arguments: the winding radii of the paper's finger, tracking error against peak tension. Force closure is
     always asked for. The same command again goes on where an earlier one ended, however it ended. For example:
 
-    optimise fig6 --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses
+    optimise fig6 --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses --no-constraints
 
     optimise fig6 --minimise tension_peak --constraint "tracking_rms<=0.006" --constraint "self_locking_margin>=2"
 

@@ -1,0 +1,142 @@
+"""Every command and every snippet of all pages does what it is shown for, from top to bottom, and every link leads on.
+
+So that this takes seconds, what is shown is made smaller, here and nowhere else: scenarios that ship last `DURATION`,
+`SHORTER` says what of a command line is replaced, figures and pages of runs are not drawn (they have tests of their
+own), browsers and windows are closed at once. A command that another page has shown is not repeated.
+"""
+
+import importlib
+import re
+import shlex
+import shutil
+import tomllib
+import webbrowser
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from harness import Quick
+
+import finger_pin as fp
+import finger_pin.studies as studies
+from finger_pin.commands import application
+from finger_pin.description import loading
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
+DURATION = 0.02
+SHORTER = {
+    r"(--duration|simulation\.duration:?)( ?)\S+": rf"\1\g<2>{DURATION}",
+    r":7\b": ":2",
+    r":6:log": ":2:log",
+    r"--samples \d+": "--samples 2",
+    r"(validate\.py)( --only \S+)?$": r"\1 --only kinematics",
+    r"force_capability\.py$": "force_capability.py ub --posture 0,30,30,20 --limit 15 --force 0,0,1 --view",
+    r"conclusions\.py$": "conclusions.py fig6 --only a",
+    r"reaction\.py$": "reaction.py fig6 --forces 1",
+    # Its stages have tests of their own, and it measures for minutes.
+    r"(benchmark\.py).*": r"\1 --help",
+}
+#: A fenced block with its kind, or code within a line.
+SHOWN = re.compile(r"^```(\w+)\n(.*?)^```$|(?<!`)`([^`\n]+)`(?!`)", re.DOTALL | re.MULTILINE)
+COMMAND = re.compile(r"(python (-m|scripts/)|finger-pin )")
+EXPRESSION = re.compile(r"fp\.[\w.]+\(.*\)")
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """A folder to work in, where what ships is short, and the commands that were run there."""
+    folder = tmp_path_factory.mktemp("pages")
+    (folder / "urdf").symlink_to(ROOT / "urdf")
+    shipped = folder / "shipped"
+    for kind in ("fingers", "scenarios"):
+        shutil.copytree(Path(loading.__file__).parent / kind, shipped / kind)
+    for path in (shipped / "scenarios").iterdir():
+        path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(loading, "resources", SimpleNamespace(files=lambda package: shipped))
+        patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
+        patch.setattr("finger_pin.views.viewer.serving.Viewing.wait", lambda viewing: viewing.close())
+        # The comparison of controllers leaves out the start.
+        patch.setattr("finger_pin.studies.comparison.SETTLED", 0.0)
+        meshcat = importlib.import_module("meshcat")
+        silent = SimpleNamespace(send=lambda command: None)
+        patch.setattr(meshcat, "Visualizer", partial(meshcat.Visualizer, window=silent))
+        patch.setattr(webbrowser, "open", lambda url, new: True)
+        yield SimpleNamespace(folder=folder, done=set())
+
+
+def run_command(line, shown):
+    for pattern, shorter in SHORTER.items():
+        line = re.sub(pattern, shorter, line)
+    if line in shown.done:
+        return
+    shown.done.add(line)
+    first, second, *rest = shlex.split(line)
+    if (first, second) == ("python", "-m") and rest[0] == "pip":
+        extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+        assert rest[1:-1] == ["install", "-e"] and rest[-1] in {".", *(f".[{each}]" for each in extras)}
+    elif (first, second) == ("python", "-m") and rest[0] == "pytest":
+        # That is what is running.
+        assert all((ROOT / each).exists() for each in rest[1:] if "/" in each), line
+    elif second.startswith("scripts/"):
+        assert importlib.import_module(Path(second).stem).main(rest) == 0, line
+    else:
+        assert application.run(None, rest[1:] if second == "-m" else [second, *rest]) == 0, line
+
+
+def run_scenario(text, name):
+    path = Path(name)
+    path.write_text(text, encoding="utf-8")
+    result = fp.simulate(fp.load_scenario(path, {"simulation.duration": 0.005}))
+    assert result.sizes["time"] == 6
+
+
+@pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop is deprecated:DeprecationWarning")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
+    monkeypatch.setattr("finger_pin.views.viewer.write_animation", lambda result, path: Path(path).write_text("moves"))
+    monkeypatch.setattr("finger_pin.commands.simulate.Drawing", lambda: nullcontext(Quick()))
+    text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
+    for found in SHOWN.finditer(text):
+        kind, block, code = found.groups(default="")
+        if COMMAND.match(code):
+            run_command(code, shown)
+        elif EXPRESSION.fullmatch(code):
+            eval(code, names)
+        elif code.endswith((".toml", ".csv")):
+            file = Path(code).name
+        elif kind == "bash":
+            for line in block.replace("\\\n", " ").splitlines():
+                for part in line.split(" && "):
+                    run_command(part.strip(), shown)
+        elif kind == "python":
+            # A traceback shows the line of the page.
+            before = "\n" * (text.count("\n", 0, found.start()) + 1)
+            exec(compile(before + block, str(page), "exec"), names)
+        elif kind == "toml":
+            run_scenario(block, file if file.endswith(".toml") else "shown.toml")
+        elif kind == "csv":
+            Path(file).write_text(block, encoding="utf-8")
+        else:
+            assert not kind, f"nothing here knows what {kind} is"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_of_a_page_leads_to_a_file(page):
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[\w-]+)?\)", page.read_text("utf-8")):
+        assert (page.parent / target).exists(), target
+    for name in re.findall(r"`((?:[\w.-]+/)+[\w-]+\.(?:py|toml))`", page.read_text("utf-8")):
+        assert any((base / name).exists() for base in (ROOT, ROOT / "finger_pin", page.parent)), name
+
+
+def test_the_front_page_is_one_page_and_shows_every_command():
+    text = PAGES[0].read_text("utf-8")
+    assert len(text.splitlines()) <= 150
+    page = (ROOT / "scripts" / "README.md").read_text("utf-8")
+    for script in (ROOT / "scripts").glob("*.py"):
+        assert f"## {script.stem}\n" in page
+        assert f"python scripts/{script.name}" in page
