@@ -11,8 +11,10 @@ from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
 from finger_pin.core.inputs import HELD
+from finger_pin.core.law_code import SIDE
 from finger_pin.core.model import MODEL, condense, evaluate, linearise
 from finger_pin.core.tableaus import Tableau
+from finger_pin.core.tables import END, FIRST, KINK
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
@@ -39,6 +41,7 @@ class Integration(NamedTuple):
         k: Scratch for the stages, shape (s, size).
         scratch: Scratch, shape (3, size).
         r: Scratch, shape (size + 1,).
+        kinks: Where each row was between the sides of its kink when the step began, shape (K,).
     """
 
     model: Block
@@ -51,14 +54,71 @@ class Integration(NamedTuple):
     k: Matrix
     scratch: Matrix
     r: Vector
+    kinks: Vector
 
 
 INTEGRATION = kind_of(Integration)
 
 
 @compiled
+def _release(tables: Any, rows: Any) -> None:
+    """Let all rows follow the motion."""
+    for g in range(tables.groups.shape[0]):
+        if tables.groups[g, KINK] >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                rows[SIDE, k] = 0.0
+
+
+@compiled
+def _hold(tables: Any, rows: Any, kinks: Any) -> None:
+    """Hold all rows on the side of their kink where they are."""
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                kinks[k] = rows[column, k]
+                rows[SIDE, k] = np.sign(rows[column, k])
+
+
+@compiled
+def _strayed(tables: Any, rows: Any, kinks: Any) -> Any:
+    """Return the least share of the step after which a held row has left its side; 1 if none has."""
+    share = 1.0
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                if rows[SIDE, k] * rows[column, k] < 0.0:
+                    share = min(share, kinks[k] / (kinks[k] - rows[column, k]))
+    return share
+
+
+@compiled
+def _turn(tables: Any, rows: Any, kinks: Any) -> None:
+    """Turn the held rows that have left their side."""
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                if kinks[k] * rows[column, k] < 0.0:
+                    rows[SIDE, k] = -rows[SIDE, k]
+
+
+@compiled
 def _step(
-    block: Any, linear: Any, tableau: Any, time: float, h: float, fresh: bool, x: Any, k: Any, scratch: Any, r: Any
+    block: Any,
+    tables: Any,
+    rows: Any,
+    linear: Any,
+    tableau: Any,
+    time: float,
+    h: float,
+    fresh: bool,
+    x: Any,
+    k: Any,
+    scratch: Any,
+    r: Any,
+    kinks: Any,
 ) -> int:
     """Try one step: fill the increments k and, in scratch[1], the state at its end.
 
@@ -79,6 +139,8 @@ def _step(
             for c in range(size):
                 state[c] += of_stage * k[j, c]
                 r[c] += of_coupling * k[j, c]
+        if i == 0 and fresh:
+            _release(tables, rows)
         if i > 0 or fresh:
             evaluate(block, time + tableau.nodes[i] * h, state, rate)
         if i == 0:
@@ -87,6 +149,7 @@ def _step(
                     scratch[0, c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return 2
+                _hold(tables, rows, kinks)
                 linearise(block, time, x)
             if not condense(block, g):
                 return 1
@@ -151,12 +214,13 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
     integration = get(block, INTEGRATION)
     model = get(integration.model, MODEL)
     tables, control, linear, tableau = model.tables, model.control, model.linear, integration.tableau
+    rows, kinks = model.work.rows, integration.kinks
     x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
     k, scratch, r = integration.k, integration.scratch, integration.r
     size, count = x.size, tableau.nodes.size
     recorded = 0
     exponent = 1.0 / tableau.order
-    fresh = True
+    fresh, whole = True, 0.0
     # Right after a full record nothing has jumped.
     jumped = control.kind == HELD and memory[HELD_STEP] >= 0.0
     memory[HELD_STEP] = abs(memory[HELD_STEP])
@@ -181,7 +245,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if last:
             h = end - time
         error = np.inf
-        outcome = _step(integration.model, linear, tableau, time, h, fresh, x, k, scratch, r)
+        outcome = _step(integration.model, tables, rows, linear, tableau, time, h, fresh, x, k, scratch, r, kinks)
         if outcome == 2:
             for c in range(size - 1, -1, -1):
                 if not np.isfinite(scratch[0, c]):
@@ -194,6 +258,25 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if outcome == 0:
             error = _error(x, scratch[1], k[count - 1], rtol, atol)
         fresh = False
+        if error <= 1.0:
+            share = _strayed(tables, rows, kinks)
+            if share < 1.0:
+                # A row was held on a side that it has left: what that cost is an error too.
+                evaluate(integration.model, time + h, scratch[1], scratch[2])
+                _turn(tables, rows, kinks)
+                for c in range(size):
+                    r[c] = scratch[2, c]
+                evaluate(integration.model, time + h, scratch[1], scratch[2])
+                _turn(tables, rows, kinks)
+                for c in range(size):
+                    r[c] = h * (scratch[2, c] - r[c])
+                memory[EVALUATIONS] += 2
+                if h > 1e-12 * max(1.0, abs(time)) and not _error(x, scratch[1], r, rtol, atol) <= 1.0:
+                    memory[REJECTED] += 1
+                    memory[CULPRIT] = -1.0
+                    whole = max(whole, h)
+                    memory[STEP] = h * min(0.9, max(0.1, 1.02 * share))
+                    continue
         if not error <= 1e30:
             factor = 0.1
         else:
@@ -227,6 +310,10 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 memory[STEP] = h * factor
             else:
                 memory[STEP] = max(memory[STEP], h * factor)
+            if whole > 0.0:
+                # The step ends at a kink; the one before it says nothing of the next, which may be as long as before.
+                memory[STEP], memory[LAST_STEP] = max(memory[STEP], whole), 0.0
+                whole = 0.0
             if recorded < times.size:
                 times[recorded] = memory[TIME]
                 for c in range(size):
@@ -239,6 +326,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 recorded += 1
             fresh = True
         else:
+            whole = 0.0
             memory[REJECTED] += 1
             memory[CULPRIT] = -1.0
             memory[STEP] = h * min(factor, 0.9)
