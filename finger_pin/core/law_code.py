@@ -23,7 +23,7 @@ _intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsi
 _constant: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsic(prefer_literal=True)
 
 # Columns of the table of rows; the signals of the law follow. Numba reads them as constants.
-LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, FORCE, RATE, SIGNALS = range(9)
+LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, FORCE, RATE, SIGNALS = range(10)
 # Columns of the table of slopes: the force by l, l', z, z', N, u, phi, then z' by l, l', z, N, u, phi.
 F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE = range(7)
 R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, SLOPES = range(7, 14)
@@ -115,8 +115,8 @@ def _put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
 
 @compiled
 def _seen(table: Any, stride: int, k: int) -> Any:
-    length, speed, state, load, command, curvature = _numbers(table, k, stride, 6)
-    return Row(length, speed, state, load, command, curvature)
+    length, speed, state, load, command, curvature, side = _numbers(table, k, stride, 7)
+    return Row(length, speed, state, load, command, curvature, side)
 
 
 def _value(table: Any, numbers: Any, stride: int, begin: int, end: int) -> None:

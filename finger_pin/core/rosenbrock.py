@@ -11,8 +11,10 @@ from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
 from finger_pin.core.inputs import HELD
+from finger_pin.core.law_code import SIDE
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau
+from finger_pin.core.tables import END, FIRST, KINK
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
@@ -39,6 +41,7 @@ class Integration(NamedTuple):
         k: Scratch for the stages, shape (s, size).
         start: Scratch, f(t, x) at the start of a step, shape (size,).
         r: Scratch, shape (size + 1,).
+        kinks: Where each row was between the sides of its kink when the step began, shape (K,).
     """
 
     model: int
@@ -51,9 +54,54 @@ class Integration(NamedTuple):
     k: Matrix
     start: Vector
     r: Vector
+    kinks: Vector
 
 
 INTEGRATION = kind_of(Integration)
+
+
+@compiled
+def _release(tables: Any, rows: Any) -> None:
+    """Let all rows follow the motion."""
+    for g in range(tables.groups.shape[0]):
+        if tables.groups[g, KINK] >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                rows[SIDE, k] = 0.0
+
+
+@compiled
+def _hold(tables: Any, rows: Any, kinks: Any) -> None:
+    """Hold all rows on the side of their kink where they are."""
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                kinks[k] = rows[column, k]
+                rows[SIDE, k] = np.sign(rows[column, k])
+
+
+@compiled
+def _strayed(tables: Any, rows: Any, kinks: Any) -> Any:
+    """Return the least share of the step after which a held row has left its side; 1 if none has."""
+    share = 1.0
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                if rows[SIDE, k] * rows[column, k] < 0.0:
+                    share = min(share, kinks[k] / (kinks[k] - rows[column, k]))
+    return share
+
+
+@compiled
+def _turn(tables: Any, rows: Any, kinks: Any) -> None:
+    """Turn the held rows that have left their side."""
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                if kinks[k] * rows[column, k] < 0.0:
+                    rows[SIDE, k] = -rows[SIDE, k]
 
 
 @compiled
@@ -67,6 +115,7 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
     """
     tableau, x, k, r, start = integration.tableau, integration.x, integration.k, integration.r, integration.start
     size, state, rate = x.size, model.state, model.rate
+    tables, rows, kinks = model.tables, model.work.rows, integration.kinks
     g = 1.0 / (h * tableau.gamma)
     for i in range(tableau.nodes.size):
         for c in range(size):
@@ -77,6 +126,8 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
             for c in range(size):
                 state[c] += of_stage * k[j, c]
                 r[c] += of_coupling * k[j, c]
+        if i == 0 and fresh:
+            _release(tables, rows)
         if i > 0 or fresh:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
@@ -85,6 +136,7 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                     start[c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return 2
+                _hold(tables, rows, kinks)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:
                 return 1
@@ -149,12 +201,13 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
     integration = get(block, INTEGRATION)
     model = bound_at(integration.model, MODEL)
     tables, control, tableau = model.tables, model.control, integration.tableau
+    rows, kinks, r = model.work.rows, integration.kinks, integration.r
     x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
     k, start, reached = integration.k, integration.start, model.state
     size, count = x.size, tableau.nodes.size
     recorded = 0
     exponent = 1.0 / tableau.order
-    fresh = True
+    fresh, whole = True, 0.0
     # Right after a full record nothing has jumped.
     jumped = control.kind == HELD and memory[HELD_STEP] >= 0.0
     memory[HELD_STEP] = abs(memory[HELD_STEP])
@@ -192,6 +245,25 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if outcome == 0:
             error = _error(x, reached, k[count - 1], rtol, atol)
         fresh = False
+        if error <= 1.0:
+            share = _strayed(tables, rows, kinks)
+            if share < 1.0:
+                # A row was held on a side that it has left: what that cost is an error too.
+                call_at(model.evaluate, integration.model, time + h)
+                _turn(tables, rows, kinks)
+                for c in range(size):
+                    r[c] = model.rate[c]
+                call_at(model.evaluate, integration.model, time + h)
+                _turn(tables, rows, kinks)
+                for c in range(size):
+                    r[c] = h * (model.rate[c] - r[c])
+                memory[EVALUATIONS] += 2
+                if h > 1e-12 * max(1.0, abs(time)) and not _error(x, reached, r, rtol, atol) <= 1.0:
+                    memory[REJECTED] += 1
+                    memory[CULPRIT] = -1.0
+                    whole = max(whole, h)
+                    memory[STEP] = h * min(0.9, max(0.1, 1.02 * share))
+                    continue
         if not error <= 1e30:
             factor = 0.1
         else:
@@ -225,6 +297,10 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 memory[STEP] = h * factor
             else:
                 memory[STEP] = max(memory[STEP], h * factor)
+            if whole > 0.0:
+                # The step ends at a kink; the one before it says nothing of the next, which may be as long as before.
+                memory[STEP], memory[LAST_STEP] = max(memory[STEP], whole), 0.0
+                whole = 0.0
             if recorded < times.size:
                 times[recorded] = memory[TIME]
                 for c in range(size):
@@ -237,6 +313,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 recorded += 1
             fresh = True
         else:
+            whole = 0.0
             memory[REJECTED] += 1
             memory[CULPRIT] = -1.0
             memory[STEP] = h * min(factor, 0.9)

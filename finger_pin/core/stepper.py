@@ -100,6 +100,7 @@ class Part:
             k=np.zeros((len(tableau.nodes), len(x))),
             start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
+            kinks=np.zeros(len(tables.state)),
         )
         self._block = block_for(core.INTEGRATION)
         core.bind(self._bound, self._block)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.core.law_code import CURVATURE, SLOPES, addresses, widest
+from finger_pin.core.law_code import CURVATURE, SIGNALS, SLOPES, addresses, widest
 from finger_pin.core.rigid_body import (
     BODY_COLUMNS,
     CENTRE,
@@ -30,7 +30,7 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import FREE_JOINTS
 
 # Columns of the table of groups.
-FIRST, END, STATEFUL, BENT, FED, PRESSED = range(6)
+FIRST, END, STATEFUL, BENT, FED, PRESSED, KINK = range(7)
 
 
 class Tables(NamedTuple):
@@ -53,7 +53,8 @@ class Tables(NamedTuple):
         loaded: Whether forces at the tips count.
         carriers: Body that has the link before each joint, -1 for the base, shape (n,).
         directions: That link's unit vector in its frame, shape (n, 3).
-        groups: First and last + 1 row of each, and whether it has states, bends, inputs, loads, shape (G, 6).
+        groups: First and last + 1 row of each, whether it has states, bends, inputs, loads,
+            and the column of its rows' kink, -1 for none, shape (G, 7).
         laws: Addresses of value, slopes and account, shape (G, 3).
         books: Where stored energy and powers of each group are booked, -1 for none, shape (G, 1 + most powers).
         parameters: Shape (most parameters, K).
@@ -274,11 +275,12 @@ def _read(mechanism: Mechanism) -> Tables:
                     np.any(table.bends),
                     bool(table.inputs) or np.any(table.channels >= 0),
                     bool(table.loads) or np.any(table.pins >= 0),
+                    SIGNALS + table.law.signals.index(table.law.kink) if table.law.kink else -1,
                 )
                 for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
             ],
             dtype=np.int64,
-        ).reshape(-1, 6),
+        ).reshape(-1, 7),
         laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
         books=_books(mechanism),
         parameters=parameters,

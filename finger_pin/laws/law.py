@@ -21,6 +21,8 @@ class Row(NamedTuple):
         load: N, what earlier rows press it with.
         command: u, its input, from the controller or an earlier row.
         curvature: phi, the angle by which its path turns, rad.
+        side: On which side of its law's kink the row is held, 1 or -1; 0 to follow the motion. An integrator holds
+            rows during a step, so that what it integrates is smooth, and ends steps where a row leaves its side.
     """
 
     length: Any
@@ -29,6 +31,12 @@ class Row(NamedTuple):
     load: Any
     command: Any
     curvature: Any
+    side: Any = 0.0
+
+
+def beyond(kink: Any, side: Any) -> Any:
+    """Return 1 where a row is on the positive side of its kink, or is held there; else 0."""
+    return 1.0 * (kink * (side == 0.0) + side > 0.0)
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,8 @@ class Law:
         supplies: Names of the powers that come in.
         losses: Names of the powers that are lost.
         scale: Typical magnitude of the state, for absolute tolerances; None for a law without a state, whose z' is 0.
+        kink: Name of the signal by whose sign the force bends so sharply that steps must not cross it unseen; empty
+            for none. On either side of it, value and slopes are smooth and heed ``Row.side``.
     """
 
     name: str
@@ -58,3 +68,4 @@ class Law:
     supplies: tuple[str, ...] = ()
     losses: tuple[str, ...] = ()
     scale: float | None = None
+    kink: str = ""

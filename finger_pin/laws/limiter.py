@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.laws.law import Law, Row
+from finger_pin.laws.law import Law, Row, beyond
 
 
 def penetration(position: Any, lower: Any, upper: Any) -> Any:
@@ -14,7 +14,7 @@ def penetration(position: Any, lower: Any, upper: Any) -> Any:
     return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
 
 
-def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> Any:
+def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any, side: Any = 0.0) -> Any:
     """Return tau^r = max(0, k d (1 + c d')) with the sign of the penetration, N m.
 
     It enters (18) as -tau^r, so a positive torque acts against positive rotation.
@@ -24,15 +24,17 @@ def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> A
         velocity: theta', rad/s.
         stiffness: k, N m/rad.
         damping: c, s/rad.
+        side: See `Row`: 1 without the clamp, -1 without the contact.
     """
-    return stiffness * depth * np.maximum(0.0, 1.0 + damping * velocity * np.sign(depth))
+    factor = 1.0 + damping * velocity * np.sign(depth)
+    return stiffness * depth * factor * beyond(factor, side)
 
 
-def limiter_slopes(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> tuple[Any, Any]:
+def limiter_slopes(depth: Any, velocity: Any, stiffness: Any, damping: Any, side: Any = 0.0) -> tuple[Any, Any]:
     """Return the derivatives of the limiter torque with respect to theta and theta'; zero inside the range."""
     sign = np.sign(depth)
     factor = 1.0 + damping * velocity * sign
-    touching = np.abs(sign) * (factor > 0.0)
+    touching = np.abs(sign) * beyond(factor, side)
     return stiffness * factor * touching, stiffness * damping * np.abs(depth) * touching
 
 
@@ -49,12 +51,14 @@ def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
 def _value(row: Row, p: Any) -> Any:
     lower, upper, stiffness, damping = p
     depth = penetration(row.length, lower, upper)
-    return -limiter_torque(depth, row.speed, stiffness, damping), 0.0 * row.length, depth
+    # What the contact would exert if it could pull too, over its stiffness.
+    grip = np.abs(depth) + depth * damping * row.speed
+    return -limiter_torque(depth, row.speed, stiffness, damping, row.side), 0.0 * row.length, depth, grip
 
 
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
     _, _, stiffness, damping = p
-    by_length, by_speed = limiter_slopes(signals[0], row.speed, stiffness, damping)
+    by_length, by_speed = limiter_slopes(signals[0], row.speed, stiffness, damping, row.side)
     return (-by_length, -by_speed, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -76,6 +80,7 @@ STROKE_LIMITER = Law(
     value=_value,
     slopes=_slopes,
     account=_account,
-    signals=("depth",),
+    signals=("depth", "grip"),
     losses=("limiter",),
+    kink="grip",
 )

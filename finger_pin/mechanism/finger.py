@@ -153,7 +153,10 @@ class Finger:
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
         self.further = tuple(rows)
-        self.layout = Layout(self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows))
+        ringing = tuple(np.sqrt(2.0 * self.tendons.half_stiffness / self.tendons.mass).tolist())
+        self.layout = Layout(
+            self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows), ringing
+        )
         joints, passive = self.routing.joints, self.routing.passive
         width = len(joints) + passive
         self.mechanism = Mechanism(

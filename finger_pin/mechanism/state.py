@@ -49,12 +49,14 @@ class Layout:
         tendons: Names of the tendons, the passive ones last.
         passive: Number of passive tendons.
         further: Name and scale of every state of further rows, which follow.
+        ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
     """
 
     joints: tuple[str, ...]
     tendons: tuple[str, ...]
     passive: int
     further: tuple[tuple[str, float], ...] = ()
+    ringing: tuple[float, ...] = ()
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -117,11 +119,16 @@ class Layout:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).
 
         Angles 1 rad, velocities 10 rad/s, passive tendon 1 mm and 0.1 m/s, stiction 1 N and 1e-2 N m: the size of
-        each in ordinary motion of a finger, so that one factor serves them all.
+        each in ordinary motion of a finger, so that one factor serves them all. A lumped mass that rings has the
+        velocity that goes with its position: an oscillation too small to matter in the one is not followed in the
+        other.
         """
-        return np.concatenate(
+        scales = np.concatenate(
             [
                 np.repeat([1.0, 1e-3, 10.0, 0.1, 1.0, 1e-2], self.sizes[:-1]),
                 [scale for _, scale in self.further],
             ]
         )
+        if self.ringing:
+            scales[self._parts[3]] = np.maximum(scales[self._parts[3]], scales[self._parts[1]] * self.ringing)
+        return scales
