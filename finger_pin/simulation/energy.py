@@ -103,6 +103,6 @@ def powers(finger: Finger, signals: FingerSignals) -> Powers:
             limiter_loss(signals.limiter_torque, signals.limiter_depth, state.velocity, limiter.stiffness), axis=-1
         ),
         joint_springs=np.sum(spring_loss(state.velocity, finger.springs.damping), axis=-1),
-        # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
+        # Only where a tension is cut: a wrong tension elsewhere then shows in the residual.
         slack=np.sum(np.where(delivered > 0.0, 0.0, (signals.command - loss) * pulled), axis=-1),
     )
