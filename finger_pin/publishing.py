@@ -1,9 +1,9 @@
-"""A set of files that takes the place of another at one instant, for whoever looks, even if a process is killed.
+"""A set of files that takes the place of another at one instant, for every reader, even if a process is killed.
 
 The new set is complete in a hidden folder inside the one that it is for, beside hard links to the earlier set, and a
-symbolic link ``now`` says which of the two counts. While files change places every name in the folder leads through
-``now``: switching that one link is the moment of decision. Then the links give way to the files themselves. Whatever
-instant a process is killed at, every name leads to a file of the same set; the next one who publishes there tidies up.
+symbolic link ``now`` says which of the two is valid. While files change places every name in the folder leads through
+``now``: switching that one link publishes the new set. Then the links give way to the files themselves. At whatever
+instant a process is killed, every name leads to a file of the same set; the next process that publishes tidies up.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ def publish(stage: Path, folder: Path, earlier: Callable[[], Iterable[str]]) -> 
         os.symlink(NEW, hidden / "next")
         os.replace(hidden / "next", hidden / _NOW)
     finally:
-        # Every name leads to the right file by now; who publishes next does what cannot be done.
+        # Every name leads to the right file by now; what cannot be tidied up, the next process does.
         with contextlib.suppress(OSError):
             _tidy(folder)
 
 
 def _claim(stage: Path, hidden: Path) -> None:
-    """Rename a stage; wait for another who is publishing, and tidy up for one who was killed."""
+    """Rename a stage; wait for a process that is publishing, and tidy up for one that was killed."""
     deadline = time.monotonic() + _PATIENCE
     while True:
         try:

@@ -29,7 +29,7 @@ def benchmark(
 ) -> None:
     """Measure the simulator: time against error, against MuJoCo, in steps, in many runs, and as a main job.
 
-    Every part is saved as soon as it is measured, and an interrupted benchmark goes on from there; parts are measured
+    Every part is saved as soon as it is measured, and an interrupted benchmark continues there; parts are measured
     anew when the code has changed. Times are the least of several turns that the compared jobs take in alternation, and
     ratios are of times from one run. Run it on a quiet machine.
     """

@@ -1,4 +1,4 @@
-"""What a finger's statics say without simulating it, self-locking and fingertip forces, and how good (17) is.
+"""Statics: what a finger can do, without a run. Self-locking, fingertip forces, and how good (17) is.
 
 It reads descriptions, fingers, scenarios and results, and nothing of the simulation.
 """

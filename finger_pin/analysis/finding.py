@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 
-# Arrays with more entries than this are told by shape and range.
+# Arrays with more entries than this are printed as shape and range.
 _FEW = 8
 
 

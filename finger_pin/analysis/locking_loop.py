@@ -1,4 +1,4 @@
-"""Self-locking: the joint friction at which the tensions that overcome it are what makes it insuperable.
+"""Self-locking: the joint friction that grows as fast as the tensions that are to overcome it.
 
 The loop. A joint that moves needs a torque against its friction, M_j R_j. The controller (21), (22) supplies it by
 tensions, which it raises until every tendon pulls. The tensions load the joints, (17), and the load makes the friction.
@@ -87,7 +87,7 @@ class FrictionLoop:
         routing = tendons.routing
         closure = routing.force_closure()
         if not closure.holds:
-            raise InputError("finger.tendons", f"{closure}; self-locking is a matter of fingers that can be taut")
+            raise InputError("finger.tendons", f"{closure}; self-locking is defined for fingers with force closure")
         inverse = np.asarray(np.linalg.pinv(routing.coupling.T))
         levels = -inverse / closure.tension[:, None]
         command = inverse + closure.tension[None, :, None] * levels[:, None, :]

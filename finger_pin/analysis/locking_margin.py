@@ -93,7 +93,7 @@ def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
         stacklevel: Of `warnings.warn`, as seen by the caller of this function.
     """
     most = max(1, _CASES // 2 ** len(scenario.finger.passive_names))
-    # Parameters at the edge of what numbers hold have no margin; they shall not be told about arithmetic.
+    # Parameters at the edge of what numbers hold have no margin: warnings of arithmetic would not help.
     with np.errstate(all="ignore"):
         margin = self_locking_margin(scenario, most=most).margin
     text = locking_advice(margin)

@@ -1,1 +1,1 @@
-"""The room commands."""
+"""What a command line does: one file per command, joined by `application`."""

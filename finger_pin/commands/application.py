@@ -1,4 +1,4 @@
-"""All commands under one roof: one parser of command lines, and one place where exceptions become exit codes."""
+"""All commands together: one parser of command lines, and one place where exceptions become exit codes."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
 
 
 def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
-    """Return a command that tells in one line what stopped it, with the notes of the exception, and an exit code."""
+    """Return a command that prints what stopped it in one line, with all notes, and returns an exit code."""
 
     @wraps(command)
     def told(*arguments: Any, **options: Any) -> int:

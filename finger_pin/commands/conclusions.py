@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What measures, judges and draws one conclusion; the name of its figure, its runs, and whom it refuses."""
+    """What measures, judges and draws one conclusion; the name of its figure, its runs, and what refuses a scenario."""
 
     measure: Callable[..., Any]
     judge: Callable[[Any], list[Finding]]
@@ -58,7 +58,7 @@ def conclusions(
         for each in chosen:
             found = each.measure(loaded, progress=progress)
             findings += each.judge(found)
-            # As soon as it is there: who interrupts keeps it.
+            # At once, so that an interruption loses nothing that is finished.
             save_figure(each.draw(found), output / each.figure)
             write_findings(findings, output / "conclusions.csv")
     if not quiet:

@@ -1,4 +1,4 @@
-"""A simulation at a terminal: signals that ask it to stop, a progress bar, and output that may have lost its reader."""
+"""A simulation at a terminal: signals that stop it, a progress bar, and output to a pipe that may be closed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Interrupts:
     In a patient phase the first of them sets `requested`. Every other one raises KeyboardInterrupt.
 
     Attributes:
-        requested: Whether an end has been asked for; to be looked at in patient phases.
+        requested: Whether an end has been asked for; patient phases check it.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ def runs_bar(what: str) -> Iterator[Callable[[int, int, int], None]]:
         def show(finished: int, failed: int, total: int) -> None:
             note = f", {failed} failed" if failed else ""
             if not tasks:
-                # What was found finished took no time, and tells nothing about the time that is left.
+                # Runs that were already finished took no time: the time that is left cannot be estimated from them.
                 bar.remove_task(waiting)
                 tasks.append(bar.add_task("", total=total, completed=finished, failed=note))
             bar.update(tasks[0], completed=finished, total=total, failed=note)
@@ -114,7 +114,7 @@ def complain(program: str, message: str) -> None:
 
 @contextmanager
 def noted(note: str) -> Iterator[None]:
-    """Add a note to what is raised meanwhile: what became of what was done."""
+    """Add a note to any exception raised meanwhile, such as where finished work is."""
     try:
         yield
     except BaseException as error:
@@ -132,7 +132,7 @@ def talks(quiet: bool) -> bool:
 
 
 def print_text(text: str) -> None:
-    """Print to standard output, whose reader may have gone and whose encoding may lack characters."""
+    """Print to standard output, which may be closed and whose encoding may lack characters."""
     encoding = sys.stdout.encoding or "utf-8"
     try:
         print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)

@@ -70,7 +70,7 @@ def note(rows: list[Comparison]) -> str:
     share, tension = (row.passive_error / row.error) ** 2, " and ".join(f"{each:.1f}" for each in row.passive_tension)
     return (
         f"Of the squared error that {row.name} leaves, {share:.0%} is the stretch of the passive tendon: the minimum\n"
-        f"tensions make it carry {tension} N, where its reference (20) reckons with 1 N. A controller that keeps both\n"
+        f"tensions make it carry {tension} N, where its reference (20) assumes 1 N. A controller that keeps both\n"
         "cannot do much better; the rows below change either."
     )
 

@@ -50,7 +50,7 @@ class Drawing:
         """Start the process."""
         pipe = subprocess.PIPE
         command = [sys.executable, "-P", "-m", __name__]
-        # In a session of its own an interrupt from the terminal is told to the one that started it alone.
+        # In a session of its own it gets no interrupt from the terminal; only the process that started it does.
         self.process = subprocess.Popen(
             command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, start_new_session=True
         )
@@ -67,7 +67,7 @@ class Drawing:
         try:
             print(json.dumps(str(folder.absolute())), file=self.process.stdin, flush=True)
         except BrokenPipeError:
-            pass  # What became of it is told when it is waited for.
+            pass  # `wait` reports why it ended.
 
     def wait(self) -> None:
         """Wait until the figures are drawn.
@@ -77,7 +77,7 @@ class Drawing:
             NotDrawn: If they cannot be drawn.
         """
         assert self.process.stdout is not None and self.process.stderr is not None
-        # Its answer is enough: to end takes it a while.
+        # Its answer is enough; its end takes a while.
         answer = self.process.stdout.readline()
         if answer:
             number, text = json.loads(answer)

@@ -18,7 +18,7 @@ def force_capability(
         typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range."),
     ] = None,
     limit: Annotated[str, typer.Option(metavar="N", help="Greatest tension.")] = "20",
-    force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tension is told, N.")] = "0,0,1",
+    force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tensions are printed, N.")] = "0,0,1",
     output: Output = Path("results/force_capability"),
     view: Annotated[bool, typer.Option("--view", help="Show the forces at the fingertip in the viewer.")] = False,
 ) -> None:

@@ -47,7 +47,7 @@ def optimise(
             help="NAME>=VALUE or NAME<=VALUE; repeatable; default self_locking_margin>=1.5 and fingertip_force>=0.8.",
         ),
     ] = [],  # noqa: B006
-    no_constraints: Annotated[bool, typer.Option("--no-constraints", help="Ask for force closure alone.")] = False,
+    no_constraints: Annotated[bool, typer.Option("--no-constraints", help="Require force closure alone.")] = False,
     population: Annotated[int | None, typer.Option(metavar="N", help="Designs of a generation; default 24.")] = None,
     generations: Annotated[int | None, typer.Option(metavar="N", help="Default 20.")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Of the search; default 0.")] = None,
@@ -65,7 +65,7 @@ def optimise(
     """Search for designs that no other one is better than: small, large and bounded metrics over chosen numbers.
 
     Without arguments: the winding radii of the paper's finger, tracking error against peak tension. Force closure is
-    always asked for. The same command again goes on where an earlier one ended, however it ended. For example:
+    always required. The same command again continues where an earlier one ended, however it ended. For example:
 
     optimise fig6 --over controller.gain=0.5:4 --minimise tracking_rms --minimise losses --no-constraints
 

@@ -94,11 +94,11 @@ def number(option: str, text: str | float, *, positive: bool = False) -> float:
 
 
 def folder_name(name: str, *variants: str) -> str:
-    """Return the name of a folder for what is asked for beyond a scenario's own entries.
+    """Return the name of a folder for a scenario and what is changed of it.
 
     Args:
         name: Of the scenario, or of a study on it.
-        variants: Such as ``controller.gain=2``. What a path cannot hold is replaced, and a digest then tells others.
+        variants: Such as ``controller.gain=2``. What a path cannot hold is replaced, and a digest keeps them apart.
     """
     text = ",".join([name, *(re.sub(r"[\s\[\]{}\"']", "", each).replace(":", "_") for each in variants)])
     plain = re.sub(r"[^\w.=,+-]+", "-", text, flags=re.ASCII)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FORCE = "environment.fingertip_force"
 AS_IT_IS = "as it is"
 TEXTS = ("fingertip force", "joint")
-# What of the difference is told, and in which words.
+# The parts of the difference that are reported, with their labels.
 PARTS = {
     "direction": "tendons' direction",
     "weight": "weight",
@@ -40,7 +40,7 @@ def reaction(
     output: Output = Path("results/reaction"),
     quiet: Quiet = False,
 ) -> None:
-    """Tell how good the joint reaction (17) is along a scenario: against weight, inertia and tendons' real paths."""
+    """Measure how good the joint reaction (17) is along a scenario: against weight, inertia and tendons' real paths."""
     changed, shown = overrides(settings), talks(quiet)
     sizes = numbers("--forces", forces) if forces else []
     import numpy as np

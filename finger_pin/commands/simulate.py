@@ -68,7 +68,7 @@ def simulate(
                 with interrupts.patient():
                     folder.write(result)
                 if interrupts.requested:
-                    # Who interrupts wants an end soon: the data are kept, the views are not drawn.
+                    # After an interruption the data are kept, and the views are not drawn: that takes too long.
                     problem = problem or KeyboardInterrupt()
                 else:
                     problem = draw(result, folder, drawing) or problem

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from finger_pin.studies.designs import Design
 
-KEPT = "the same command goes on from what is recorded"
+KEPT = "the same command continues from what is recorded"
 
 
 def sweep(
@@ -62,7 +62,7 @@ def sweep(
 ) -> None:
     """Run a scenario at many points, measure every run, and draw what came out.
 
-    The same command again goes on where an earlier one ended, however it ended. For example:
+    The same command again continues where an earlier one ended, however it ended. For example:
 
     sweep fig6 --over controller.gain=0.5:2:7 --over finger.tendon_friction.coulomb=0.05,0.11,0.2
 
@@ -103,7 +103,7 @@ def sweep(
                     stop=lambda: interrupts.requested,
                 )
             except StudyError as error:
-                # The summary tells what every run died of.
+                # The summary says why runs failed.
                 result = error.result
         if figures and not interrupts.requested:
             from finger_pin.views.plots import plot_sweep, save_figure

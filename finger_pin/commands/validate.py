@@ -1,4 +1,4 @@
-"""The command validate: the simulator against everything that is not ours."""
+"""The command validate: the simulator against independent sources."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def validate(
     only: Annotated[str, typer.Option(metavar="NAMES", help=f"Some of {','.join(FAMILIES)}.")] = ",".join(FAMILIES),
     output: Output = Path("results/validation"),
 ) -> int:
-    """Compare the simulator with everything that is not ours, and write a report.
+    """Compare the simulator with independent sources, and write a report.
 
     Closed forms, published experiments, Pinocchio, yourdfpy, MuJoCo, and the simulator against itself.
 

@@ -69,7 +69,7 @@ def _distribution(scenario: Scenario, finger: Finger) -> Distribution:
     limits = scenario.controller.distribution
     if limits is None and finger.routing.force_closure().holds:
         return PseudoInverse.from_routing(finger.routing)
-    # Importing the solver takes a while, which nobody without limits shall wait for.
+    # Importing the solver takes a while: only where there are limits.
     from finger_pin.control.limited_distribution import LimitedDistribution
 
     maximum = math.inf if limits is None else limits.maximum_tension

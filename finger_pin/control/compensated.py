@@ -1,4 +1,4 @@
-"""The wiring: torque law, then friction of joints and passive tendons, then tensions, then friction of tendons."""
+"""The whole controller: torque, friction of joints and passive tendons, tensions, friction of tendons, in turn."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from finger_pin.control.tendon_feedforward import TendonFeedforward, undivided
 from finger_pin.control.torque import TorqueLaw
 from finger_pin.description.routing import Array, Routing
 
-# Newton's method is done in a few turns; should it go round in circles, plain turns take over.
+# Newton's method converges in a few iterations; if it cycles, plain iteration takes over.
 _SETTLED, _NEWTON, _TURNS = 1e-9, 20, 200
 
 
 @dataclass(frozen=True, eq=False)
 class CompensatedController:
-    """A controller with the face of the paper's, and any of the compensations.
+    """A controller with the interface of the paper's, and any of the compensations.
 
     The torque that the tendons have to exert is tau = tau^d + tau^f(f_hat): friction of the joints grows with the
     tensions, and the tensions with the torque that overcomes it. Below the critical joint friction

@@ -1,4 +1,4 @@
-"""Which way something is meant to slide, told smoothly, and the friction that law (9) then settles at."""
+"""The direction in which something is to slide, as a smooth number, and the friction that law (9) then settles at."""
 
 from __future__ import annotations
 

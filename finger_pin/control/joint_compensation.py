@@ -13,7 +13,7 @@ from finger_pin.mechanism.joint_friction import JointFriction
 class JointCompensation:
     """tau = M(v) R direction(v) + b v, the steady sliding of (9) with the reaction (17) of the planned tensions.
 
-    No external force is known to it. The torque asks for tensions, which load the joints: whoever plans the tensions
+    No external force is known to it. The torque asks for tensions, which load the joints: the plan of the tensions
     closes that loop.
 
     Attributes:

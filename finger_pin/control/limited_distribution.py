@@ -7,7 +7,7 @@ there is one direction and no upper limit binds, it is (21), (22): f^m is orthog
 lambda, and the least lambda that the minimum allows is that of (22).
 
 Where no tensions within the limits exert tau, the nearest torque is exerted, min |H_c^T f - tau|, still within the
-limits, and what is missing is told.
+limits, and what is missing is returned.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a controller learns through sensors: angles in steps, velocities from them, tensions with noise."""
+"""What a controller measures: angles in steps, velocities from them, tensions with noise."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Controllers and references of a user's own: asked for one time at a time, and checked.
 
-Nobody has to vectorise over time, and what is wrong is said at the first answer. What goes wrong later ends the
-simulation there, because a command that is not a number does; what was computed until then is kept.
+They need not work on arrays of times. A wrong answer is refused at the first call. One that comes later ends the
+simulation there, and what was computed is kept.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class OwnController:
         if torque.shape != (len(routing.joints),):
             allowed = f"command() must return {len(routing.joints)} torques for one time, not shape {torque.shape}"
             raise InputError("controller", allowed)
-        # A passive tendon of which nothing is said is planned to carry nothing.
+        # A passive tendon without a planned tension is planned to carry none.
         tension = np.append(tension, np.zeros(len(routing.tendons) - len(tension)))
         return ControlSignals(torque, tension, getattr(found, "shortfall", None))
 

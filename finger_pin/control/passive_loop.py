@@ -12,7 +12,7 @@ from finger_pin.description.routing import Array
 
 
 class PassiveTensionLoop(MeasuringController):
-    """Raises or lowers the internal tension until the passive tendons carry what is wished.
+    """Raises or lowers the internal tension until the passive tendons carry what is desired.
 
     A passive tendon cannot be commanded; (20) only chooses an angle of the follower joint at which, free of friction
     and with the actuated tendons in balance, it would carry f5^d. Here f5^d is also planned: it is the least tension of
@@ -20,8 +20,8 @@ class PassiveTensionLoop(MeasuringController):
 
         f0_5 = max(f0_5, f5^d + k_P e + I),   I' = k_I e,   e = f5^d - f5.
 
-    Where the other tendons' f0 asks for more internal tension than the wish does, (22) has its way and f5 stays above
-    the wish; the integral stops at f0_5 or at its limit. It lasts from sample to sample: one object, one simulation.
+    Where the other tendons' f0 requires more internal tension than f5^d does, (22) decides and f5 stays above
+    f5^d; the integral stops at f0_5 or at its limit. It lasts from sample to sample: one object, one simulation.
 
     Attributes:
         controller: The controller whose internal tension is set.
@@ -46,7 +46,7 @@ class PassiveTensionLoop(MeasuringController):
         """Take measured tensions, shape (t,), N, of which the passive ones count, and the time since the last, s."""
         actuated = self.controller.routing.actuated
         error = self.wish - tension[actuated:]
-        # Below its own f0 a wish has no effect, and an integral that went there would take time to come back.
+        # Below its own f0 the desired tension has no effect; an integral that went there would take time to come back.
         lowest = np.clip(self.controller.minimum[actuated:] - self.wish, -self.limit, 0.0)
         self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)
         self.correction = self.proportional * error + self._sum

@@ -28,7 +28,7 @@ class TendonFeedforward:
 
         f^a = (f (1 + x) + b v) / (1 - x),
 
-    which is f exp(mu_e phi) where M = mu^d and b = 0: the capstan law, upside down. The passive tendons have no
+    which is f exp(mu_e phi) where M = mu^d and b = 0: the inverse of the capstan law. The passive tendons have no
     command; the halves of one carry m (1 + x) and m (1 - x) with mean m, and the difference is a torque that the others
     have to make up for.
 

@@ -1,4 +1,4 @@
-"""The torque that a controller wants at the joints: (19), with damping and with gravity."""
+"""The torque that a controller commands at the joints: (19), with damping and with gravity."""
 
 from __future__ import annotations
 

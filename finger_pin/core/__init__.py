@@ -1,1 +1,1 @@
-"""The compiled core: the laws of the model without Python inside."""
+"""The mechanism compiled: right-hand side, exact Jacobian, Rosenbrock methods and stepper, and scipy's as reference."""

@@ -63,7 +63,7 @@ def _pointer(context: Any, builder: Any, block: Any, value: Any, kind: Any) -> A
 
 @_built_in
 def put(_typing: Any, block: Any, value: Any, kind: Any) -> Any:
-    """Write a value into a block; whoever does must keep the value's arrays alive as long as the block.
+    """Write a value into a block; its arrays must be kept alive as long as the block.
 
     Raises:
         TypingError: If the value is not of the type that `get` will read: another layout would be misread.

@@ -65,7 +65,7 @@ _OPTIONS: dict[str, Any] = {
 
 
 def is_cached() -> bool:
-    """Return whether compiled code is at hand, so that the first simulation starts at once."""
+    """Return whether compiled code is in the cache, so that the first simulation starts at once."""
     return CACHE_FOLDER is not None and any(Path(CACHE_FOLDER).rglob("*.nbi"))
 
 

@@ -1,4 +1,4 @@
-"""A mechanism whose evaluation is compiled: the same face as `Mechanism` where signals are asked for."""
+"""A mechanism whose evaluation is compiled: the same interface as `Mechanism` for signals."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class _Monitor:
 
     def __call__(self, instant: float, x: Array) -> float:
         if self.stop_time < np.inf:
-            # solve_ivp looks for the root of this function: the time to stop at.
+            # solve_ivp finds the root of this function: the time to stop at.
             return self.stop_time - instant
         if not np.all(np.isfinite(x)):
             raise _Broken("the state is not finite")
@@ -175,7 +175,7 @@ def integrate(
 
 
 class _System:
-    """The right-hand side, counted; keeps an exception that it raises, to tell it from one of the solver's."""
+    """The right-hand side, counted; keeps an exception that it raises, to distinguish it from one of the solver's."""
 
     def __init__(self, rhs: Callable[[float, Array], Array]) -> None:
         self.rhs = rhs

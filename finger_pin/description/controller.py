@@ -1,4 +1,4 @@
-"""The controller as data: the paper's (19)-(22), what compensates its errors, and how it is executed."""
+"""The controller as data: the paper's (19)-(22), what compensates its errors, and when it is executed."""
 
 from __future__ import annotations
 
@@ -26,40 +26,40 @@ Share = Annotated[float, real(0.0, 2.0)]
 
 
 class TendonFeedforwardSettings(Description):
-    """Tendon friction by (9) and (16), added to the commands; what is left out is believed as it is in the finger."""
+    """Tendon friction by (9) and (16), added to the commands; what is left out is as in the finger."""
 
     share: Share = quantity(1.0, unit="1", source="chosen", doc="Part of the expected friction that is compensated.")
     reversal_speed: Annotated[float, real(0.0, 10.0, above=True)] = quantity(
         1e-3, unit="m/s", source="chosen", doc="Desired tendon velocity below which a reversal is smoothed."
     )
     coulomb: Annotated[Numbers, reals(0.0, 10.0)] | None = quantity(
-        None, unit="1", source="finger.tendon_friction", doc="mu_e as the controller believes it."
+        None, unit="1", source="finger.tendon_friction", doc="mu_e as the controller estimates it."
     )
     stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] | None = quantity(
-        None, unit="1", source="finger.tendon_friction", doc="rho as the controller believes it."
+        None, unit="1", source="finger.tendon_friction", doc="rho as the controller estimates it."
     )
 
 
 class JointCompensationSettings(Description):
-    """Joint friction by (9) and (17), added to the torque; what is left out is believed as it is in the finger."""
+    """Joint friction by (9) and (17), added to the torque; what is left out is as in the finger."""
 
     share: Share = quantity(1.0, unit="1", source="chosen", doc="Part of the expected friction that is compensated.")
     reversal_speed: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
         0.1, unit="rad/s", source="chosen", doc="Desired joint velocity below which a reversal is smoothed."
     )
     coulomb: Annotated[Numbers, reals(0.0, 0.1)] | None = quantity(
-        None, unit="m", source="finger.joint_friction", doc="M^d as the controller believes it."
+        None, unit="m", source="finger.joint_friction", doc="M^d as the controller estimates it."
     )
     stiction: Annotated[Numbers, reals(0.0, 0.1)] | None = quantity(
-        None, unit="m", source="finger.joint_friction", doc="M^c as the controller believes it."
+        None, unit="m", source="finger.joint_friction", doc="M^c as the controller estimates it."
     )
     viscous: Annotated[Numbers, reals(0.0, 1e6)] | None = quantity(
-        None, unit="N m s/rad", source="finger.joint_friction", doc="b as the controller believes it."
+        None, unit="N m s/rad", source="finger.joint_friction", doc="b as the controller estimates it."
     )
 
 
 class PassiveTensionSettings(Description):
-    """A loop from the measured passive tension to the internal tension; the wish is controller.passive_tension."""
+    """A loop from the measured passive tension to the internal tension; its set point is controller.passive_tension."""
 
     proportional: Annotated[float, real(0.0, 10.0)] = quantity(
         0.0, unit="1", source="chosen", doc="k_P, change of the planned tension over the error of the measured one."
@@ -214,7 +214,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
     for name, signal in (settings.tensions or {}).items():
         entry = f"controller.tensions.{name}"
         if name in finger.passive_names:
-            raise problem(entry, f"is a passive tendon, which nobody pulls; actuated are {', '.join(names)}")
+            raise problem(entry, f"is a passive tendon, which has no actuator; actuated are {', '.join(names)}")
         if name not in names:
             near = nearest(name, names)
             hint = f"; did you mean {near}?" if near else ""

@@ -1,4 +1,4 @@
-"""From TOML to validated descriptions: shipped data, a user's files, overrides, and errors a person can act on."""
+"""From TOML to validated descriptions: shipped data, a user's files, overrides, and one-line errors."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ class Scenario(Description):
         return self
 
     def _check_taut(self, routing: Routing, missing: str) -> None:
-        """Raise unless springs keep the tendons taut that (22) cannot, for want of force closure."""
+        """Raise unless springs keep the tendons taut that (22) cannot without force closure."""
         if not any(joint.spring for joint in self.finger.joints.values()):
             raise problem("finger.tendons", f"{missing}; the controller needs force closure")
         minimum = expand(self.controller.minimum_tension, len(routing.tendons))

@@ -1,4 +1,4 @@
-"""Whether springs at the joints keep tendons taut that nothing else would: fingers without force closure."""
+"""Whether springs at the joints keep all tendons taut in fingers without force closure."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError
 from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
-#: The largest angle of a joint, rad: two turns. In degrees nearly every angle is beyond it.
+#: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
 Numbers = float | tuple[float, ...]
@@ -115,7 +115,7 @@ def series(low: float = -math.inf, high: float = math.inf, hint: str = "") -> Be
 
 
 def choice(*allowed: str) -> BeforeValidator:
-    """Return a validator for one of a few names; a near miss is told the nearest one."""
+    """Return a validator for one of a few names; the error for a misspelt one has the nearest."""
 
     def validate(value: Any) -> Any:
         if value not in allowed:

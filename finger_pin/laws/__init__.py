@@ -1,1 +1,1 @@
-"""The room laws."""
+"""The laws of force, one per file: value, slopes, stored energy, lost power."""

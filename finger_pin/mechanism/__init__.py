@@ -1,1 +1,1 @@
-"""The room mechanism."""
+"""Coordinates and rows: rigid body, tendons, frictions, limiters, how they are joined; URDF and MJCF. No time."""

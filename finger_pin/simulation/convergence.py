@@ -126,7 +126,7 @@ def check_convergence(
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,
 ) -> Convergence:
-    """Repeat a run at a tighter tolerance, and tell how far and where the two part.
+    """Repeat a run at a tighter tolerance, and find how far and where the two part.
 
     Args:
         scenario: What was or is to be simulated.

@@ -125,7 +125,7 @@ def simulate(
     if sampling is not None:
         loop = replace(loop, controller=SampledController(loop, sampling))
     elif own:
-        # What is wrong with an answer of one's own is told before anything is computed.
+        # A wrong answer of a user's own controller is refused before anything is computed.
         loop.evaluate(0.0, loop.initial_state())
 
     def watch(time: float, x: Array) -> None:
@@ -137,7 +137,7 @@ def simulate(
     chunk = _CHUNK if observe is None else _CHUNK_OBSERVED
     trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
     reached = float(trajectory.breakpoints[-1])
-    # A motion at the edge of what numbers hold has energies beyond it: that is told below, in one line.
+    # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         result = record(scenario, loop, trajectory, method)
     if margin is not None:

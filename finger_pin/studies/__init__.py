@@ -1,6 +1,6 @@
 """Studies: many runs of a scenario, measured and kept; sweeps over its entries, and searches for better ones.
 
-From what is asked to what comes out: ``keys`` of a scenario; ``designs`` (and how a command line does the ``spelling``)
+From the question to the answer: ``keys`` of a scenario; ``designs`` (and how a command line does the ``spelling``)
 or the ``problem`` of a ``search``; ``metrics``; ``runs``, and the ``fingerprint`` that they are found by; ``processes``
 or a ``cluster`` that do them; the ``folder`` that keeps them; the ``dataset`` of all. ``sweeping`` and ``optimising``
 put these together. ``many`` returns whole runs instead of metrics. ``comparison`` and ``conclusions`` are studies of

@@ -1,7 +1,7 @@
 """Tasks on a Dask cluster.
 
 The workers need this package, of this very source. The process that asks records every run as it finishes; a worker
-that dies costs the runs that it was at, which Dask gives to others.
+that dies loses the runs that it was doing, which Dask gives to others.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class DaskWorkers:
     _level: int = field(default=logging.NOTSET, init=False, repr=False)
 
     def __enter__(self) -> Self:
-        """Return itself; what the client logs about a lost scheduler is told by an error instead."""
+        """Return itself; an error says instead what the client logs about a lost scheduler."""
         self._level = _LOGGER.level
         _LOGGER.setLevel(logging.CRITICAL)
         return self

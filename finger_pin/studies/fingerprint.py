@@ -19,7 +19,7 @@ import numpy as np
 
 #: Packages whose versions results depend on, and say.
 PACKAGES = ("finger-pin", "numba", "numpy", "pin", "scipy", "xarray")
-# Imports point down, so nothing above the studies has a say in what comes out of them.
+# Imports point down, so nothing above the studies affects their results.
 _ABOVE = {"views", "commands"}
 # What a class has besides what is written in it.
 _OF_CLASSES = {"__dict__", "__weakref__", "__dataclass_fields__", "__dataclass_params__"}
@@ -64,7 +64,7 @@ def code_digest(function: Any) -> str:
 
 
 def _parts(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Iterator[str]:
-    """Give what tells a thing from others; of a module of one's own, only what is used by one of some names."""
+    """Yield what distinguishes a thing from others; of a user's own module, only what is used by one of some names."""
     if thing is None or isinstance(thing, bool | int | float | complex | str | bytes | EllipsisType):
         yield repr(thing)
         return

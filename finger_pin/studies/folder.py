@@ -1,8 +1,8 @@
 """The folder of a study: what was asked, a record of every finished run, and what was made of them.
 
-A record is a line of ``runs.jsonl``, written by one append and synced before its run counts as finished. Whoever is
-killed in the middle of one leaves a torn last line, which the next one to open the file cuts off; the run that it was
-to record is done again.
+A record is a line of ``runs.jsonl``, written by one append and synced before its run counts as finished. A process
+that is killed in the middle of one leaves a torn last line. The next process that opens the file cuts it off, and the
+run is done again.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Store:
         return self._records
 
     def append(self, record: Record) -> None:
-        """Keep a record; once this returns it outlives the process and the power.
+        """Keep a record; once this returns it is on disk.
 
         Raises:
             OSError: If it cannot be written, such as on a full disk.
@@ -94,7 +94,7 @@ class Store:
             try:
                 record = Record.from_json(line.decode())
             except ValueError:
-                # Not a record, whatever it is: its run is done again.
+                # Not a record: its run is done again.
                 continue
             self._records[record.key] = record
 

@@ -29,7 +29,7 @@ def simulate_many(
 ) -> xr.Dataset:
     """Simulate scenarios in parallel processes.
 
-    A process that dies costs its own run, which is done again; this process does the first run and, while the others
+    If a process dies, only its own run is done again; this process does the first run and, while the others
     start, the next ones.
 
     Args:

@@ -85,7 +85,7 @@ def optimise(
         fp.optimise("fig6", ["controller.gain=0.5:4"], minimise=["tracking_rms", "tension_peak"], constraints=[])
 
     A design without force closure, or whose run fails, does not count; it is recorded with its reason. With an
-    ``output`` every finished run is on disk at once, and the same search asked for again goes on where it ended.
+    ``output`` every finished run is on disk at once, and the same search again continues where it ended.
 
     Args:
         scenario: Name or path, as `load_scenario` takes it.
@@ -181,7 +181,7 @@ class _Course:
         )
 
     def _judge(self, record: Record) -> tuple[Array, Array]:
-        """Return objectives and excesses; those of a design that cannot be run are beyond hope."""
+        """Return objectives and excesses; those of a design that cannot be run are worse than all others."""
         if record.status == DONE:
             values, excesses = self.goals.values(record.metrics), self.goals.excesses(record.metrics)
             if np.isfinite(values).all() and not np.isnan(excesses).any():

@@ -18,6 +18,6 @@ spawn._fixup_main_from_path = spawn._fixup_main_from_name = lambda name: None  #
 # Of the code that is loaded here and now.
 source_digest()
 if is_cached():
-    # Should anything be wrong, the processes say so themselves.
+    # If anything is wrong, the processes report it.
     with contextlib.suppress(Exception):
         simulate(load_scenario("fig6", {"simulation.duration": 1e-3}))

@@ -1,6 +1,6 @@
 """Work in processes of this machine: one pool, for studies and for `simulate_many`.
 
-Every process has a pipe of its own, so one that dies, even in the midst of sending a result, costs its own piece of
+Every process has a pipe of its own, so one that dies, even while it sends a result, loses its own piece of
 work and nothing else. That is why this is not a library's pool: in pebble, loky and `concurrent.futures` the processes
 share pipes and locks, and one that is killed while it holds them hangs or breaks the pool.
 
@@ -37,7 +37,7 @@ _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 # How often a request to stop is looked at, s, and how long compiled code is tried for, in simulated time, s.
 _POLL, _GLANCE = 0.1, 1e-3
-# A process may die for a reason outside, such as memory that others took; the same work twice is told.
+# A process may die for a reason outside, such as memory that others took; work that ends two of them is reported.
 _ATTEMPTS = 2
 # Matrices of a finger are too small for several threads to help, and the cores are taken by the processes.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -102,7 +102,7 @@ class Pool:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End all processes, in the midst of whatever they do."""
+        """End all processes at once, whatever they are doing."""
         for worker in list(self._workers):
             self._remove(worker)
 
@@ -128,7 +128,7 @@ class Pool:
             InputError: If processes cannot be started.
         """
         for worker in [each for each in self._workers if each.index is not None]:
-            # It is still at what an earlier call was stopped in.
+            # It is still busy with what an earlier call asked for.
             self._remove(worker)
         waiting, deaths = deque(range(len(items))), Counter[int]()
         if helping:
@@ -157,7 +157,7 @@ class Pool:
                     at, worker.index = worker.index, None
                     if answer is None:
                         self._remove(worker)
-                        # One that dies before it is there is counted apart.
+                        # One that dies while it starts is counted apart.
                         deaths[-1] += not worker.ready
                         if deaths[-1] >= _ATTEMPTS:
                             what = 'no process can be started; put what is run under if __name__ == "__main__":'
@@ -269,7 +269,7 @@ def _send(worker: _Worker, work: bytes) -> None:
     try:
         worker.connection.send_bytes(work)
     except OSError:
-        # It has died; what comes of that is seen where answers are received.
+        # It has died; that is handled where answers are received.
         return
 
 
@@ -293,5 +293,5 @@ def _compile(scenario: Scenario) -> None:
     try:
         simulate(scenario.model_copy(update={"simulation": settings}))
     except FingerPinError:
-        # Why this scenario cannot be simulated is told with its run.
+        # Its run reports why this scenario cannot be simulated.
         return

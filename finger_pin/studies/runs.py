@@ -186,7 +186,7 @@ def execute(task: Task) -> Record:
 
 
 def _identity(metric: Metric) -> list[str]:
-    """Return what tells a metric from others; from all others, if what its code depends on cannot be known."""
+    """Return what distinguishes a metric from others; from all others, if what its code depends on cannot be known."""
     try:
         code = code_digest(metric.measure)
     except UnknownDependency:

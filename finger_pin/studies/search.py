@@ -22,8 +22,8 @@ HOPELESS = 1e6
 class Search:
     """An evolutionary search in the unit cube.
 
-    It knows of the objectives and constraints only what `tell` says, so a search that is told the same again takes the
-    same course: to go on with one is to repeat it with recorded values.
+    It knows of the objectives and constraints only what `tell` says, so a search with the same values takes the
+    same course: one is continued by repeating it with recorded values.
     """
 
     def __init__(self, size: int, objectives: int, constraints: int, population: int, seed: int, start: Array | None):

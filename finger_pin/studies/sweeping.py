@@ -38,7 +38,7 @@ def sweep(
         fp.sweep("fig6", {"controller.gain": [0.5, 1.0, 2.0]}, metrics=["tracking_rms"])
         fp.sweep("fig6", {"simulation.method": ["Rodas4", "Rodas5P"], "simulation.rtol": [1e-4, 1e-6]})
 
-    With an ``output`` every finished run is on disk at once: whoever is killed and asks for the same again goes on
+    With an ``output`` every finished run is on disk at once: after a kill the same call continues
     where it ended; runs that depend on code that has changed since, such as that of a metric, are done anew. A run that
     fails, or a point at which there is no valid scenario, is NaN, with its reason.
 

@@ -102,7 +102,7 @@ def test_a_wrong_entry_is_named_in_one_line(overrides, entry, said):
 
 
 PULLS = [
-    ({"tensions": {"T5": {"offset": 1.0}}}, "controller.tensions.T5", "is a passive tendon, which nobody pulls"),
+    ({"tensions": {"T5": {"offset": 1.0}}}, "controller.tensions.T5", "is a passive tendon, which has no actuator"),
     ({"tensions": {"T7": {"offset": 1.0}}}, "controller.tensions.T7", "no such tendon; actuated are T1, T2, T3, T4"),
     ({"tensions": {"T1": {"offset": 1.0, "amplitude": 1.5}}}, "controller.tensions.T1", "not -0.5 N"),
     ({"gain": 2.0}, "controller.gain", "has no effect"),

@@ -66,7 +66,7 @@ def compare(
         tolerance: How far apart the two may be.
         unit: Of all of them.
         expected: The value of the source; zero where a deviation is measured.
-        known: A difference up to this much is known and explained by the note: it is told, but is no failure.
+        known: A difference up to this much is known and explained by the note: it is reported, but is no failure.
         note: What a reader should know.
     """
     gap = abs(float(measured) - expected)

@@ -1,4 +1,4 @@
-"""Every integrator against the others: one motion, to which they all come."""
+"""Every integrator against the others: all converge to one motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TITLE = "Integrators against each other"
 #: Scenario and how much of it the slowest methods can afford, s.
 WINDOWS = {"fig6": 0.1, "stick_slip": 0.02}
 TOLERANCES = (1e-4, 1e-6, 1e-8)
-#: How far a method may be from the truth at the tightest of them, rad, and how much nearer it must come on the way.
+#: Largest error of a method at the tightest tolerance, rad, and the least factor by which it shrinks on the way.
 LIMIT, GAIN = 2e-8, 30.0
 _RATE = 10_000.0
 

@@ -1,4 +1,4 @@
-"""What must not matter: left and right, and the units of length, mass and time."""
+"""Symmetries: left and right, and the units of length, mass and time, change nothing."""
 
 from __future__ import annotations
 

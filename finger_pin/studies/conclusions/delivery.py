@@ -2,7 +2,7 @@
 
 (21), (22) plan f_hat for all tendons; the last entries are what the passive ones should carry if the others are as
 commanded and nothing else acts. At rest H_c^T f = G while the plan has H_c^T f_hat = tau^d, and f = f_hat but for the
-passive tendons: so a plan is met where tau^d = G. Four things spoil it, and each is switched on by itself here:
+passive tendons: so a plan is met where tau^d = G. Four things make them differ, and each is switched on by itself here:
 
 - *reference*: the proportional controller holds tau^d = 0 only if the references (20) stretch the passive tendons as
   much as their internal tension does, f5^d = lambda f^k_5. Any other f5^d bends finger and tendon against each other.
@@ -60,7 +60,7 @@ class PassiveDelivery:
 
     Attributes:
         scenario: What was varied.
-        causes: Name of what spoils the plan, and the deviation with it alone; slowly but for ``speed``.
+        causes: Name of each cause, and the deviation with it alone; slowly but for ``speed``.
         given: The scenario as it is.
         speeds: Factors of the speed, increasing, shape (v,).
         factors: Factors of both frictions, increasing from 0, shape (m,).
@@ -90,7 +90,7 @@ def passive_delivery(
     factors: tuple[float, ...] = _FACTORS,
     progress: Progress | None = None,
 ) -> PassiveDelivery:
-    """Vary speed and friction of a scenario, and switch on one by one what spoils the plan.
+    """Vary speed and friction of a scenario, and switch on one by one what makes delivery differ from the plan.
 
     Args:
         scenario: What to vary.

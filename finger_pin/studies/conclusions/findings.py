@@ -218,7 +218,7 @@ def delivery_findings(found: PassiveDelivery) -> list[Finding]:
         ),
         Finding(
             "c",
-            "inertia and friction are all that spoils it",
+            "only inertia and friction make it differ",
             f"each by itself: {causes}",
             Verdict.of([found.causes["reference"] < 0.05, found.causes["weight"] < 0.05]),
         ),

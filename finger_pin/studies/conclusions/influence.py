@@ -5,9 +5,9 @@
 - Which friction is felt more when it changes a little: the elasticity d ln(error) / d ln(friction).
 - Which one would be worth removing: the error without either.
 - Which one costs more accuracy for the same energy lost: each alone, scaled to the same work.
-- Which one can stop the finger: joint friction at a critical multiple, where the tensions that overcome it are what
-  makes it insuperable. Tensions grow like 1 / (1 - share of critical) before; so where 1 / tension would reach zero
-  is where the simulated finger grips itself, found without going there.
+- Which one can stop the finger: joint friction at a critical multiple, where it grows as fast as the tensions that
+  are to overcome it. Tensions grow like 1 / (1 - share of critical) before: the simulated finger grips itself where
+  1 / tension would reach zero, which is found by extrapolation.
 """
 
 from __future__ import annotations

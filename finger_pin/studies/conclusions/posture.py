@@ -1,4 +1,4 @@
-"""Conclusion (a): does tendon friction depend on the posture, so much that a controller must know it?"""
+"""Conclusion (a): does tendon friction depend on the posture so much that a controller has to consider it?"""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @styled
 def plot_passive_delivery(found: PassiveDelivery) -> Figure:
-    """Draw (a) plan and delivery of the scenario as it is, (b) what spoils the plan, (c) over speed and friction.
+    """Draw (a) plan and delivery of the scenario as it is, (b) causes of the difference, (c) over speed and friction.
 
     Args:
         found: What the experiment `passive_delivery` returned.
@@ -55,7 +55,7 @@ def _causes(axes: Axes, found: PassiveDelivery) -> None:
     axes.margins(x=0.15)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("delivered off planned (% rms)")
-    axes.set_title("(b) what spoils the plan, each alone")
+    axes.set_title("(b) causes of the difference, each alone")
 
 
 def _grid(axes: Axes, found: PassiveDelivery) -> None:

@@ -1,4 +1,4 @@
-"""The look of every figure: one style, and colours that colour-blind people tell apart."""
+"""The look of every figure: one style, and colours that colour-blind people can distinguish."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ YELLOW = "#F0E442"
 
 #: For joints and other series, in this order.
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
-#: Where there are more series than colours, the next round is told apart by these.
+#: Where there are more series than colours, the next round has these dashes.
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)))
 GREY = "#666666"
 

@@ -21,7 +21,7 @@ from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, sty
 _MAP = "cividis"
 # Values that differ by more than this factor are coloured by their logarithm.
 _WIDE = 50.0
-# Parts of a key that tell a reader nothing.
+# Parts of a key that a label does not need.
 _SILENT = {"finger", "joints", "link", "tendons", "crossings"}
 
 

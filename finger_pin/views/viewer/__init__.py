@@ -1,9 +1,9 @@
 """The finger in a browser: meshcat with tendons along their paths, coloured by tension.
 
 The page is meshcat's own viewer with a player beside it. It is the same page as a file (`write_animation`), served
-while somebody looks at a result (`view`), and during a simulation (`LiveView`). Meshcat's server is not used: it
-listens on every network interface, while this one is bound to the loopback address. Who runs it anyway can have the
-finger there (`draw`).
+while a result is viewed (`view`), and during a simulation (`LiveView`). Meshcat's server is not used: it
+listens on every network interface, while this one is bound to the loopback address. `draw` puts the
+finger into meshcat's own window.
 """
 
 from __future__ import annotations

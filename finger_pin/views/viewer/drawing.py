@@ -1,4 +1,4 @@
-"""A result in the user's own meshcat.Visualizer: the finger moves there, among whatever else stands there."""
+"""A result in the user's own meshcat.Visualizer: the finger moves there, beside the user's own objects."""
 
 from __future__ import annotations
 

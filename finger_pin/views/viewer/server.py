@@ -47,7 +47,7 @@ class PageServer:
             self._changed.notify_all()
 
     def join(self) -> None:
-        """Wait until somebody else closes the server."""
+        """Wait until the server is closed from elsewhere."""
         while self._thread.is_alive():
             self._thread.join(0.2)
 

@@ -44,7 +44,7 @@ _FEW = 25
 def write_video(
     result: xr.Dataset, path: str | os.PathLike[str], *, speed: float = 1.0, rate: float | None = None
 ) -> Path:
-    """Write a result as a film: MP4, for which the program ffmpeg must be at hand, or GIF.
+    """Write a result as a film: MP4, which needs the program ffmpeg, or GIF.
 
     The file appears whole or not at all; an earlier one is replaced.
 
