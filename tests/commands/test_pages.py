@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
 DURATION = 0.02
 SHORTER = {
-    r"(--duration|simulation\.duration:?)( ?)\S+": rf"\1\g<2>{DURATION}",
+    r"--duration \S+": f"--duration {DURATION}",
     r":7\b": ":2",
     r":6:log": ":2:log",
     r"--samples \d+": "--samples 2",
