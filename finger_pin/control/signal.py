@@ -10,16 +10,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator, PPoly
 
 from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.harmonic import harmonic, harmonic_rate
 from finger_pin.laws.quintic import quintic, quintic_rate
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 _ORDER = 6
 
@@ -68,6 +71,9 @@ class Signal:
             raise InputError(name, "times and values must be finite")
         if not np.all(np.diff(times) > 0.0):
             raise InputError(name, "times must increase")
+        # Importing it takes a while, which nobody without samples shall wait for.
+        from scipy.interpolate import PchipInterpolator
+
         return cls(np.zeros((len(columns), 4)), *_joined([PchipInterpolator(times, each) for each in values.T]))
 
     @cached_property
@@ -99,6 +105,8 @@ class Signal:
 def _polynomial(settings: SignalSettings) -> PPoly | None:
     """Return what the kind of a signal adds to the sinusoid, or None."""
     if settings.times is not None:
+        from scipy.interpolate import PchipInterpolator, PPoly
+
         times, values = np.array(settings.times), np.array(settings.values)
         if settings.kind == "samples":
             return PchipInterpolator(times, values)
@@ -108,6 +116,8 @@ def _polynomial(settings: SignalSettings) -> PPoly | None:
         return PPoly(np.array([*(change * term for term in terms), nothing, nothing, values[:-1]]), times)
     if settings.time is None:
         return None
+    from scipy.interpolate import PPoly
+
     start, height = settings.time, settings.height or 0.0
     if settings.duration is None:
         return PPoly(np.array([[0.0, height]]), np.array([start - 1.0, start, start + 1.0]))

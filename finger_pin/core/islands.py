@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from finger_pin.core.inputs import PLANNED, Control, Signal
 from finger_pin.core.tables import Tables
@@ -58,8 +56,7 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
         links.append((row_at + wired, loop_at + loop_of[tables.channel[wired]]))
     first, second = (np.concatenate(side) for side in zip(*links, strict=True))
     total = loop_at + (int(control.loop.max(initial=-1)) + 1 if planned else 0)
-    graph = scipy.sparse.coo_array((np.ones(len(first)), (first, second)), shape=(total, total))
-    labels = connected_components(graph, directed=False)[1]
+    labels = _connected(first, second, total)
     found = []
     for label in dict.fromkeys(labels[:width].tolist()):
         rows = np.flatnonzero(labels[row_at:loop_at] == label)
@@ -172,6 +169,19 @@ def _chosen(signal: Signal, functions: Indices) -> Signal:
         return signal
     coefficients = np.ascontiguousarray(signal.coefficients[:, :, functions])
     return Signal(signal.harmonics[functions], signal.knots, coefficients)
+
+
+def _connected(first: Indices, second: Indices, count: int) -> Indices:
+    """Return for each of some nodes the least one that links lead to."""
+    labels = np.arange(count)
+    while True:
+        before = labels.copy()
+        least = np.minimum(labels[first], labels[second])
+        np.minimum.at(labels, first, least)
+        np.minimum.at(labels, second, least)
+        labels = labels[labels]
+        if np.array_equal(labels, before):
+            return labels
 
 
 def _entries(start: Indices, rows: Indices) -> tuple[Indices, Indices]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-import scipy.optimize
 
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.parameters import FingerDescription
@@ -38,6 +37,9 @@ class Tautness:
     @classmethod
     def of(cls, finger: FingerDescription, routing: Routing, coupling: PassiveCoupling, minimum: Array) -> Tautness:
         """Solve the programmes of all corners; for a finger without force closure, whose spare tension is finite."""
+        # Importing it takes a while, which only who needs it shall wait for.
+        from scipy.optimize import linprog
+
         joints = list(finger.joints.values())
         stiffness = np.array([joint.spring.stiffness if joint.spring else 0.0 for joint in joints])
         rest = np.array([joint.spring.rest if joint.spring else 0.0 for joint in joints])
@@ -50,7 +52,7 @@ class Tautness:
             base[free] = corner
             posture = coupling.matrix @ base + coupling.offset
             torque = stiffness * (posture - rest) - routing.coupling.T @ minimum
-            found = scipy.optimize.linprog(
+            found = linprog(
                 np.append(np.zeros(tendons), -1.0),
                 A_eq=np.hstack([routing.coupling.T / scale, np.zeros((len(joints), 1))]),
                 b_eq=torque / scale,

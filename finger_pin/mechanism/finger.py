@@ -153,7 +153,7 @@ class Finger:
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
         self.further = tuple(rows)
-        ringing = tuple(np.sqrt(2.0 * self.tendons.half_stiffness / self.tendons.mass).tolist())
+        ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
             self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows), ringing
         )

@@ -98,7 +98,7 @@ def still(finger, samples=3):
     angles = dict.fromkeys(("joint_position", "joint_reference"), (("time", "joint"), position))
     places = {"time": 0.1 * np.arange(samples), "joint": list(finger.routing.joints)}
     return xr.Dataset(
-        {**at_joints, **at_tendons, **angles},
+        {**at_joints, **at_tendons, **angles, "fingertip_force": (("time", "axis"), np.zeros((samples, 3)))},
         {**places, "tendon": list(finger.routing.tendons)},
         {"scenario": fp.to_toml(bending(finger.description))},
     )

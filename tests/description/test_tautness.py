@@ -139,7 +139,7 @@ def test_a_finger_that_tendons_only_close_is_simulated_against_its_springs(flexo
 
 
 def test_tensions_never_fall_below_the_minimum_whatever_torque_is_asked_for(flexors):
-    controller = fp.build_controller(fp.load_scenario(flexors))
+    controller = fp.control.build_controller(fp.load_scenario(flexors))
     for torque in np.random.default_rng(2).normal(0.0, 0.1, (50, 2)):
         plan = controller.distribution.plan(torque, controller.minimum)
         assert plan.tension.min() >= 0.2
@@ -168,8 +168,8 @@ def test_without_springs_force_closure_is_asked_for_as_before(flexors):
 
 def test_the_paper_s_controller_holds_the_springs_where_it_is_told_to(tmp_path):
     sprung = {"finger.joints.medial.spring": {"stiffness": 0.05, "rest": -0.2}}
-    plain = fp.build_controller(fp.load_scenario("fig6", sprung))
-    told = fp.build_controller(fp.load_scenario("fig6", sprung | {"controller.spring_compensation": True}))
+    plain = fp.control.build_controller(fp.load_scenario("fig6", sprung))
+    told = fp.control.build_controller(fp.load_scenario("fig6", sprung | {"controller.spring_compensation": True}))
     position = np.array([0.0, 0.3, 0.6, 0.4])
     torques = []
     for controller in (plain, told):
