@@ -23,6 +23,10 @@ class MicroDampingWarning(ScenarioWarning):
     """The micro-damping of a law (9) is more than its viscous friction covers: friction can drive motion."""
 
 
+class AccuracyWarning(ScenarioWarning):
+    """The error of a result is far more than its tolerances suggest."""
+
+
 class SelfLockingWarning(ScenarioWarning):
     """A scenario comes close to the joint friction at which its finger locks itself, or exceeds it."""
 

@@ -100,6 +100,7 @@ class Part:
             k=np.zeros((len(tableau.nodes), len(x))),
             start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
+            drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
         )
         self._block = block_for(core.INTEGRATION)
@@ -237,6 +238,17 @@ class Stepper:
         return self._charts.packed_places(self._places(island))
 
     @property
+    def estimated_error(self) -> float:
+        """Estimate of the error of the joints' angles so far, root mean square over joints and time, rad.
+
+        The local errors are carried along the linearised flow. A motion that is sensitive makes it grow, mostly by
+        more than the error itself.
+        """
+        sizes = [len(part.tables.parents) for part in self.parts]
+        total = sum(size * part.memory[core.DRIFT] for size, part in zip(sizes, self.parts, strict=True))
+        return float(np.sqrt(total / (max(sum(sizes), 1) * self.time))) if self.time > 0.0 else 0.0
+
+    @property
     def time(self) -> float:
         """Time that all have reached, s."""
         return min(part.time for part in self.parts)
@@ -307,6 +319,8 @@ def failure(part: Part, status: int, names: list[str]) -> str:
         )
     if status == core.NOT_FINITE:
         return f"the rate of {culprit} is not finite"
+    if status == core.RUNAWAY:
+        return f"{culprit} is beyond {core.FASTEST:g} rad/s (or m/s): the motion has left every physical range"
     return ""
 
 

@@ -41,6 +41,7 @@ class Trajectory:
         statistics: The cost.
         failure: What the integrator reported if it failed, otherwise empty.
         interrupted: Whether it was asked to stop.
+        estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
     """
 
     breakpoints: Array
@@ -48,6 +49,7 @@ class Trajectory:
     statistics: Statistics
     failure: str = ""
     interrupted: bool = False
+    estimated_error: float = np.nan
 
 
 class _Broken(Exception):

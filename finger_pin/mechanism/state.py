@@ -120,8 +120,8 @@ class Layout:
 
         Angles 1 rad, velocities 10 rad/s, passive tendon 1 mm and 0.1 m/s, stiction 1 N and 1e-2 N m: the size of
         each in ordinary motion of a finger, so that one factor serves them all. A lumped mass that rings has the
-        velocity that goes with its position: an oscillation too small to matter in the one is not followed in the
-        other.
+        velocity that goes with 1 % of its position: an oscillation too small to matter in the one is not followed
+        in the other.
         """
         scales = np.concatenate(
             [
@@ -130,5 +130,5 @@ class Layout:
             ]
         )
         if self.ringing:
-            scales[self._parts[3]] = np.maximum(scales[self._parts[3]], scales[self._parts[1]] * self.ringing)
+            scales[self._parts[3]] = np.maximum(scales[self._parts[3]], 1e-5 * np.array(self.ringing))
         return scales

@@ -103,8 +103,8 @@ def _own(result: xr.Dataset) -> list[str]:
 
 def _warnings(result: xr.Dataset) -> list[str]:
     advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
-    driving = str(result.attrs.get("micro_damping", ""))
-    return [line for each in (advice, driving) if each for line in textwrap.wrap(f"Warning: {each}", 80)]
+    told = (advice, *(str(result.attrs.get(name, "")) for name in ("micro_damping", "accuracy", "ringing")))
+    return [line for each in told if each for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:
@@ -172,7 +172,9 @@ def _cost(result: xr.Dataset) -> list[str]:
     attributes = result.attrs
     wall = float(attributes["solver_wall_time"])
     factor = f"{attributes['end_time'] / wall:.3g}" if wall > 0.0 else "-"
+    error = attributes.get("estimated_error")
     return [
+        *([] if error is None else [f"Estimated error of the joint angles: {error:.0e} rad rms"]),
         f"Solver: {attributes['solver_steps']} steps, {attributes['solver_evaluations']} evaluations, "
         f"{attributes['solver_jacobians']} Jacobians",
         f"Wall time {wall:.3g} s, real-time factor {factor} (simulated over wall time)",

@@ -211,7 +211,7 @@ def test_a_step_ends_finite_or_says_why_it_stopped(table, scale, pulls, steps, m
     if description is None:
         return
     simulator = Simulator(fp.Finger(description), method=method)
-    tension = scale * np.array(pulls[: len(description.actuated_names)])
+    tension = scale * np.abs(pulls[: len(description.actuated_names)])
     try:
         for dt in steps:
             simulator.step(tension, dt, force)

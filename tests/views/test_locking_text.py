@@ -19,9 +19,11 @@ def test_every_number_says_its_tendon_friction_and_posture_and_a_finger_that_loc
     assert "without tendon friction" in without
     for name in scenario.finger.joints:
         locks, has = map(float, re.search(rf"{name} +([0-9.]+) +([0-9.]+)", without).groups())
-        assert locks == pytest.approx(1e3 * fp.critical_friction(scenario.finger, joints=[name]).coefficient, abs=1e-3)
+        assert locks == pytest.approx(
+            1e3 * fp.analysis.critical_friction(scenario.finger, joints=[name]).coefficient, abs=1e-3
+        )
         assert has == pytest.approx(1e3 * friction)
-    margin = fp.self_locking_margin(scenario)
+    margin = fp.analysis.self_locking_margin(scenario)
     for block in (somewhere, moving):
         assert "With the friction of the tendons" in block and WORDS[friction > 7.5e-4] in block
     assert f"{1.0 / margin.margin:.3g} times what locks it, at {margin.time:.3g} s" in moving
@@ -30,7 +32,7 @@ def test_every_number_says_its_tendon_friction_and_posture_and_a_finger_that_loc
 
 def test_the_posture_at_which_it_locks_first_is_named_where_postures_differ():
     bent = fp.load_scenario("fig6", {"finger.tendons.T5.crossings.distal.bends": True})
-    found = fp.self_locking_map(fp.Finger(bent.finger))
+    found = fp.analysis.self_locking_map(fp.Finger(bent.finger))
     medial = found.angles[1][np.argmin(found.coefficient.min(axis=0))]
     assert f"locks at {1e3 * found.coefficient.min():.3f}, at proximal " in summarize_locking(bent)
     assert f"medial {np.rad2deg(medial):.3g} deg" in summarize_locking(bent)

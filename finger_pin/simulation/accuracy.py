@@ -1,0 +1,116 @@
+"""What a user should know of a run before trusting it: its own error, what rings in it, whether it fits in memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.core.textbook import Trajectory
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+
+# A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
+_EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
+# The estimate that is carried along is mostly too large: only from so many times the expected error on is it checked.
+_DOUBTED = 30.0
+_TIGHTER = 10.0
+# Where joint friction is above half of what locks the finger, small forces make large tensions.
+_CLOSE_TO_LOCKING = 2.0
+# More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
+# radian, and steps follow it if they are shorter than so many radians.
+_MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
+
+
+def expected_error(scenario: Scenario) -> float:
+    """Return the error of the joints' angles that the tolerances let a user expect, rad rms."""
+    settings = scenario.simulation
+    return min(_EXPECTED * max(settings.rtol, settings.atol_scale), _MOST_EXPECTED)
+
+
+def estimate_error(
+    scenario: Scenario, trajectory: Trajectory, repeated: Callable[[Scenario], Trajectory], *, margin: float
+) -> tuple[float, str]:
+    """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
+
+    Where the estimate that the integration carried along is large, or the finger is close to self-locking, where the
+    linearised flow does not show how far slips go, the run is repeated at a tighter tolerance, and the difference
+    counts.
+
+    Args:
+        scenario: What was simulated.
+        trajectory: Its solution.
+        repeated: Integrates the scenario with other tolerances.
+        margin: Of the joints' friction to what locks the finger; infinite where not known.
+    """
+    expected, error = expected_error(scenario), trajectory.estimated_error
+    doubted = error > _DOUBTED * expected or (margin < _CLOSE_TO_LOCKING and np.isfinite(error))
+    if not doubted or trajectory.failure or trajectory.interrupted:
+        return error, ""
+    settings = scenario.simulation
+    tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in ("rtol", "atol_scale")}
+    other = repeated(scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)}))
+    times = scenario.sample_times()
+    times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
+    difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]
+    error = float(np.sqrt(np.mean(difference**2)))
+    if error <= expected:
+        return error, ""
+    return error, (
+        f"the run errs by about {error:.1g} rad rms: repeated at rtol {tighter['rtol']:g} it differs by that. "
+        "The motion is sensitive, as close to self-locking or in a loop that hunts; "
+        "try a smaller simulation.rtol and atol_scale"
+    )
+
+
+def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
+    """Return what rings undamped where a run took many short steps, and at which frequency; else empty.
+
+    The modes are those of the Jacobian of the whole at the last state.
+    """
+    reached, steps = float(trajectory.breakpoints[-1]), trajectory.statistics.steps
+    if steps < _MANY or reached > _SHORT * steps:
+        return ""
+    x, scales = trajectory.interpolate(np.array([reached]))[0], loop.finger.layout.scales()
+    values, modes = np.linalg.eig(_jacobian(loop, reached, x, scales))
+    followed = values.imag * reached / steps < _FOLLOWED
+    rings = (values.imag > 0.0) & (np.abs(values.real) < _DECAY * values.imag) & followed
+    if not rings.any():
+        return ""
+    fastest = int(np.argmax(np.where(rings, values.imag, 0.0)))
+    name = loop.finger.layout.names[int(np.argmax(np.abs(modes[:, fastest])))]
+    return (
+        f"{name} rings almost undamped at {values[fastest].imag / (2.0 * np.pi):.3g} Hz, and steps of "
+        f"{reached / steps:.1g} s on average follow it; more viscous friction, a softer spring or more mass there helps"
+    )
+
+
+def _jacobian(loop: ClosedLoop, time: float, x: Array, scales: Array) -> Array:
+    """Return df/dx by differences, in units of the scales, shape (size, size)."""
+    steps = 1e-7 * np.maximum(np.abs(x), 1e-2 * scales)
+    columns = [
+        (loop.rhs(time, x + step) - loop.rhs(time, x - step)) / (2.0 * step[i]) for i, step in enumerate(np.diag(steps))
+    ]
+    return np.array(columns).T / scales[:, None] * scales
+
+
+def check_memory(scenario: Scenario) -> None:
+    """Refuse a result that cannot fit into the machine's memory.
+
+    Raises:
+        InputError: Naming the sample rate.
+    """
+    settings, finger = scenario.simulation, scenario.finger
+    samples = settings.duration * settings.sample_rate
+    # Every signal of a result, and what it is computed from: measured, 2 kB a sample for 4 joints and 5 tendons.
+    needed = samples * 8.0 * (30 * len(finger.joints) + 15 * len(finger.tendons) + 60)
+    present = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else np.inf
+    if needed > present:
+        allowed = (
+            f"{samples:.3g} samples need about {needed / 2**30:.3g} GiB of memory, of which there are "
+            f"{present / 2**30:.3g}; must be at most {settings.sample_rate * present / needed:.3g}"
+        )
+        raise InputError("simulation.sample_rate", allowed, settings.sample_rate)

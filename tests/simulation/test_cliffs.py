@@ -1,0 +1,128 @@
+"""Runs that once took millions of steps, gigabytes, or a wrong number without a word."""
+
+import os
+import warnings
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.exceptions import AccuracyWarning
+from finger_pin.simulation import accuracy
+from finger_pin.views.summary import summarize
+
+LINK = {"length": 0.04, "width": 0.015, "mass": 5e-3}
+
+
+def one_joint(limiter, **sections):
+    """One joint with two opposed tendons, 0.45 rad beyond its limit at the start."""
+    tendon = {"curvature_offset": 0.5}
+    table = {
+        "name": "one",
+        "finger": {
+            "name": "one",
+            "joints": {"j": {"range": [-0.5, 0.5], "link": LINK}},
+            "tendons": {name: tendon | {"crossings": {"j": {"radius": r}}} for name, r in (("A", 6e-3), ("B", -6e-3))},
+            "stroke_limiter": limiter,
+        },
+        "controller": {"gain": 1.0},
+        "reference": {"joints": {"j": {"offset": 0.0}}},
+        "simulation": {"duration": 0.1, "initial": {"position": {"j": 0.95}}},
+    }
+    for name, entries in sections.items():
+        table[name] = table[name] | entries
+    return table
+
+
+def steps_of(table, tolerance):
+    table["simulation"] |= {"rtol": tolerance, "atol_scale": tolerance}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fp.ScenarioWarning)
+        return fp.simulate(fp.Scenario.model_validate(table)).attrs["solver_steps"]
+
+
+@pytest.mark.parametrize("limiter", [{"stiffness": 500.0, "damping": 100.0}, {"stiffness": 5e4, "damping": 10.0}])
+@pytest.mark.parametrize("pull", [0.3, 0.9])
+def test_a_looser_tolerance_never_costs_more_where_a_joint_creeps_out_of_its_limiter(limiter, pull):
+    # Pushed outwards by its controller, the joint leaves along the clamp 1 + c theta' = 0.
+    table = one_joint(limiter, reference={"joints": {"j": {"offset": pull + 0.9}}})
+    counts = [steps_of(table, tolerance) for tolerance in (1e-3, 1e-4, 1e-6, 1e-8)]
+    assert all(looser <= 1.1 * tighter for looser, tighter in pairwise(counts))
+
+
+def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
+    table = one_joint({"stiffness": 0.0})
+    table["finger"]["joints"]["j"]["link"] = {"length": 0.01, "width": 0.01, "mass": 1e-5}
+    table["controller"]["gain"] = 1e3
+    with pytest.raises(fp.IntegrationError, match=r"joint_velocity\[j\] is beyond 100000 rad/s .* physical range"):
+        fp.simulate(fp.Scenario.model_validate(table))
+
+
+def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in_the_summary(fig6_runs):
+    result = fig6_runs["Rodas5P"]
+    tight = {"simulation.duration": 0.15, "simulation.rtol": 1e-10, "simulation.atol_scale": 1e-10}
+    exact = fp.simulate(fp.load_scenario("fig6", tight))
+    error = float(np.sqrt(np.mean((result.joint_position - exact.joint_position) ** 2)))
+    assert 0.1 * error < result.attrs["estimated_error"] < 100.0 * error
+    assert "accuracy" not in result.attrs
+    assert "Estimated error of the joint angles" in summarize(result)
+
+
+def test_a_run_that_errs_by_far_more_than_its_tolerance_says_so(monkeypatch):
+    # The paper's finger near self-locking, held to less than a user may expect at this tolerance.
+    overrides = {"simulation.duration": 0.3, "controller.gain": 10.0, "simulation.rtol": 1e-4,
+                 "simulation.atol_scale": 1e-4, "finger.joint_friction.coulomb": 2.9e-3,
+                 "finger.joint_friction.stiction": 4.0e-3}  # fmt: skip
+    scenario = fp.load_scenario("fig6", overrides)
+    monkeypatch.setattr(accuracy, "_MOST_EXPECTED", 1e-5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fp.ScenarioWarning)
+        warnings.simplefilter("always", AccuracyWarning)
+        with pytest.warns(AccuracyWarning, match="errs by about"):
+            result = fp.simulate(scenario)
+    exact = fp.load_scenario("fig6", overrides | {"simulation.rtol": 1e-8, "simulation.atol_scale": 1e-8})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fp.ScenarioWarning)
+        difference = fp.simulate(exact).joint_position - result.joint_position
+    error = float(np.sqrt(np.mean(difference**2)))
+    assert 0.3 * error < result.attrs["estimated_error"] < 3.0 * error
+    assert "Warning: the run errs by about" in summarize(result).replace("\n", " ")
+
+
+def test_what_rings_in_a_slow_run_is_named_with_its_frequency(monkeypatch):
+    monkeypatch.setattr(accuracy, "_MANY", 100)
+    overrides = {
+        "simulation.duration": 1e-3,
+        "finger.passive_tendon.mass": 1e-7,
+        "finger.tendon_friction.viscous": 0.0,
+        "finger.tendon_friction.coulomb": 0.0,
+        "simulation.initial.velocity.distal": 50.0,
+    }
+    result = fp.simulate(fp.load_scenario("fig6", overrides))
+    # A mass between two halves of K_h = 2 K_t.
+    frequency = np.sqrt(2 * 2 * 5e4 / 1e-7) / (2.0 * np.pi)
+    name, _, rest = result.attrs["ringing"].partition(" rings almost undamped at ")
+    assert name in ("passive_velocity[T5]", "passive_position[T5]")
+    assert float(rest.split(" Hz")[0]) == pytest.approx(frequency, rel=0.15)
+
+
+def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monkeypatch):
+    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**18}
+    monkeypatch.setattr(os, "sysconf", pages.__getitem__)
+    scenario = fp.load_scenario("fig6", {"simulation.sample_rate": 5e5})
+    with pytest.raises(
+        fp.InputError, match=r"^simulation.sample_rate = 500000.0: .* GiB of memory, .* at most"
+    ) as found:
+        fp.simulate(scenario)
+    fitting = float(str(found.value).rsplit(" ", 1)[-1])
+    accuracy.check_memory(fp.load_scenario("fig6", {"simulation.sample_rate": 0.99 * fitting}))
+
+
+def test_a_simulator_refuses_what_is_no_time_and_tensions_that_push(finger):
+    simulator = fp.Simulator(finger)
+    with pytest.raises(fp.InputError, match=r"^dt = .*above 0"):
+        simulator.step([1.0] * 4, "a")
+    with pytest.raises(fp.InputError, match=r"^tension = .*must not be negative"):
+        simulator.step([1.0, -1.0, 1.0, 1.0], 1e-3)
+    assert simulator.time == 0.0
