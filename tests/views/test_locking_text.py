@@ -19,9 +19,8 @@ def test_every_number_says_its_tendon_friction_and_posture_and_a_finger_that_loc
     assert "without tendon friction" in without
     for name in scenario.finger.joints:
         locks, has = map(float, re.search(rf"{name} +([0-9.]+) +([0-9.]+)", without).groups())
-        assert locks == pytest.approx(
-            1e3 * fp.analysis.critical_friction(scenario.finger, joints=[name]).coefficient, abs=1e-3
-        )
+        critical = fp.analysis.critical_friction(scenario.finger, joints=[name]).coefficient
+        assert locks == pytest.approx(1e3 * critical, abs=1e-3)
         assert has == pytest.approx(1e3 * friction)
     margin = fp.analysis.self_locking_margin(scenario)
     for block in (somewhere, moving):
