@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -47,7 +48,7 @@ def test_a_looser_tolerance_never_costs_more_where_a_joint_creeps_out_of_its_lim
     # Pushed outwards by its controller, the joint leaves along the clamp 1 + c theta' = 0.
     table = one_joint(limiter, reference={"joints": {"j": {"offset": pull + 0.9}}})
     counts = [steps_of(table, tolerance) for tolerance in (1e-3, 1e-4, 1e-6, 1e-8)]
-    assert all(looser <= 1.1 * tighter for looser, tighter in zip(counts[:-1], counts[1:], strict=True))
+    assert all(looser <= 1.1 * tighter for looser, tighter in pairwise(counts))
 
 
 def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
@@ -75,6 +76,7 @@ def test_a_run_that_errs_by_far_more_than_its_tolerance_says_so(monkeypatch):
                  "finger.joint_friction.stiction": 2.1e-3}  # fmt: skip
     scenario = fp.load_scenario("fig6", overrides)
     monkeypatch.setattr(accuracy, "_MOST_EXPECTED", 1e-5)
+    monkeypatch.setattr(accuracy, "_CLOSE_TO_LOCKING", 3.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fp.ScenarioWarning)
         warnings.simplefilter("always", AccuracyWarning)
