@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from itertools import count
 
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.textbook import Trajectory
+from finger_pin.core.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+
+#: Steps between two looks at a compiled simulation.
+CHUNK = 256
 
 # A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
 _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
 # The estimate that is carried along is mostly too large: only from so many times the expected error on is it checked.
 _DOUBTED = 30.0
 _TIGHTER = 10.0
-# Where joint friction is above half of what locks the finger, small forces make large tensions.
-_CLOSE_TO_LOCKING = 2.0
+# Where joint friction is above two thirds of what locks the finger, small forces make large tensions.
+_CLOSE_TO_LOCKING = 1.5
+# The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
+_PATIENCE = 5
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
@@ -32,7 +38,7 @@ def expected_error(scenario: Scenario) -> float:
 
 
 def estimate_error(
-    scenario: Scenario, trajectory: Trajectory, repeated: Callable[[Scenario], Trajectory], *, margin: float
+    scenario: Scenario, trajectory: Trajectory, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
 ) -> tuple[float, str]:
     """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
 
@@ -43,7 +49,7 @@ def estimate_error(
     Args:
         scenario: What was simulated.
         trajectory: Its solution.
-        repeated: Integrates the scenario with other tolerances.
+        repeated: Integrates the scenario with other tolerances until it is asked to stop.
         margin: Of the joints' friction to what locks the finger; infinite where not known.
     """
     expected, error = expected_error(scenario), trajectory.estimated_error
@@ -52,7 +58,10 @@ def estimate_error(
         return error, ""
     settings = scenario.simulation
     tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in ("rtol", "atol_scale")}
-    other = repeated(scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)}))
+    looks = count()
+    most = _PATIENCE * (1 + trajectory.statistics.steps // CHUNK)
+    tightened = scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
+    other = repeated(tightened, lambda: next(looks) >= most)
     times = scenario.sample_times()
     times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
     difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]

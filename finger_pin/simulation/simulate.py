@@ -32,7 +32,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import AccuracyWarning, InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import check_memory, estimate_error, ringing
+from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, ringing
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -42,8 +42,8 @@ _TIGHT = 1e-8
 _ADVICE_TIGHT = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
 _ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within the joints' ranges"
 _CONTINUOUS = "Radau"
-# Steps between two looks at a compiled simulation: rarely for a progress bar, often for an observer.
-_CHUNK, _CHUNK_OBSERVED = 256, 4
+# Steps between two looks at a compiled simulation that is observed.
+_CHUNK_OBSERVED = 4
 
 
 def simulate(
@@ -140,13 +140,15 @@ def simulate(
         if observe is not None:
             observe(time, loop.evaluate(time, x))
 
-    chunk = _CHUNK if observe is None else _CHUNK_OBSERVED
+    chunk = CHUNK if observe is None else _CHUNK_OBSERVED
     trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(
         scenario,
         trajectory,
-        lambda other: _integrate(other, loop, method, lambda time, x: None, _CHUNK, stop),
+        lambda other, enough: _integrate(
+            other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or (stop is not None and stop())
+        ),
         margin=math.inf if margin is None else margin,
     )
     slow = ringing(loop, trajectory)

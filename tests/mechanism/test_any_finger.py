@@ -200,7 +200,7 @@ def test_a_run_ends_finite_and_accounted_for_or_says_why_it_stopped(table):
 @given(
     fingers(closed=False),
     magnitude(1e-3, 1e5, 1.0),
-    st.lists(between(-0.2, 1.0), min_size=9, max_size=9),
+    st.lists(between(0.0, 1.0), min_size=9, max_size=9),
     st.lists(magnitude(1e-5, LONGEST), min_size=1, max_size=3),
     st.sampled_from(["Rodas5P", "Rodas4"]),
     FORCES,
