@@ -7,6 +7,7 @@ from collections.abc import Callable
 from itertools import count
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import Stop, Trajectory
@@ -26,6 +27,8 @@ _TIGHTER = 10.0
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
 _PATIENCE = 5
+# The share of the energy exchanged to which an account has to close, and what is too little to count, J.
+_OPEN, _NOTHING = 1e-4, 1e-12
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
@@ -72,6 +75,23 @@ def estimate_error(
         f"the run errs by about {error:.1g} rad rms: repeated at rtol {tighter['rtol']:g} it differs by that. "
         "The motion is sensitive, as close to self-locking or in a loop that hunts; "
         "try a smaller simulation.rtol and atol_scale"
+    )
+
+
+def open_account(result: xr.Dataset) -> str:
+    """Return what to say if a result's energy account does not close to a ten thousandth of all energy exchanged."""
+    exchanged = sum(
+        float(np.abs(values.values).max())
+        for name, values in result.variables.items()
+        if str(name).startswith("energy_exchanged_")
+    )
+    residual = float(np.abs(result.variables["energy_residual"].values).max())
+    if not residual > max(_OPEN * exchanged, _NOTHING):
+        return ""
+    share = residual / exchanged if exchanged else np.inf
+    return (
+        f"the energy account closes only to {share:.1g} of the energy exchanged: an impact or a kink was passed too "
+        "coarsely; try a smaller simulation.rtol and atol_scale"
     )
 
 

@@ -32,7 +32,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import AccuracyWarning, InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, ringing
+from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, open_account, ringing
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -166,6 +166,9 @@ def simulate(
     if inaccurate:
         result.attrs["accuracy"] = inaccurate
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=2)
+    gap = open_account(result)
+    if gap and not trajectory.failure:
+        result.attrs["account"] = gap
     if slow:
         result.attrs["ringing"] = slow
     result, excess = _finite_part(result)

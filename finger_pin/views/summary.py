@@ -103,7 +103,7 @@ def _own(result: xr.Dataset) -> list[str]:
 
 def _warnings(result: xr.Dataset) -> list[str]:
     advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
-    told = (advice, *(str(result.attrs.get(name, "")) for name in ("micro_damping", "accuracy", "ringing")))
+    told = (advice, *(str(result.attrs.get(name, "")) for name in ("micro_damping", "accuracy", "account", "ringing")))
     return [line for each in told if each for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 

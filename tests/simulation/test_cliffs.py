@@ -127,3 +127,17 @@ def test_a_simulator_refuses_what_is_no_time_and_tensions_that_push(finger):
     with pytest.raises(fp.InputError, match=r"^tension = .*must not be negative"):
         simulator.step([1.0, -1.0, 1.0, 1.0], 1e-3)
     assert simulator.time == 0.0
+
+
+def test_an_account_that_does_not_close_is_told():
+    # Hard hits on the limiters, at a tolerance that passes them coarsely.
+    hits = {"reference.joints.abduction.amplitude": 0.6, "reference.joints.abduction.frequency": 3.0,
+            "controller.gain": 2.0, "simulation.duration": 0.5}  # fmt: skip
+    for tolerance, tells in ((1e-2, True), (1e-8, False)):
+        tolerances = {"simulation.rtol": tolerance, "simulation.atol_scale": tolerance}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", fp.ScenarioWarning)
+            result = fp.simulate(fp.load_scenario("fig6", hits | tolerances))
+        works = [abs(values).max() for name, values in result.items() if name.startswith("energy_exchanged_")]
+        share = float(abs(result.energy_residual).max() / sum(works))
+        assert (share > 1e-4) == tells == ("account closes only to" in summarize(result).replace("\n", " "))
