@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
@@ -54,14 +55,14 @@ def run_seed(seed: int, limit: float) -> Run:
     return Run(seed, time.perf_counter() - began, steps, residual_share(result), estimate, reason)
 
 
-def main() -> None:
-    """Run, and print a table of those that are not as they should be."""
+def main(given: list[str] | None = None) -> int:
+    """Run, and print a table of those that are not as they should be; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", type=int, nargs="?", default=100, help="fingers (default 100)")
     parser.add_argument("--seed", type=int, default=0, help="of the first finger (default 0)")
     parser.add_argument("--limit", type=float, default=20.0, help="s for a finger (default 20)")
     parser.add_argument("--processes", type=int, default=2, help="side by side (default 2)")
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(given)
     seeds = range(arguments.seed, arguments.seed + arguments.count)
     with ProcessPoolExecutor(arguments.processes) as pool:
         runs = list(pool.map(partial(run_seed, limit=arguments.limit), seeds))
@@ -76,7 +77,8 @@ def main() -> None:
         f"{sum(run.residual > OPEN for run in runs)} with a residual above {OPEN:g} of the energy exchanged; "
         f"steps: median {np.median(steps):.0f}, 99 % {np.quantile(steps, 0.99):.0f}, most {steps.max()}"
     )
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -39,7 +39,7 @@ def test_the_distance_from_the_gear_is_the_stretch_that_the_tensions_make(stiffe
 
 @pytest.mark.parametrize(("scenario", "window"), [("fig6", 0.015), ("stick_slip", 0.006)])
 def test_every_method_converges_to_one_motion_as_its_tolerance_shrinks(scenario, window, monkeypatch):
-    """From 1e-4 to 1e-8, 30 times nearer at least for every hundredth, and all end within 2e-8 rad of one truth."""
+    """From 1e-4 to 1e-8, 20 times nearer at least for every hundredth, and all end within 2e-8 rad of one truth."""
     monkeypatch.setitem(methods.WINDOWS, scenario, window)
     found = list(methods.approaches(scenario))
     assert {each.method for each in found} == set(filter(methods.available, methods.METHODS))

@@ -21,7 +21,7 @@ TITLE = "Integrators against each other"
 WINDOWS = {"fig6": 0.1, "stick_slip": 0.02}
 TOLERANCES = (1e-4, 1e-6, 1e-8)
 #: Largest error of a method at the tightest tolerance, rad, and the least factor by which it shrinks on the way.
-LIMIT, GAIN = 2e-8, 30.0
+LIMIT, GAIN = 2e-8, 20.0
 _RATE = 10_000.0
 
 
