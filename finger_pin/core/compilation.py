@@ -115,14 +115,6 @@ def compiled_loosely(function: _Function) -> _Function:
     )
 
 
-def compiled_apart(function: _Function) -> _Function:
-    """Return the function compiled, to be called by compiled code only, as a unit of its own.
-
-    The time that compilation takes grows faster than the size of what is inlined into one function.
-    """
-    return _compile(function, cache=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-
-
 def entry(function: _Function) -> _Function:
     """Return the function compiled on first use, to be called from Python."""
     return _compile(function, cache=CACHE_FOLDER is not None, no_cfunc_wrapper=True)

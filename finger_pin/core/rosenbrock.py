@@ -11,10 +11,9 @@ from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
 from finger_pin.core.inputs import HELD
-from finger_pin.core.law_code import SIDE
+from finger_pin.core.kinks import hold, release, strayed, turn
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau
-from finger_pin.core.tables import END, FIRST, KINK
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
@@ -66,50 +65,6 @@ INTEGRATION = kind_of(Integration)
 
 
 @compiled
-def _release(tables: Any, rows: Any) -> None:
-    """Let all rows follow the motion."""
-    for g in range(tables.groups.shape[0]):
-        if tables.groups[g, KINK] >= 0:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                rows[SIDE, k] = 0.0
-
-
-@compiled
-def _hold(tables: Any, rows: Any, kinks: Any) -> None:
-    """Hold all rows on the side of their kink where they are."""
-    for g in range(tables.groups.shape[0]):
-        column = tables.groups[g, KINK]
-        if column >= 0:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                kinks[k] = rows[column, k]
-                rows[SIDE, k] = np.sign(rows[column, k])
-
-
-@compiled
-def _strayed(tables: Any, rows: Any, kinks: Any) -> Any:
-    """Return the least share of the step after which a held row has left its side; 1 if none has."""
-    share = 1.0
-    for g in range(tables.groups.shape[0]):
-        column = tables.groups[g, KINK]
-        if column >= 0:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                if rows[SIDE, k] * rows[column, k] < 0.0:
-                    share = min(share, kinks[k] / (kinks[k] - rows[column, k]))
-    return share
-
-
-@compiled
-def _turn(tables: Any, rows: Any, kinks: Any) -> None:
-    """Turn the held rows that have left their side."""
-    for g in range(tables.groups.shape[0]):
-        column = tables.groups[g, KINK]
-        if column >= 0:
-            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
-                if kinks[k] * rows[column, k] < 0.0:
-                    rows[SIDE, k] = -rows[SIDE, k]
-
-
-@compiled
 def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> int:
     """Try one step: fill the increments k and, in model.state, the state at its end.
 
@@ -132,7 +87,7 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                 state[c] += of_stage * k[j, c]
                 r[c] += of_coupling * k[j, c]
         if i == 0 and fresh:
-            _release(tables, rows)
+            release(tables, rows)
         if i > 0 or fresh:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
@@ -141,7 +96,7 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                     start[c] = rate[c]
                     if not np.isfinite(rate[c]):
                         return 2
-                _hold(tables, rows, kinks)
+                hold(tables, rows, kinks)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:
                 return 1
@@ -293,15 +248,15 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
             error = _error(x, reached, k[count - 1], rtol, atol)
         fresh = False
         if error <= 1.0:
-            share = _strayed(tables, rows, kinks)
+            share = strayed(tables, rows, kinks)
             if share < 1.0:
                 # A row was held on a side that it has left: what that cost is an error too.
                 call_at(model.evaluate, integration.model, time + h)
-                _turn(tables, rows, kinks)
+                turn(tables, rows, kinks)
                 for c in range(size):
                     r[c] = model.rate[c]
                 call_at(model.evaluate, integration.model, time + h)
-                _turn(tables, rows, kinks)
+                turn(tables, rows, kinks)
                 for c in range(size):
                     r[c] = h * (model.rate[c] - r[c])
                 memory[EVALUATIONS] += 2

@@ -16,13 +16,3 @@ def joint_reaction(load: Any, along: Any, across: Any) -> Any:
         across: |F - (e . F) e|, N.
     """
     return np.hypot(along - load, across)
-
-
-def joint_reaction_slopes(load: Any, along: Any, reaction: Any) -> tuple[Any, Any]:
-    """Return the derivatives of R with respect to S and to e . F, for a given F.
-
-    |F| is kept, so what e . F gains its component across loses. At R = 0 it has a kink,
-    which the floor of the friction level hides.
-    """
-    safe = np.maximum(reaction, 1e-100)
-    return (load - along) / safe, -load / safe
