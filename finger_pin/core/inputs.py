@@ -42,7 +42,7 @@ class Control(NamedTuple):
 
     Attributes:
         kind: HELD, PLANNED or SCHEDULED.
-        tension: What is held, shape (u,).
+        tension: What is held, shape (u,); zero for inputs that are planned or scheduled.
         gain: K_P, shape (N,).
         minimum: f0, shape (T,).
         inverse: Pseudo-inverse of H_c^T, shape (T, N).
@@ -227,13 +227,15 @@ def signal_rates(signal: Any, time: float, out: Any) -> None:
 
 @compiled
 def inputs(control: Any, time: float, position: Any, out: Any) -> None:
-    """Fill the inputs: f_hat of (19), (21), (22), or what is held or scheduled."""
+    """Fill the inputs: f_hat of (19), (21), (22), or what is scheduled; what is held, beside them or alone."""
+    for i in range(out.size):
+        out[i] = control.tension[i]
     if control.kind == HELD:
-        for i in range(out.size):
-            out[i] = control.tension[i]
         return
     if control.kind == SCHEDULED:
         signal_values(control.schedule, time, out)
+        for i in range(out.size):
+            out[i] += control.tension[i]
         return
     signal_values(control.reference, time, control.base)
     desired, planned, base = control.desired, control.planned, control.base
