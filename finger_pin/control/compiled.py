@@ -62,6 +62,7 @@ def paper_control(controller: ProportionalController, reference: SignalReference
         reference=_arrays(reference.signal),
         coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
         offset=padded(reference.coupling.offset),
+        damping=padded(controller.damping),
     )
 
 
