@@ -9,12 +9,13 @@ gravity or friction if it does. What the finger really needs beyond them has to 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger_pin.control.proportional import Controller
-from finger_pin.control.reference import Reference
+from finger_pin.control.proportional import Controller, ControlSignals
+from finger_pin.control.reference import Reference, ReferenceSignals
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
@@ -27,6 +28,8 @@ class PositionDrives:
     """The loops of all motors of a finger that are in position drive, asked in order at multiples of their period.
 
     Attributes:
+        period: s.
+        channels: The inputs that are their voltages.
         instant: When they, or the sampled controller beside them, are to act next, s.
     """
 
@@ -58,11 +61,12 @@ class PositionDrives:
                 entry = f"finger.actuators.{name}.position_loop.period"
                 raise InputError(entry, f"must be that of the others, {self.period:g} s", loop.period)
         self.instant = 0.0
-        self._beside = beside
+        self._controller, self._beside = controller, beside
         self._held = np.zeros(finger.routing.actuated)
         self._voltages: list[Array] = []
         actuators, joints = finger.actuators, len(finger.routing.joints)
         self._places = joints + finger.routing.passive + np.flatnonzero(actuators.holds)
+        self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
         self.channels = actuators.channels[actuators.holds]
         self._gains = np.array([[each.proportional, each.derivative, each.integral] for each in loops]).T
         encoders = [actuator.motor.encoder for _, actuator in chosen]
@@ -91,6 +95,14 @@ class PositionDrives:
         following = len(self._voltages) * self.period
         self.instant = following if self._beside is None else min(following, self._beside.instant)
         return self._held
+
+    def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
+        """Return what is asked for, with what the goals are made of in place of what errors ask for."""
+        plan = self._controller.command(time, reference, reference.position, reference.velocity)
+        if self._positioned.all():
+            return plan
+        chosen = np.append(self._positioned, np.zeros(plan.tension.shape[-1] - len(self._positioned), dtype=bool))
+        return replace(control, tension=np.where(chosen, plan.tension, control.tension))
 
     def voltages(self, time: Array | float) -> Array:
         """Return what was held at one time, or at times (m,), by motor, V; an instant belongs to its sample."""

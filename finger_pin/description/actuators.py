@@ -152,13 +152,16 @@ class Actuator(Description):
         "tension", unit="1", source="design", doc="Commanded tensions as torque, or planned tendon lengths as angle."
     )
     tendon_rigidity: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
-        1500.0, unit="N", source="the passive tendon's 5e4 N/m over 3 cm", doc="E A; the tendon has K = E A / L_0."
+        6000.0,
+        unit="N",
+        source="a polyethylene braid that breaks at 200 N and 3.5 %",
+        doc="E A; the tendon has K = E A / L_0.",
     )
     tendon_length: Annotated[Numbers, reals(0.0, 100.0, above=True)] = quantity(
         0.3, unit="m", source="design", doc="L_0, from the spool to the finger."
     )
     tendon_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
-        1.0, unit="N s/m", source="estimate", doc="D, of the tendon as a whole."
+        10.0, unit="N s/m", source="estimate: a tenth of K at 200 rad/s", doc="D, of the tendon as a whole."
     )
     pretension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
         0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of two tendons all there is."
@@ -167,7 +170,7 @@ class Actuator(Description):
         0.0, unit="1", source="chosen", doc="Tension drive: part of the sliding gear friction that current overcomes."
     )
     reversal_speed: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
-        0.1, unit="rad/s", source="chosen", doc="Tension drive: speed below which that is smoothed."
+        0.5, unit="rad/s", source="chosen", doc="Tension drive: speed below which that is smoothed."
     )
     position_loop: PositionLoop = Field(PositionLoop(), description="Position drive: its loop.")
 

@@ -145,6 +145,7 @@ class Actuators:
             parameters=np.array([self.stiffness, self.damping]),
             arm=arm,
             offset=-self.slack,
+            powers=("elastic_damping",),
         )
 
     def rotor_rows(self, width: int) -> list[Rows]:
