@@ -67,7 +67,7 @@ class PositionDrives:
         actuators, joints = finger.actuators, len(finger.routing.joints)
         self._places = joints + finger.routing.passive + np.flatnonzero(actuators.holds)
         self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
-        self.channels = actuators.channels[actuators.holds]
+        self.channels = actuators.voltages
         self._gains = np.array([[each.proportional, each.derivative, each.integral] for each in loops]).T
         encoders = [actuator.motor.encoder for _, actuator in chosen]
         self._resolution = np.array([encoder.resolution for encoder in encoders if encoder is not None])

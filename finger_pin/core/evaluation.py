@@ -140,16 +140,12 @@ class CompiledFinger:
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
-        found = self._mechanism.evaluate(x, self._inputs(command), fingertip_force)
+        found = self._mechanism.evaluate(x, command, fingertip_force)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
 
     def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
-        return self._mechanism.powers(x, self._inputs(command), fingertip_force)
-
-    def _inputs(self, command: Array) -> Array:
-        """Return the commands that are inputs: the second tendon of a spool has none, and may be the last."""
-        return np.asarray(command)[..., : self.finger.mechanism.channels]
+        return self._mechanism.powers(x, command, fingertip_force)
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""

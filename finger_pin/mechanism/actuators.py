@@ -111,6 +111,11 @@ class Actuators:
         return self.tendons[np.argmax(self.spools != 0.0, axis=0)] if self.names else np.zeros(0, dtype=np.int64)
 
     @property
+    def voltages(self) -> NDArray[np.int64]:
+        """The inputs that are voltages of motors in position drive."""
+        return self.channels[self.holds]
+
+    @property
     def positioned(self) -> NDArray[np.int64]:
         """Tendons that motors in position drive pull."""
         return self.tendons[np.any(self.spools[:, self.holds] != 0.0, axis=1)]

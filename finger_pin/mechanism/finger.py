@@ -202,6 +202,8 @@ class Finger:
             ],
             (*self.routing.passive_names, *motors),
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
+            # Also where a tendon's input goes nowhere: the second one of a spool has none.
+            self.routing.actuated,
         )
 
     def __repr__(self) -> str:

@@ -76,7 +76,7 @@ class Tendons:
         proximal, distal = self.stretch(position, np.zeros((*position.shape[:-1], self.routing.passive)))
         return 0.5 * (proximal - distal)
 
-    def rows(self, actuators: Actuators) -> list[Rows]:
+    def rows(self, actuators: Actuators | None = None) -> list[Rows]:
         """Return the tables of the tendons, for coordinates (theta, p, theta_m).
 
         Halves of passive tendons (12), elastic tendons where there are motors, and driven and passive tendons
@@ -84,7 +84,8 @@ class Tendons:
         """
         routing, joints = self.routing, len(self.routing.joints)
         actuated, passive = routing.actuated, routing.passive
-        width = joints + passive + len(actuators.names)
+        motors = 0 if actuators is None else len(actuators.names)
+        width = joints + passive + motors
         # p of the halves: what draws the mass back loosens the proximal half and stretches the distal one.
         halves = np.zeros((2 * passive, width))
         halves[:, :joints] = routing.strand_coupling[actuated:]
@@ -106,7 +107,8 @@ class Tendons:
             ]
         )
         losses = ("tendon_coulomb", "tendon_viscous", "tendon_micro_damping")
-        names, pulled = routing.passive_names, actuators.pulled
+        names = routing.passive_names
+        pulled = np.zeros((actuated, 0)) if actuators is None else actuators.pulled
         elastic = pulled.any(axis=1)
         return [
             Rows(
@@ -117,7 +119,7 @@ class Tendons:
                 arm=halves,
                 stored="passive_tendon",
             ),
-            *([actuators.tendon_rows(width)] if actuators.names else []),
+            *([actuators.tendon_rows(width)] if actuators is not None and motors else []),
             Rows(
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
@@ -125,7 +127,7 @@ class Tendons:
                 parameters=np.vstack([friction[:, :actuated], elastic]),
                 arm=driven[:actuated],
                 channels=np.where(elastic, -1, np.arange(actuated)),
-                inputs={"elastic_tendons": pulled} if actuators.names else {},
+                inputs={"elastic_tendons": pulled} if motors else {},
                 bends=bends[:actuated],
                 curvature_offset=routing.curvature_offset[:actuated],
                 stored="tendon_bristles",
