@@ -129,7 +129,7 @@ def test_without_power_a_backdrivable_gear_lets_a_load_down_and_another_one_hold
     spool = load / (STIFFNESS * SPOOL)
     # Gears that carry nearly all of the load from the start.
     moved = stepped(hanging, [0.0], [0.0, 0.5], spool=spool, stiction=-0.9 * SPOOL * load, rtol=1e-6)[:, 2]
-    assert (moved[1] - moved[0] < -0.1) if turns else abs(moved[1] - moved[0]) < 1e-4
+    assert (moved[1] - moved[0] < -0.1) if turns else abs(moved[1] - moved[0]) < 1e-3
 
 
 def test_a_motor_overcomes_a_gear_that_no_load_turns():
