@@ -171,9 +171,10 @@ class ClosedLoop:
         state = self.finger.layout.unpack(x)
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        return LoopSignals(
-            reference, control, self.dynamics.evaluate(x, self._command(time, control), self.force(time))
-        )
+        command = self._command(time, control)
+        if self.drives is not None:
+            control = self.drives.planned(time, reference, control)
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:
         """Return the inputs of the finger: tensions, and voltages of motors in position drive."""
