@@ -9,6 +9,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.description.actuators import check_currents, check_sources
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.parameters import FingerDescription
@@ -139,6 +140,11 @@ class Scenario(Description):
             raise problem(error.entry, error.allowed) from None
         if self.controller.kind == "proportional" and not closure.holds:
             self._check_taut(routing, str(closure))
+        check_sources(finger.actuators, self.controller.tensions or {})
+        rest = expand(self.controller.minimum_tension, len(routing.tendons))
+        if self.controller.kind == "proportional" and closure.holds:
+            rest = closure.tension * np.max(rest / closure.tension)
+        check_currents(finger.actuators, dict(zip(routing.tendons, rest, strict=True)))
         initial = self.simulation.initial or InitialSettings()
         tables: dict[str, Iterable[str]] = {
             "reference.joints": self.reference.joints,
