@@ -8,6 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
+from finger_pin.core.inputs import held_control
+from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.mechanism.mechanism import Mechanism
 
 sys.path.append(str(Path(__file__).parents[1] / "mechanism"))
 from servo_cases import INERTIA, LINK, RADIUS, SMOOTH, SPOOL, finger
@@ -142,3 +145,38 @@ def test_a_result_of_servos_is_continued_where_it_ended():
     second = fp.simulate(fp.load_scenario("servo", rest), initial=first)
     for name in ("joint_position", "motor_position", "gearbox_stiction"):
         np.testing.assert_allclose(second[name][-1], whole[name][-1], atol=1e-5)
+
+
+def test_a_spool_of_two_tendons_works_beside_sampled_tensions_and_closes_the_account():
+    both = {"motor": "STS3215", "tendons": ["T1", "T4"], "spool_radius": [0.006, 0.005], "drive": "position"}
+    actuators = {"M": {**both, "pretension": [3.0, 3.0]}}
+    overrides = {"finger.actuators": actuators, "simulation.duration": 0.1, "controller.sampling.period": 1.5e-3}
+    result = fp.simulate(fp.load_scenario("fig6", overrides))
+    assert np.all(np.ptp(result.spool_tension.values, axis=0) > 0.0) and float(result.spool_tension.min()) > 0.0
+    assert np.ptp(result.motor_voltage.values) > 0.0
+    # T2 has an ideal source, whose sampled tension goes right into the canal.
+    np.testing.assert_array_equal(result.spool_tension.sel(tendon="T2"), result.tendon_command.sel(tendon="T2"))
+    exchanged = sum(float(abs(result[name]).max()) for name in result if str(name).startswith("energy_exchanged"))
+    assert float(abs(result.energy_residual).max()) < 1e-6 * exchanged
+
+
+def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():
+    """The second tendon of a spool has an input that goes nowhere, the last one of all among them."""
+    made = [finger(SMOOTH, opposed=True, drive="position", pretension=3.0, tendon_damping=each) for each in (5.0, 20.0)]
+    whole = Mechanism.join({"left": made[0].mechanism, "right": made[1].mechanism})
+
+    def stepper(mechanism, starts):
+        q, v, z = zip(*(part.split(start) for part, start in starts), strict=True)
+        # Joints of all, then lumps of all, in positions and velocities; then all states.
+        moving = [each[part] for kind in (q, v) for part in (slice(1), slice(1, None)) for each in kind]
+        x, control = np.concatenate([*moving, *z]), held_control(mechanism.channels, mechanism.coordinates)
+        return Stepper(mechanism, control, x, TABLEAUS["Rodas5P"](), 1e-9, 1e-9 * np.ones(len(x)))
+
+    starts = [(each.mechanism, each.rest_state(np.zeros(1))) for each in made]
+    together, alone = stepper(whole, starts), [stepper(part, [(part, start)]) for part, start in starts]
+    together.hold(np.array([1.0, 0.0, -2.0, 0.0]))
+    assert len(together.parts) == 2 and not together.advance(0.05)
+    for index, (each, voltage) in enumerate(zip(alone, (1.0, -2.0), strict=True)):
+        each.hold(np.array([voltage, 0.0]))
+        assert not each.advance(0.05)
+        np.testing.assert_array_equal(together.x[[index, 2 + index]], each.x[:2])
