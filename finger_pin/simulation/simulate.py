@@ -139,7 +139,7 @@ def simulate(
     sampled = None if sampling is None else SampledController(loop, sampling)
     if positioned:
         duration = scenario.simulation.duration
-        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, sampled)
+        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
         loop = replace(loop, drives=drives)
     if sampled is not None:
         loop = replace(loop, controller=sampled)
@@ -239,11 +239,14 @@ def _integrate(
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
         control, tableau = compiled_control(loop) or sampled_control(loop), TABLEAUS[method]()
+        stepper = Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force)
+        if loop.drives is not None:
+            stepper.drive(loop.drives.compiled)
         return integrate_compiled(
-            Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force),
+            stepper,
             settings.duration,
             loop.finger.layout.names,
-            held=loop.drives or (controller if isinstance(controller, SampledController) else None),
+            held=controller if isinstance(controller, SampledController) else None,
             knots=loop.knots(),
             watch=watch,
             chunk=chunk,
