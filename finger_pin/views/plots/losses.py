@@ -16,9 +16,9 @@ from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_fi
 def plot_losses(result: xr.Dataset) -> Figure:
     """Draw what friction takes, from a result.
 
-    (a) One panel per tendon, N: the tension before its friction (the command; of a passive tendon, the proximal half)
-    and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d of (19), the
-    torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
+    (a) One panel per tendon, N: the tension before its friction (the command, or that at a spool; of a passive tendon,
+    the proximal half) and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d
+    of (19), the torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
 
     Args:
         result: Dataset of `simulate`, of any finger.
@@ -32,7 +32,8 @@ def plot_losses(result: xr.Dataset) -> Figure:
 
 def _tendons(figure: Figure, result: xr.Dataset) -> None:
     time, tendons = result["time"].values, names(result, "tendon")
-    before = result["tendon_command"].transpose("time", "tendon").values
+    entering = "spool_tension" if "spool_tension" in result else "tendon_command"
+    before = result[entering].transpose("time", "tendon").values
     after = result["tendon_tension"].transpose("time", "tendon").values
     proximal = passive_proximal(result)
     titles = [f"{name}, passive" if name in proximal else name for name in tendons]
