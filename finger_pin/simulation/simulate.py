@@ -113,6 +113,9 @@ def simulate(
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
+    elif loop.finger.actuators.names:
+        # Before the controller is sampled: then it must not be asked for a start.
+        loop = replace(loop, start=loop.initial_state())
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     # The margin is that of the paper's controller on the scenario's reference.
     judged = controller is None and reference is None and scenario.controller.kind == "proportional"
