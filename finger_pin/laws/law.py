@@ -69,3 +69,56 @@ class Law:
     losses: tuple[str, ...] = ()
     scale: float | None = None
     kink: str = ""
+
+
+class Touch(NamedTuple):
+    """What a contact of two bodies sees: numbers, or arrays that broadcast.
+
+    Attributes:
+        gap: Signed distance of the surfaces, m; negative where they penetrate.
+        speed: Its rate, m/s.
+        slip_1: Speed along the first tangent of the body that is pushed up the normal, against the other, m/s.
+        slip_2: Along the second.
+        state_1: The law's first state.
+        state_2: The second.
+        side: On which side of its law's kink the contact is held, as in `Row`.
+    """
+
+    gap: Any
+    speed: Any
+    slip_1: Any
+    slip_2: Any
+    state_1: Any
+    state_2: Any
+    side: Any = 0.0
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """The law of a row with three arms and two states: a contact, its normal and its tangents.
+
+    Forces act along the arms: the first drives the gap open, the others drive the slips up.
+
+    Attributes:
+        name: For messages.
+        parameters: Names of the numbers that each contact has; ``p`` holds them in this order.
+        value: (touch, p) -> (f_n, f_1, f_2, z_1', z_2', *signals).
+        slopes: (touch, p, signals) -> five tuples: derivatives of f_n, f_1, f_2, z_1' and z_2' by gap, speed, slip_1,
+            slip_2, state_1, state_2.
+        account: (touch, p, (f_n, f_1, f_2), (z_1', z_2'), signals) -> (stored energy, *lost powers), J and W. The power
+            of the three forces is what is neither lost nor stored.
+        signals: Names of the further numbers that ``value`` returns.
+        losses: Names of the powers that are lost.
+        scale: Typical magnitude of the states, for absolute tolerances.
+        kink: As in `Law`.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    value: Callable[..., Any]
+    slopes: Callable[..., Any]
+    account: Callable[..., Any]
+    signals: tuple[str, ...]
+    losses: tuple[str, ...]
+    scale: float
+    kink: str = ""
