@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.law_code import CURVATURE, SIGNALS, SLOPES, addresses, widest
 from finger_pin.core.rigid_body import (
+    ARMATURE,
     BODY_COLUMNS,
     CENTRE,
     INERTIA,
@@ -206,6 +207,7 @@ def _read(mechanism: Mechanism) -> Tables:
             parents[i], kinds[i] = above, part.kind
             bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
             bodies[i, TRANSLATION : TRANSLATION + 3] = translation
+            bodies[i, ARMATURE] = model.armature[i]
             above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
         inertia = model.inertias[joint]
         bodies[above, MASS] = inertia.mass
