@@ -14,6 +14,7 @@ from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.law_code import CURVATURE, SIGNALS, SLOPES, addresses, widest
 from finger_pin.core.path_tables import Paths, PathWork, build_path_work, reached, read_paths
 from finger_pin.core.rigid_body import (
+    ARMATURE,
     BODY_COLUMNS,
     CENTRE,
     INERTIA,
@@ -215,6 +216,7 @@ def _read(mechanism: Mechanism) -> Tables:
             parents[i], kinds[i] = above, part.kind
             bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
             bodies[i, TRANSLATION : TRANSLATION + 3] = translation
+            bodies[i, ARMATURE] = model.armature[i]
             above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
         inertia = model.inertias[joint]
         bodies[above, MASS] = inertia.mass

@@ -126,6 +126,8 @@ class RigidBody:
                 at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
                 # Appending bodies, or frames with theirs, would round.
                 model.inertias[at] = own.inertias[index]
+                at, moved = model.joints[at].idx_v, own.joints[index]
+                model.armature[at : at + moved.nv] = own.armature[moved.idx_v : moved.idx_v + moved.nv]
             for tip in body.tips:
                 frame = own.frames[tip]
                 holder = frame.parentJoint and frame.parentJoint + shift
@@ -228,7 +230,8 @@ class RigidBody:
             return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
         tip = np.array(self._data.oMf[self.tip_frame].translation)
-        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
+        # Pinocchio's kinetic energy is without what turns with the joints' motors.
+        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)

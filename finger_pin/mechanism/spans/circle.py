@@ -1,8 +1,7 @@
 """A path around or inside a circle, in the plane of the circle: which way it goes, its length, and how they change.
 
 In the plane, with the circle about the origin, the ends are at distances r_0 and r_1, and the path goes from one to the
-other through an angle phi. Length and turn are functions of these three. Which way the path goes follows MuJoCo's
-spatial tendons (computation chapter of its documentation; `mju_wrap` in engine_util_misc.c).
+other through an angle phi. Length and turn are functions of these three. Which way the path goes is as in MuJoCo 4.
 """
 
 from __future__ import annotations
@@ -14,14 +13,15 @@ from typing import Any
 FREE, SHORT_WAY, LONG_WAY, INSIDE = range(4)
 # Below this, a length or a radius is none, as in MuJoCo.
 _TINY = 1e-15
-# A root of the inside wrap is where Newton's steps end: twice as many as it ever took.
 _MOST_STEPS = 50
-# Merit of a path that crosses itself.
-_CROSSING = 1e4
 
 
 def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: Any, has_side: Any, inside: Any) -> Any:
     """Return which way the path goes.
+
+    A path wraps if, on its way, the ends are further apart than where their tangents meet the circle. With a side
+    point its way is through the direction of that point; without one it is the shorter. Inside, it has to be drawn to
+    the circle unless the straight line meets it.
 
     Args:
         r0: Distance of the first end, m.
@@ -33,47 +33,16 @@ def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: A
         has_side: Whether there is a side point.
         inside: Whether the path passes inside.
     """
-    if radius < _TINY or r0 < _TINY or r1 < _TINY or min(r0, r1) < radius:
+    if radius < _TINY or min(r0, r1) <= radius:
         return FREE
-    x, y = r1 * math.cos(angle), r1 * math.sin(angle)
-    span = (x - r0) ** 2 + y * y
-    # Nearest point of the straight line between the ends.
-    share = min(max(r0 * (r0 - x) / span, 0.0), 1.0) if span > _TINY else 0.0
-    near_x, near_y = r0 + share * (x - r0), share * y
-    apart = near_x * near_x + near_y * near_y > radius * radius
+    touching = math.acos(radius / r0) + math.acos(radius / r1)
     if inside != 0.0:
-        return INSIDE if min(r0, r1) > radius and (apart or share == 0.0 or share == 1.0) else FREE
-    if span < _TINY or (apart and (has_side == 0.0 or along * near_x + across * near_y >= 0.0)):
-        return FREE
-    short = _merit(SHORT_WAY, r0, r1, angle, radius, along, across, has_side)
-    long = _merit(LONG_WAY, r0, r1, angle, radius, along, across, has_side)
-    if max(short, long) <= -_CROSSING:
-        return FREE
-    return LONG_WAY if long > short else SHORT_WAY
-
-
-def _merit(way: Any, r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: Any, has_side: Any) -> Any:
-    """Return how close the middle of a way is to the side point, or, without one, how short it is."""
-    turning = 1.0 if way == SHORT_WAY else -1.0
-    first = turning * math.acos(radius / r0)
-    second = angle - turning * math.acos(radius / r1)
-    x0, y0, x1, y1 = math.cos(first), math.sin(first), math.cos(second), math.sin(second)
-    if _meet(r0, 0.0, radius * x0, radius * y0, r1 * math.cos(angle), r1 * math.sin(angle), radius * x1, radius * y1):
-        return -_CROSSING
-    if has_side == 0.0:
-        return -(radius * radius) * ((x1 - x0) ** 2 + (y1 - y0) ** 2)
-    middle = math.sqrt((x0 + x1) ** 2 + (y0 + y1) ** 2)
-    return ((x0 + x1) * along + (y0 + y1) * across) / max(middle, _TINY)
-
-
-def _meet(ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, dx: Any, dy: Any) -> Any:
-    """Return whether the lines from a to b and from c to d cross."""
-    area = (dy - cy) * (bx - ax) - (dx - cx) * (by - ay)
-    if abs(area) < _TINY:
-        return False
-    one = ((dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)) / area
-    other = ((bx - ax) * (ay - cy) - (by - ay) * (ax - cx)) / area
-    return 0.0 <= one <= 1.0 and 0.0 <= other <= 1.0
+        return INSIDE if angle < touching else FREE
+    # Where what is opposite to the side point lies between the ends, the way is the long one.
+    long = has_side != 0.0 and math.atan2(across, along) < angle - math.pi
+    if long:
+        return LONG_WAY if 2.0 * math.pi - angle > touching else FREE
+    return SHORT_WAY if angle > touching else FREE
 
 
 def path(way: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
@@ -91,11 +60,9 @@ def path(way: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
 def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     """Return `path` of two tangents and the arc between them."""
     # A point on the circle itself has no second derivative.
-    h0 = max(math.sqrt(max(r0 * r0 - radius * radius, 0.0)), 1e-12 * radius)
-    h1 = max(math.sqrt(max(r1 * r1 - radius * radius, 0.0)), 1e-12 * radius)
-    turn = angle - math.acos(min(radius / r0, 1.0)) - math.acos(min(radius / r1, 1.0))
-    if turn < 0.0:
-        turn += 2.0 * math.pi
+    h0 = max(math.sqrt((r0 - radius) * (r0 + radius)), 1e-12 * radius)
+    h1 = max(math.sqrt((r1 - radius) * (r1 + radius)), 1e-12 * radius)
+    turn = angle - math.acos(radius / r0) - math.acos(radius / r1)
     by0, by1 = -radius / (r0 * h0), -radius / (r1 * h1)
     length = h0 + h1 + radius * turn
     return (

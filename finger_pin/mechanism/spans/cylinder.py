@@ -70,11 +70,11 @@ def cylinder_slopes(y: Any, p: Any, out: Any) -> None:
     flat, steep = found[0] / length, (y[5] - y[2]) / length
     _, by_turn, by_flat = _turned(way, found[10], flat)
     for i in range(6):
-        up = (i == 5) * 1.0 - (i == 2) * 1.0
+        up = 1.0 * (i == 5) - 1.0 * (i == 2)
         pull = flat * flat_pull[i] + steep * up
         out[i] = by_turn * flat_turn[i] + by_flat * (flat_pull[i] - flat * pull) / length
         for j in range(6):
-            rise = (j == 5) * 1.0 - (j == 2) * 1.0
+            rise = 1.0 * (j == 5) - 1.0 * (j == 2)
             other = flat * flat_pull[j] + steep * rise
             spread = (flat_pull[i] * flat_pull[j] + up * rise - pull * other) / length
             out[6 + 6 * i + j] = flat * out[6 + 6 * i + j] + spread
