@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,7 +221,7 @@ class Mechanism:
         for table, part in zip(self.rows, self.states, strict=True):
             routed = self._routed(table, turning)
             arm = table.arm + routed.arm
-            row = table.law.sees(
+            row: Any = table.law.sees(
                 linear @ table.measure.T + table.offset + routed.length,
                 (arm @ v[..., None])[..., 0],
                 z[..., part] if table.states else np.zeros((*lead, table.count)),
@@ -271,7 +272,12 @@ class Mechanism:
         return total
 
     def _load(
-        self, table: Rows, found: dict[str, RowSignals], q: Array, forces: Array, touching: Sequence[tuple[Paths, Array]]
+        self,
+        table: Rows,
+        found: dict[str, RowSignals],
+        q: Array,
+        forces: Array,
+        touching: Sequence[tuple[Paths, Array]],
     ) -> Array:
         """Return N: the magnitude of what earlier rows add up to, or of -e S + F for the pins of joints (17)."""
         load = np.zeros((*q.shape[:-1], table.count))
