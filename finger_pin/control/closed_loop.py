@@ -14,6 +14,7 @@ from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
 from finger_pin.control.passive_loop import PassiveTensionLoop
+from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
@@ -26,6 +27,9 @@ from finger_pin.mechanism.rigid_body import Motion
 
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
+
+# Controllers that remember nothing: asked for the start beforehand, they answer alike later.
+_ANSWERS_ALIKE = (ProportionalController, CompensatedController, OpenLoopTensions)
 
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
@@ -65,6 +69,7 @@ class ClosedLoop:
         dynamics: What evaluates the finger.
         varying_force: What varies of F, three signals, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
+        drives: Of motors in position drive; None without any.
     """
 
     finger: Finger
@@ -74,6 +79,7 @@ class ClosedLoop:
     dynamics: Dynamics
     varying_force: Signal | None = None
     start: Array | None = None
+    drives: PositionDrives | None = None
 
     @classmethod
     def from_scenario(
@@ -125,12 +131,23 @@ class ClosedLoop:
             position = loop.reference.at(0.0).position
             moved = [initial.position.get(name, own) for name, own in zip(joints, position, strict=True)]
             velocity = [initial.velocity.get(name, 0.0) for name in joints]
-            loop = replace(loop, start=finger.rest_state(np.array(moved), np.array(velocity)))
+            loop = replace(loop, start=loop.rest_state(np.array(moved), np.array(velocity)))
         return loop
+
+    def rest_state(self, position: Array, velocity: Array) -> Array:
+        """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
+        tension = None
+        if self.finger.actuators.names and isinstance(self.controller, _ANSWERS_ALIKE):
+            planned = self.controller.command(0.0, self.reference.at(0.0), position, velocity)
+            tension = planned.tension[: self.finger.routing.actuated]
+        return self.finger.rest_state(position, velocity, tension)
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""
-        return self.finger.rest_state(self.reference.at(0.0).position) if self.start is None else self.start.copy()
+        if self.start is not None:
+            return self.start.copy()
+        position = self.reference.at(0.0).position
+        return self.rest_state(position, np.zeros_like(position))
 
     def force(self, time: Array | float) -> Array:
         """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame."""
@@ -154,15 +171,23 @@ class ClosedLoop:
         state = self.finger.layout.unpack(x)
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
+        return LoopSignals(
+            reference, control, self.dynamics.evaluate(x, self._command(time, control), self.force(time))
+        )
+
+    def _command(self, time: Array | float, control: ControlSignals) -> Array:
+        """Return the inputs of the finger: tensions, and voltages of motors in position drive."""
         command = control.tension[..., : self.finger.routing.actuated]
-        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
+        if self.drives is not None:
+            command = command.copy()
+            command[..., self.drives.channels] = self.drives.voltages(time)
+        return command
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
         state, reference = self.finger.layout.unpack(x), self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        command = control.tension[..., : self.finger.routing.actuated]
-        rows, external = self.dynamics.powers(x, command, self.force(time))
+        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time))
         joints = state.velocity.shape[-1]
         fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)

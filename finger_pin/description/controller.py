@@ -139,16 +139,15 @@ class ControllerSettings(Description):
 
     @property
     def is_paper(self) -> bool:
-        """Whether it is the paper's controller and nothing else, sampled or not."""
+        """Whether it is the paper's controller, perhaps damped, and nothing else, sampled or not."""
         added = (
             self.tendon_friction_feedforward,
             self.joint_friction_compensation,
             self.passive_tension_loop,
             self.distribution,
         )
-        damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
-        return plain and not any(damping) and all(each is None for each in added)
+        return plain and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.description.actuators import Actuator, check_actuators
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -265,6 +266,7 @@ class FingerDescription(Description):
     joint_friction: JointFriction = JointFriction()
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
+    actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
 
     @field_validator("tendons")
     @classmethod
@@ -279,6 +281,7 @@ class FingerDescription(Description):
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        check_actuators(self.actuators, self.actuated_names, self.passive_names)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),

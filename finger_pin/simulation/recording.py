@@ -24,6 +24,7 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
+_MOTOR = ("time", "motor")
 _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 _STORED = {
     "kinetic": "kinetic energy",
@@ -33,10 +34,18 @@ _STORED = {
     "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
+    "elastic_tendons": "elastic energy of the tendons on spools",
+    "gearboxes": "elastic energy of the gearboxes' bristles",
+    "rotors": "kinetic energy of the rotors",
 }
 _EXCHANGED = {
     "actuators": "supplied by the actuators",
+    "electrical": "supplied by the motors' electronics",
     "fingertip": "supplied by the fingertip force",
+    "motor_heat": "lost as heat in the motors' windings",
+    "gearbox_coulomb": "lost by gears sliding",
+    "gearbox_viscous": "lost in the gears' viscous friction",
+    "elastic_damping": "lost as tendons on spools stretch",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",
@@ -76,6 +85,8 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
     dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
     if routing.passive > 1:
         dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
+    if loop.finger.actuators.names:
+        dataset = dataset.assign_coords(motor=("motor", list(loop.finger.actuators.names), {"long_name": "motor"}))
     return dataset
 
 
@@ -143,6 +154,21 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     if signals.control.shortfall is not None:
         text = "desired torque that tension limits keep from being planned"
         table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)
+    motors = finger.motors
+    if motors is not None and state.motor_position is not None:
+        assert state.motor_velocity is not None and state.gearbox_stiction is not None
+        text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
+        table |= {
+            "motor_position": _entry(_MOTOR, state.motor_position, "rad", "angle of the spool"),
+            "motor_velocity": _entry(_MOTOR, state.motor_velocity, "rad/s", "velocity of the spool"),
+            "motor_current": _entry(_MOTOR, motors.current, "A", "current"),
+            "motor_voltage": _entry(_MOTOR, motors.voltage, "V", "voltage"),
+            "motor_torque": _entry(_MOTOR, motors.torque, "N m", "torque of the motor, at the spool"),
+            "gearbox_friction": _entry(_MOTOR, motors.friction, "N m", "friction torque of the gearbox", "9c"),
+            "gearbox_stiction": _entry(_MOTOR, state.gearbox_stiction, "N m", "its stiction torque", "9a"),
+            "gearbox_load": _entry(_MOTOR, motors.load, "N m", "torque that the gears carry"),
+            "spool_tension": _entry(_TENDON, tendons.entering, "N", text),
+        }
     if passive:
         shared = {
             "passive_tension_proximal": (halves[..., 0::2], "N", "tension of the proximal half", "12"),
