@@ -63,8 +63,8 @@ def test_at_the_end_of_a_step_the_tensions_and_the_force_of_the_next_one_act(fin
     simulator, force = fp.Simulator(finger, START), np.array([0.1, 0.0, -0.2])
     # The sum of three steps of 0.1 is not 0.3: rounding must not move a sample to the step before.
     for step in range(7):
-        simulator.step(TENSION + step, 1e-3, step * force)
-    result = simulator.result()
+        simulator.step(TENSION + step, 0.1, step * force)
+    result = simulator.result(sample_rate=10.0)
     expected = TENSION + np.minimum(np.arange(8), 6)[:, None]
     np.testing.assert_array_equal(result.tendon_command[:, :4], expected)
     np.testing.assert_array_equal(result.fingertip_force, np.minimum(np.arange(8), 6)[:, None] * force)
