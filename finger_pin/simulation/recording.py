@@ -58,12 +58,14 @@ _EXCHANGED = {
 }
 
 
-def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str) -> xr.Dataset:
-    """Return all signals of a trajectory at the scenario's sample times, as far as the trajectory goes.
+def record(
+    scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str, times: Array | None = None
+) -> xr.Dataset:
+    """Return all signals of a trajectory at times, by default the scenario's, as far as the trajectory goes.
 
     The signals are recomputed from the states by the evaluation that the dynamics use.
     """
-    times = scenario.sample_times()
+    times = scenario.sample_times() if times is None else times
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
     signals = loop.evaluate(times, trajectory.interpolate(times))
     state = signals.finger.state
