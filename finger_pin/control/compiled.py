@@ -49,6 +49,7 @@ def paper_control(controller: ProportionalController, reference: SignalReference
         reference=_arrays(reference.signal),
         coupling=np.concatenate([matrix, np.zeros((routing.passive, len(matrix)))]),
         offset=padded(reference.coupling.offset),
+        loop=controller.loop,
     )
 
 
@@ -57,7 +58,7 @@ def with_force(control: Control, loop: ClosedLoop) -> Control:
     if loop.varying_force is None:
         return control
     force = _arrays(loop.varying_force)
-    force.harmonics[:, 0] += loop.fingertip_force
+    force.harmonics[:, 0] += loop.fingertip_force.ravel()
     return control._replace(force=force)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array, Routing
@@ -47,12 +48,14 @@ class ProportionalController:
         minimum: f0, shape (t,), N.
         inverse: Pseudo-inverse of H_c^T, shape (t, n), 1/m.
         internal: f^k, shape (t,), internal tensions with the largest entry 1.
+        loop: The finger that each tendon belongs to, shape (t,): each has a lambda of its own; one for all by default.
     """
 
     gain: Array
     minimum: Array
     inverse: Array
     internal: Array
+    loop: NDArray[np.int64] | None = None
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> ProportionalController:
@@ -72,5 +75,10 @@ class ProportionalController:
         """Return tau^d of (19) and f_hat of (21) with lambda of (22)."""
         torque = proportional_torque(self.gain, reference.position, position)
         minimal = torque @ self.inverse.T
-        level = np.max(internal_level(self.minimum, minimal, self.internal), axis=-1, keepdims=True)
+        levels = internal_level(self.minimum, minimal, self.internal)
+        if self.loop is None:
+            level = np.max(levels, axis=-1, keepdims=True)
+        else:
+            fingers = [np.max(levels[..., self.loop == each], axis=-1) for each in range(int(self.loop.max()) + 1)]
+            level = np.stack(fingers, axis=-1)[..., self.loop]
         return ControlSignals(torque, minimal + level * self.internal)
