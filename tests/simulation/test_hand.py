@@ -122,7 +122,7 @@ def test_other_controllers_and_forces_act_on_the_finger_that_they_are_for(overri
     else:
         changed = fp.load_scenario("hand", SHORT | overrides)
     found = fp.simulate(changed)
-    for name, part in changed.parts().items():
+    for part in changed.parts().values():
         alone = fp.simulate(part)
         moved = found.joint_position.sel(joint=alone.joint)
         np.testing.assert_allclose(moved, alone.joint_position, rtol=0.0, atol=1e-9)
@@ -167,7 +167,7 @@ def test_fingers_that_share_a_name_and_a_finger_that_is_missing_are_refused(tmp_
         ("title = 'none'\n", "hand.fingers: is missing"),
         (
             "[fingers.index]\nfinger = 'nobody.toml'\n",
-            "hand.fingers.index.finger file nobody.toml: there is no such file",
+            missing,
         ),
     ):
         hand.write_text(text)
