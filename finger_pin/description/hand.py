@@ -21,6 +21,7 @@ from finger_pin.description.parameters import (
 )
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import IN_RADIANS, Description, Name, expand, problem, quantity, real, vector
+from finger_pin.exceptions import InputError
 
 _MILLIMETRES = " m (is it in millimetres?)"
 _PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
@@ -118,6 +119,18 @@ class HandDescription(Description):
         own = placed.rotation.T @ np.array(self.gravity)
         finger = scaled(placed.finger, placed.scale)
         return finger.model_copy(update={"name": name, "gravity": tuple(own.tolist())})
+
+
+def one_finger(description: FingerDescription) -> None:
+    """Raise where something is asked of a hand that only a finger has.
+
+    Raises:
+        InputError: If it is a hand of several fingers.
+    """
+    hand = description.hand
+    if hand is not None and len(hand.fingers) > 1:
+        allowed = f"is a hand; take one of its fingers: scenario.parts()[NAME] with {', '.join(hand.fingers)}"
+        raise InputError("finger", allowed, hand.name)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
