@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.hand import HandController, joined_controller
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
@@ -18,6 +19,7 @@ from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import AXES, Scenario
 from finger_pin.description.signals import ForceSignal
@@ -65,11 +67,13 @@ class ClosedLoop:
         finger: The finger.
         controller: Turns reference and motion into tensions.
         reference: The desired motion.
-        fingertip_force: F, or what is constant of it, shape (3,), N, base frame.
+        fingertip_force: F, or what is constant of it, shape (3,), of several fingers (f, 3), N, base frame.
         dynamics: What evaluates the finger.
-        varying_force: What varies of F, three signals, N; None for nothing.
+        varying_force: What varies of F, three signals for each finger, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
         drives: Of motors in position drive; None without any.
+        parts: Of a hand whose controller and reference are the scenario's, the loops of its fingers, each alone on the
+            palm; otherwise none.
     """
 
     finger: Finger
@@ -80,6 +84,7 @@ class ClosedLoop:
     varying_force: Signal | None = None
     start: Array | None = None
     drives: PositionDrives | None = None
+    parts: tuple[ClosedLoop, ...] = ()
 
     @classmethod
     def from_scenario(
@@ -97,33 +102,43 @@ class ClosedLoop:
             controller: Replaces its controller: an object, or times (m,), s, and tensions (m, a), N.
             reference: Replaces its reference: an object, or times (m,), s, and angles (m, k), rad, one column for each
                 of the k joints that no passive tendon drives.
-            fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame.
+            fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame; (m, 3 f) of several fingers.
             finger: Replaces the finger that its description makes, such as one with rows of its own.
 
         Raises:
             InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
                 or are not finite, or tensions are negative.
         """
-        finger, start = finger or Finger(scenario.finger), scenario.simulation.start_time
+        start, scenarios = scenario.simulation.start_time, scenario.parts()
+        parts: tuple[ClosedLoop, ...] = ()
+        if len(scenarios) > 1 and all(each is None for each in (controller, reference, fingertip_force, finger)):
+            parts = tuple(cls.from_scenario(each) for each in scenarios.values())
+            routing = Routing.from_description(scenario.finger)
+            controller = joined_controller([part.controller for part in parts], routing)
+        finger = finger or Finger(scenario.finger)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),
         ):
             if own != tuple(described):
                 raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
+        acting = {name: part.environment for name, part in scenarios.items()}
+        alone = len(acting) == 1
         loop = cls(
             finger=finger,
             controller=_controller(controller, scenario, finger),
             reference=_reference(reference, scenario, finger.routing),
-            fingertip_force=np.array(scenario.environment.fingertip_force),
+            fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
+            parts=parts,
         )
-        signals = scenario.environment.fingertip_force_signal
+        signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
-            force = Signal.from_samples("fingertip_force", fingertip_force, AXES)
-            loop = replace(loop, fingertip_force=np.zeros(3), varying_force=force.later(start))
-        elif signals:
-            force = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES])
+            columns = AXES if alone else [f"{name}.{axis}" for name in acting for axis in AXES]
+            force = Signal.from_samples("fingertip_force", fingertip_force, columns)
+            loop = replace(loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.later(start))
+        elif any(signals):
+            force = Signal.from_settings([each.get(axis, ForceSignal()) for each in signals for axis in AXES])
             loop = replace(loop, varying_force=force.later(start))
         initial = scenario.simulation.initial
         if initial is not None:
@@ -142,6 +157,11 @@ class ClosedLoop:
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
 
+    def compiled(self) -> ClosedLoop:
+        """Return the same loop, whose finger is evaluated by the compiled core."""
+        parts = tuple(part.compiled() for part in self.parts)
+        return replace(self, dynamics=CompiledFinger(self.finger), parts=parts)
+
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""
         if self.start is not None:
@@ -150,10 +170,14 @@ class ClosedLoop:
         return self.rest_state(position, np.zeros_like(position))
 
     def force(self, time: Array | float) -> Array:
-        """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame."""
+        """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame.
+
+        Of several fingers shapes are (f, 3) and (m, f, 3).
+        """
         if self.varying_force is None:
             return self.fingertip_force
-        return np.asarray(self.fingertip_force + self.varying_force.at(time)[0])
+        varying = self.varying_force.at(time)[0]
+        return np.asarray(self.fingertip_force + varying.reshape(*np.shape(time), *self.fingertip_force.shape))
 
     def knots(self) -> Array:
         """Return the times at which a signal may have a kink or a jump, s, in order."""
@@ -202,7 +226,9 @@ def _controller(given: Controller | Samples | None, scenario: Scenario, finger: 
         return build_controller(scenario, finger)
     if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    if isinstance(given, ProportionalController | CompensatedController | PassiveTensionLoop):
+    if isinstance(
+        given, ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
+    ):
         return given
     kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
     return kind(given, finger.routing, scenario.simulation.start_time)

@@ -63,6 +63,7 @@ def paper_control(controller: ProportionalController, reference: SignalReference
         coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
         offset=padded(reference.coupling.offset),
         damping=padded(controller.damping),
+        loop=controller.loop,
     )
 
 
@@ -71,7 +72,7 @@ def with_force(control: Control, loop: ClosedLoop) -> Control:
     if loop.varying_force is None:
         return control
     force = _arrays(loop.varying_force)
-    force.harmonics[:, 0] += loop.fingertip_force
+    force.harmonics[:, 0] += loop.fingertip_force.ravel()
     return control._replace(force=force)
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_serializer, field_validator
 
+from finger_pin.description.by_finger import flat, given, nested
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.signals import ForceSignal
 from finger_pin.description.validation import (
     Description,
+    FullName,
     Name,
     Numbers,
     check_size,
@@ -99,6 +101,9 @@ class ControllerSettings(Description):
 
     With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
     columns are ``time`` and actuated tendons, and become samples of ``tensions``.
+
+    In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
+    ``sampling`` is the same for all.
     """
 
     file_keys = ("file",)
@@ -106,7 +111,7 @@ class ControllerSettings(Description):
     kind: Annotated[Literal["proportional", "tensions"], choice("proportional", "tensions")] = quantity(
         "proportional", unit="1", source="(19)", doc="Which controller; tensions: open loop."
     )
-    tensions: dict[Name, ForceSignal] | None = Field(
+    tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."
     )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
@@ -131,11 +136,11 @@ class ControllerSettings(Description):
     distribution: DistributionSettings | None = Field(None, description="Quadratic programme with tension limits.")
     sampling: SamplingSettings | None = Field(None, description="Sampled execution; continuous without it.")
 
-    @model_validator(mode="after")
-    def _sampled(self) -> Self:
-        if self.passive_tension_loop is not None and self.sampling is None:
-            raise problem("passive_tension_loop", "works from sample to sample: set controller.sampling.period too")
-        return self
+    fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, what differs there.")
+
+    _flat = field_validator("tensions", mode="before")(flat)
+    _nested = field_serializer("tensions", mode="wrap")(nested)
+    _sparse = field_serializer("fingers")(given)
 
     @property
     def is_paper(self) -> bool:
@@ -152,6 +157,9 @@ class ControllerSettings(Description):
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
     """Raise the error of an entry that does not fit the finger, or another entry."""
+    if settings.passive_tension_loop is not None and settings.sampling is None:
+        entry = "controller.passive_tension_loop"
+        raise problem(entry, "works from sample to sample: set controller.sampling.period too")
     _check_tensions(settings, finger)
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")

@@ -6,9 +6,9 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
 from finger_pin.description.validation import (
@@ -26,6 +26,9 @@ from finger_pin.description.validation import (
     vector,
 )
 from finger_pin.exceptions import toml_like
+
+if TYPE_CHECKING:
+    from finger_pin.description.hand import HandDescription
 
 _MILLIMETRES = " m (is it in millimetres?)"
 
@@ -267,6 +270,7 @@ class FingerDescription(Description):
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
     actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    _hand: Any = PrivateAttr(None)
 
     @field_validator("tendons")
     @classmethod
@@ -291,6 +295,12 @@ class FingerDescription(Description):
             for field, value in getattr(self, group):
                 check_size(value, names, f"{group}.{field}", what)
         return self
+
+    @property
+    def hand(self) -> HandDescription | None:
+        """The hand whose fingers together this is; None for a finger."""
+        hand: HandDescription | None = self._hand
+        return hand
 
     @property
     def passive_names(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -99,7 +100,7 @@ class FingerSignals:
     Attributes:
         state: The state, unpacked.
         command: f^a, shape (..., a), N.
-        fingertip_force: F, shape (3,) or (..., 3), N, base frame.
+        fingertip_force: F, shape (3,) or (..., 3), of several fingers (f, 3) or (..., f, 3), N, base frame.
         tendons: Tendon forces and friction.
         joints: Joint reaction and friction.
         limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
@@ -148,14 +149,15 @@ class Finger:
 
     def __init__(
         self,
-        description: FingerDescription | str | Path,
+        description: FingerDescription | HandDescription | str | Path,
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
     ) -> None:
         """Build a finger.
 
         Args:
-            description: The finger, or what `load_finger` takes: the name of one, or the path of a file.
+            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand is all
+                its fingers together, whose joints and tendons have dotted names.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
@@ -165,6 +167,8 @@ class Finger:
         """
         if isinstance(description, str | Path):
             description = load_finger(description)
+        if isinstance(description, HandDescription):
+            description = description.joined()
         self.description = description
         self.rigid_body = rigid_body or build_rigid_body(description)
         if len(self.rigid_body.joints) != len(description.joints):
@@ -209,6 +213,9 @@ class Finger:
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
         described = self.description
+        if described.hand is not None:
+            sizes = f"{len(described.joints)} joints, {len(described.tendons)} tendons"
+            return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
         return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
 
@@ -288,7 +295,8 @@ class Finger:
         Args:
             x: Packed state, shape (size,) or (m, size).
             command: f^a, shape (a,) or (m, a), N; of a motor in position drive its voltage, V, at its first tendon.
-            fingertip_force: F, shape (3,) or (m, 3), N, base frame; none by default.
+            fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
+                default.
         """
         return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force))
 
@@ -309,7 +317,7 @@ class Finger:
         return FingerSignals(
             state=self.layout.unpack(x),
             command=command,
-            fingertip_force=np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float),
+            fingertip_force=np.asarray(np.zeros(3) if fingertip_force is None else fingertip_force, dtype=float),
             tendons=TendonForces(
                 curvature=both(lambda tendons: tendons.row.curvature),
                 coefficient=both(lambda tendons: tendons["coefficient"]),

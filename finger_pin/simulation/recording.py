@@ -85,6 +85,8 @@ def record(
         attrs=_attributes(scenario, trajectory, method),
     )
     dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
+    if scenario.hand is not None and len(scenario.hand.fingers) > 1:
+        dataset = dataset.assign_coords(finger=list(scenario.hand.fingers))
     if routing.passive > 1:
         dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
     if loop.finger.actuators.names:
@@ -128,13 +130,14 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
     tension = loop.finger.routing.tendon_tension(tendons.strands)
     error = signals.reference.position - state.position
     force = np.broadcast_to(finger.fingertip_force, motion.tip.shape)
+    tip = ("time", "axis") if motion.tip.ndim == 2 else ("time", "finger", "axis")
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
         "joint_velocity": _entry(_JOINT, state.velocity, "rad/s", "joint velocity"),
         "joint_acceleration": _entry(_JOINT, finger.acceleration, "rad/s2", "joint acceleration", "18"),
         "joint_reference": _entry(_JOINT, signals.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": _entry(_JOINT, error, "rad", "desired less actual joint angle"),
-        "fingertip_position": _entry(("time", "axis"), motion.tip, "m", "fingertip position", "1"),
+        "fingertip_position": _entry(tip, motion.tip, "m", "fingertip position", "1"),
         "tendon_command": _entry(_TENDON, signals.control.tension, "N", "commanded or planned tension", "21b"),
         "tendon_tension": _entry(_TENDON, tension, "N", "delivered tension; distal half of a passive tendon", "12"),
         "tendon_velocity": _entry(_TENDON, tendons.velocity, "m/s", "sliding velocity", "3"),
@@ -149,7 +152,7 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "joint_stiction": _entry(_JOINT, state.joint_stiction, "N m", "joint stiction torque", "9a"),
         "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": _entry(("time", "axis"), force, "N", "force on the fingertip", "6"),
+        "fingertip_force": _entry(tip, force, "N", "force on the fingertip", "6"),
         "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }

@@ -115,7 +115,8 @@ def simulate(
         loop = replace(loop, start=packed_state(initial, loop.finger))
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     # The margin is that of the paper's controller on the scenario's reference.
-    judged = controller is None and reference is None and scenario.controller.kind == "proportional"
+    planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
+    judged = controller is None and reference is None and planned
     judged = judged and loop.finger.routing.force_closure().holds
     margin = warn_of_self_locking(scenario) if judged else None
     driving = micro_damping_advice(scenario.finger)
@@ -134,15 +135,15 @@ def simulate(
             )
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
-        loop = replace(loop, dynamics=CompiledFinger(loop.finger))
+        loop = loop.compiled()
     answers = loop.controller
     sampled = None if sampling is None else SampledController(loop, sampling)
     if positioned:
         duration = scenario.simulation.duration
         drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, sampled)
-        loop = replace(loop, drives=drives)
+        loop = replace(loop, drives=drives, parts=())
     if sampled is not None:
-        loop = replace(loop, controller=sampled)
+        loop = replace(loop, controller=sampled, parts=())
     elif own:
         # A wrong answer of a user's own controller is refused before anything is computed.
         loop.evaluate(0.0, loop.initial_state())
@@ -251,6 +252,7 @@ def _integrate(
             knots=loop.knots(),
             watch=watch,
             chunk=chunk,
+            together=chunk == _CHUNK_OBSERVED,
             stop=stop,
         )
     if method == "CVODE":
