@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.signals import ForceSignal, of_axes
 from finger_pin.description.validation import (
     Description,
     Name,
@@ -122,6 +122,9 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+        None, description="What the fingertip is to exert besides, J^T F added to tau^d, by axis x, y, z of the base."
+    )
     spring_compensation: bool = Field(
         False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
     )
@@ -148,6 +151,7 @@ class ControllerSettings(Description):
         )
         damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
+        plain = plain and not self.fingertip_force
         return plain and not any(damping) and all(each is None for each in added)
 
 
@@ -195,6 +199,7 @@ _CLOSED_LOOP = (
     "damping",
     "gravity_compensation",
     "spring_compensation",
+    "fingertip_force",
     "tendon_friction_feedforward",
     "joint_friction_compensation",
     "passive_tension_loop",

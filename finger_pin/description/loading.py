@@ -15,7 +15,8 @@ import tomli_w
 
 from finger_pin.description.columns import read_columns
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.scenario import AXES, Scenario
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import AXES
 from finger_pin.description.validation import Description, find_field, nearest, validate
 from finger_pin.exceptions import InputError
 
