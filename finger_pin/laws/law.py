@@ -6,9 +6,11 @@ or arrays; NumPy runs them as they are, and the compiler runs the same text.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 
 class Row(NamedTuple):
@@ -69,6 +71,21 @@ class Law:
     losses: tuple[str, ...] = ()
     scale: float | None = None
     kink: str = ""
+    arms: ClassVar[int] = 1
+    states: ClassVar[int] = 1
+
+    def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Row:
+        """Return what rows see, shape (..., k) each."""
+        return Row(length, speed, state, load, command, curvature)
+
+    def act(self, row: Row, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
+        """Return the rows' forces, the rates of their states, and their signals."""
+        force, rate, *signals = self.value(row, p)
+        return force, rate, tuple(signals)
+
+    def book(self, row: Row, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
+        """Return stored energy and powers of what `act` has returned."""
+        return self.account(row, p, force, rate, signals)
 
 
 class Touch(NamedTuple):
@@ -122,3 +139,26 @@ class ContactLaw:
     losses: tuple[str, ...]
     scale: float
     kink: str = ""
+    supplies: ClassVar[tuple[str, ...]] = ()
+    arms: ClassVar[int] = 3
+    states: ClassVar[int] = 2
+
+    def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Touch:
+        """Return what contacts see; arms stand side by side, shape (..., 3 k), and so do states, shape (..., 2 k)."""
+        slips = (speed[..., each::3] for each in range(3))
+        return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))
+
+    def act(self, touch: Touch, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
+        """Return the contacts' forces, shape (..., 3 k), the rates of their states, (..., 2 k), and their signals."""
+        found = self.value(touch, p)
+        return _side_by_side(found[:3]), _side_by_side(found[3:5]), tuple(found[5:])
+
+    def book(self, touch: Touch, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
+        """Return stored energy and powers of what `act` has returned."""
+        forces, rates = ([all_[..., each::count] for each in range(count)] for all_, count in ((force, 3), (rate, 2)))
+        return self.account(touch, p, forces, rates, signals)
+
+
+def _side_by_side(parts: Sequence[Any]) -> Any:
+    stacked = np.stack(np.broadcast_arrays(*parts), axis=-1)
+    return stacked.reshape(*stacked.shape[:-2], -1)

@@ -27,7 +27,7 @@ FORCE = np.array([0.3, -0.2, 0.4])
 
 
 def tree_model():
-    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes."""
+    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes, with rotors."""
     pin.seed(5)
     turned = np.array([0.48, -0.6, 0.64])
     joints = [
@@ -44,6 +44,7 @@ def tree_model():
         index = model.addJoint(parent, kind, pin.SE3.Random(), name)
         model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Random())
     model.addFrame(pin.Frame("tip", 5, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    model.armature[:] = np.linspace(0.1, 0.7, model.nv)
     return model
 
 

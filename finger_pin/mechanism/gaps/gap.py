@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 #: Columns of what ``value`` fills: distance, normal, point, two tangents.
 DISTANCE, NORMAL, POINT, TANGENT_1, TANGENT_2, FOUND = 0, 1, 4, 7, 10, 13
@@ -31,3 +31,4 @@ class Gap:
     parameters: tuple[str, ...]
     value: Callable[..., Any]
     slopes: Callable[..., Any]
+    columns: ClassVar[int] = 3
