@@ -21,8 +21,8 @@ from finger_pin.control.reference import Reference, ReferenceSignals, SignalRefe
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
-from finger_pin.description.scenario import AXES, Scenario
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
@@ -183,6 +183,8 @@ class ClosedLoop:
         """Return the times at which a signal may have a kink or a jump, s, in order."""
         owners = (self.reference, self.controller)
         signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
+        if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
+            signals.append(self.controller.fingertip.wanted)
         found = [each.knots for each in (*signals, self.varying_force) if each and not each.is_harmonic]
         return np.unique(np.concatenate([np.zeros(0), *found]))
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_serializer, field_validator
+from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.by_finger import flat, given, nested
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.signals import ForceSignal, of_axes
 from finger_pin.description.validation import (
     Description,
     FullName,
@@ -127,6 +127,9 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+        None, description="What the fingertip is to exert besides, J^T F added to tau^d, by axis x, y, z of the base."
+    )
     spring_compensation: bool = Field(
         False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
     )
@@ -152,7 +155,7 @@ class ControllerSettings(Description):
             self.distribution,
         )
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
-        return plain and all(each is None for each in added)
+        return plain and not self.fingertip_force and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
@@ -202,6 +205,7 @@ _CLOSED_LOOP = (
     "damping",
     "gravity_compensation",
     "spring_compensation",
+    "fingertip_force",
     "tendon_friction_feedforward",
     "joint_friction_compensation",
     "passive_tension_loop",
