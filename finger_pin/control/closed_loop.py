@@ -154,18 +154,23 @@ class ClosedLoop:
         state = self.finger.layout.unpack(x)
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        command = control.tension[..., : self.finger.routing.actuated]
+        command = self._command(control)
         return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
         state, reference = self.finger.layout.unpack(x), self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        command = control.tension[..., : self.finger.routing.actuated]
+        command = self._command(control)
         rows, external = self.dynamics.powers(x, command, self.force(time))
         joints = state.velocity.shape[-1]
         fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)
+
+    def _command(self, control: ControlSignals) -> Array:
+        """Return the inputs of the mechanism: actuated tensions, and those of a tree's actuators."""
+        tensions = control.tension[..., : self.finger.routing.actuated]
+        return tensions if control.inputs is None else np.concatenate([tensions, control.inputs], axis=-1)
 
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""

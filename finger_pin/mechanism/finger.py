@@ -21,6 +21,7 @@ from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -141,7 +142,8 @@ class Finger:
         if isinstance(description, str | Path):
             description = load_finger(description)
         self.description = description
-        self.rigid_body = rigid_body or build_rigid_body(description)
+        build = build_rigid_body if description.tree is None else build_tree
+        self.rigid_body = rigid_body or build(description)
         if len(self.rigid_body.joints) != len(description.joints):
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
         for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
@@ -152,13 +154,13 @@ class Finger:
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
-        self.further = tuple(rows)
+        width = len(self.routing.joints) + self.routing.passive
+        self.further = (*tree_rows(description, width), *rows)
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
-            self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows), ringing
+            self.routing.joints, self.routing.tendons, self.routing.passive, further_states(self.further), ringing
         )
-        joints, passive = self.routing.joints, self.routing.passive
-        width = len(joints) + passive
+        joints = self.routing.joints
         self.mechanism = Mechanism(
             self.rigid_body,
             [
@@ -166,7 +168,7 @@ class Finger:
                 self.joint_friction.rows(joints, self.routing.actuated, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
-                *rows,
+                *self.further,
             ],
             self.routing.passive_names,
             self.tendons.mass,
