@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.signals import ForceSignal, JointReference
@@ -64,6 +65,8 @@ class EnvironmentSettings(Description):
     fingertip_force_signal: dict[Name, ForceSignal] | None = Field(
         None, description="What varies of F, added to the constant, by axis x, y, z of the base frame."
     )
+
+    objects: dict[Name, Object] = Field({}, description="What the finger may touch, by name.")
 
     @field_validator("fingertip_force_signal")
     @classmethod

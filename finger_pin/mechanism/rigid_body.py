@@ -173,6 +173,17 @@ class RigidBody:
         pin.forwardKinematics(self.model, self._data, q)
         return self._directions()
 
+    def placements(self, q: Array) -> tuple[list[pin.SE3], list[Array]]:
+        """Return placement and Jacobian of every joint, the base first, at q of shape (nq,).
+
+        A Jacobian's columns are velocity of the body's point at the origin, and angular velocity; base frame.
+        """
+        model, data = self.model, self._data
+        pin.computeJointJacobians(model, data, q)
+        still, reference = np.zeros((6, model.nv)), pin.ReferenceFrame.WORLD
+        twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]
+        return [pin.SE3(each) for each in data.oMi], [still, *(np.asarray(each).reshape(6, -1) for each in twists)]
+
     def tip_position(self, q: Array) -> Array:
         """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
         pin.framesForwardKinematics(self.model, self._data, q)

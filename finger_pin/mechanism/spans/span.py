@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class Span:
     parameters: tuple[str, ...]
     value: Callable[[Any, Any, Any], None]
     slopes: Callable[[Any, Any, Any], None]
+    columns: ClassVar[int] = 1
 
 
 #: Numbers of a wrap: its radius, m; the side point, m; whether there is one; whether the path passes inside.
