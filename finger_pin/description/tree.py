@@ -2,8 +2,8 @@
 
 It stands beside the joints and tendons of a `FingerDescription`, which keep the joints' ranges and springs. Units are
 SI: of a joint that slides, angles are lengths in m and torques are forces in N. Frames and signs are MuJoCo's: a body's
-frame is where its placement says while its joints are at their references, quaternions begin with their real part, and
-the length of a tendon grows where its joints' coefficients are positive.
+frame is where its placement says while its joints are at their references, and the length of a tendon grows where its
+joints' coefficients are positive. Quaternions are x, y, z, w.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Body(Description):
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its frame, in the parent's."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
-        (1.0, 0.0, 0.0, 0.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion w, x, y, z."
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
     )
     mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass.")
     centre: Annotated[Triple, _PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre.")
@@ -53,7 +53,7 @@ class Body(Description):
     def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         norm = sum(each * each for each in value) ** 0.5
         if abs(norm - 1.0) > 1e-6:
-            raise problem("", "must be a quaternion w, x, y, z of length 1", list(value))
+            raise problem("", "must be a quaternion x, y, z, w of length 1", list(value))
         return value
 
 
@@ -94,7 +94,7 @@ class Waypoint(Description):
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
-        (1.0, 0.0, 0.0, 0.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
     )
     radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of a wrap."

@@ -17,6 +17,7 @@ from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
+from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
@@ -119,7 +120,8 @@ class Finger:
         springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
-        further: Tables of rows that were added.
+        paths: The tendons of a tree as functions of the posture; None without a tree.
+        further: Tables of rows that were added, those of a tree first.
     """
 
     def __init__(
@@ -142,8 +144,11 @@ class Finger:
         if isinstance(description, str | Path):
             description = load_finger(description)
         self.description = description
-        build = build_rigid_body if description.tree is None else build_tree
-        self.rigid_body = rigid_body or build(description)
+        self.paths: Routes | None = None
+        if description.tree is None:
+            self.rigid_body = rigid_body or build_rigid_body(description)
+        else:
+            self.rigid_body, self.paths = build_tree(description)
         if len(self.rigid_body.joints) != len(description.joints):
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
         for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
@@ -155,7 +160,7 @@ class Finger:
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
         width = len(self.routing.joints) + self.routing.passive
-        self.further = (*tree_rows(description, width), *rows)
+        self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
             self.routing.joints, self.routing.tendons, self.routing.passive, further_states(self.further), ringing
@@ -312,3 +317,7 @@ class Finger:
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
         return self.mechanism.evaluate(x, command, fingertip_force).rate
+
+
+#: A hand is a finger whose joints form a tree.
+Hand = Finger

@@ -16,7 +16,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mujoco_rest import Rest
-from finger_pin.mechanism.tree import rotation
+from finger_pin.mechanism.routes import rotation
 
 Table = dict[str, Any]
 # Stiffness with which a tendon's range stops a joint, N m/rad, as the stroke limiters do.
@@ -121,12 +121,12 @@ class _Reader:
 
     def _body(self, i: int) -> Table:
         model = self.model
-        turned = rotation(model.body_iquat[i])
+        turned = rotation(_quaternion(model.body_iquat[i]))
         moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
         return {
             **self._carrier(int(model.body_parentid[i]), "parent"),
             "position": model.body_pos[i].tolist(),
-            "orientation": model.body_quat[i].tolist(),
+            "orientation": _quaternion(model.body_quat[i]),
             "mass": float(model.body_mass[i]),
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
@@ -195,7 +195,7 @@ class _Reader:
         wrap = {
             "kind": "cylinder" if kind == types.mjWRAP_CYLINDER else "sphere",
             "position": model.geom_pos[at].tolist(),
-            "orientation": model.geom_quat[at].tolist(),
+            "orientation": _quaternion(model.geom_quat[at]),
             "radius": float(model.geom_size[at, 0]),
             **self._carrier(int(model.geom_bodyid[at]), "body"),
         }
@@ -265,6 +265,12 @@ class _Reader:
 
     def _carrier(self, body: int, entry: str) -> Table:
         return {entry: self.bodies[body]} if body else {}
+
+
+def _quaternion(real_first: Array) -> tuple[float, float, float, float]:
+    """Return a quaternion x, y, z, w of one w, x, y, z."""
+    w, x, y, z = real_first.tolist()
+    return x, y, z, w
 
 
 def _name(text: str) -> str:
