@@ -24,6 +24,8 @@ _STOP = 50.0
 # The same for joints that slide, N/m.
 _STOP_SLIDING = 1e4
 _LEAST_FRICTION = 1e-7
+# Time constant with which a coupled joint follows, critically damped, s.
+_COUPLED = 0.005
 
 
 def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
@@ -222,9 +224,12 @@ class _Reader:
             q0 = model.qpos0[model.jnt_qposadr]
             other = {"other": self.joints[second], "ratio": ratio} if second >= 0 else {}
             offset = q0[first] + constant - (ratio * q0[second] if second >= 0 else 0.0)
+            inertia = float(model.dof_M0[model.jnt_dofadr[first]])
             found[model.equality(i).name or f"equality_{i}"] = {
                 "joint": self.joints[first],
                 "offset": float(offset),
+                "stiffness": inertia / _COUPLED**2,
+                "damping": 2.0 * inertia / _COUPLED,
                 **other,
             }
         return dict(zip(_names("equality", list(found)), found.values(), strict=True))
