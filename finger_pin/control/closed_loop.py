@@ -197,17 +197,16 @@ class ClosedLoop:
         state = self.finger.layout.unpack(x)
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        return LoopSignals(
-            reference, control, self.dynamics.evaluate(x, self._command(time, control), self.force(time))
-        )
+        command = self._command(time, control)
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:
-        """Return the inputs of the finger: tensions, and voltages of motors in position drive."""
+        """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
         command = control.tension[..., : self.finger.routing.actuated]
         if self.drives is not None:
             command = command.copy()
             command[..., self.drives.channels] = self.drives.voltages(time)
-        return command
+        return command if control.inputs is None else np.concatenate([command, control.inputs], axis=-1)
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""

@@ -23,11 +23,13 @@ class ControlSignals:
         torque: tau^d, shape (..., n), N m.
         tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
         shortfall: What tension limits keep from being exerted of tau^d, shape (..., n), N m; None without limits.
+        inputs: Of the actuators of a tree, shape (..., k); None without any.
     """
 
     torque: Array
     tension: Array
     shortfall: Array | None = None
+    inputs: Array | None = None
 
 
 class Controller(Protocol):

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.by_finger import flat, given, nested
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.signals import ForceSignal, of_axes
+from finger_pin.description.signals import ForceSignal, InputSignal, of_axes
 from finger_pin.description.validation import (
     Description,
     FullName,
@@ -114,6 +114,9 @@ class ControllerSettings(Description):
     tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."
     )
+    inputs: dict[Name, InputSignal] | None = Field(
+        None, description="By actuator of a tree; one without a signal has zero input."
+    )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
     )
@@ -214,7 +217,16 @@ _CLOSED_LOOP = (
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
+    actuators = tuple(finger.tree.actuators) if finger.tree else ()
+    for name in settings.inputs or {}:
+        if name not in actuators:
+            near = nearest(name, actuators)
+            hint = f"; did you mean {near}?" if near else ""
+            allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
+            raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
+        if finger.tree is not None and (actuators or not finger.tendons):
+            raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
         if settings.tensions is not None:
             raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return

@@ -120,6 +120,19 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
         return validate(Scenario, table, ())
 
 
+def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Return the scenario that a table describes, as `load_scenario` returns that of a file.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    checked, whole = _from_here(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
+    with _depth_limited("scenario"):
+        _override(checked, whole, Path())
+        _resolve_signals(whole, Path())
+        return validate(Scenario, whole, ())
+
+
 def to_toml(description: Description) -> str:
     """Return the TOML text of a description, complete: reading it gives the same description back."""
     if isinstance(description, FingerDescription) and description.hand is not None:

@@ -19,10 +19,12 @@ from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
+from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -144,7 +146,8 @@ class Finger:
         springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
-        further: Tables of rows that were added.
+        paths: The tendons of a tree as functions of the posture; None without a tree.
+        further: Tables of rows that were added, those of a tree first.
     """
 
     def __init__(
@@ -170,7 +173,11 @@ class Finger:
         if isinstance(description, HandDescription):
             description = description.joined()
         self.description = description
-        self.rigid_body = rigid_body or build_rigid_body(description)
+        self.paths: Routes | None = None
+        if description.tree is None:
+            self.rigid_body = rigid_body or build_rigid_body(description)
+        else:
+            self.rigid_body, self.paths = build_tree(description)
         if len(self.rigid_body.joints) != len(description.joints):
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
         for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
@@ -182,18 +189,18 @@ class Finger:
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
-        self.further = tuple(rows)
+        joints, motors = self.routing.joints, self.actuators.names
+        width = len(joints) + self.routing.passive + len(motors)
+        self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
             self.routing.joints,
             self.routing.tendons,
             self.routing.passive,
-            further_states(rows),
+            further_states(self.further),
             ringing,
             self.actuators.names,
         )
-        joints, motors = self.routing.joints, self.actuators.names
-        width = len(joints) + self.routing.passive + len(motors)
         self.mechanism = Mechanism(
             self.rigid_body,
             [
@@ -202,7 +209,7 @@ class Finger:
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
                 *(self.actuators.rotor_rows(width) if motors else []),
-                *rows,
+                *self.further,
             ],
             (*self.routing.passive_names, *motors),
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
@@ -364,3 +371,7 @@ class Finger:
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
         return self.mechanism.evaluate(x, command, fingertip_force).rate
+
+
+#: A hand is a finger whose joints form a tree.
+Hand = Finger

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -31,11 +31,19 @@ class Shape(Protocol):
         columns: How many wrenches it has: one along a span; normal and two tangents of a gap.
     """
 
-    name: str
-    parameters: tuple[str, ...]
-    value: Callable[..., None]
-    slopes: Callable[..., None]
-    columns: int
+    columns: ClassVar[int]
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def value(self) -> Callable[..., None]: ...  # noqa: D102
+
+    @property
+    def slopes(self) -> Callable[..., None]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)

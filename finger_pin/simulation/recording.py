@@ -195,6 +195,8 @@ def _further(tables: tuple[Rows, ...], found: Evaluation) -> dict[str, tuple[Any
         own, dims = found.rows[table.group], ("time", table.group)
         values = {"force": own.force, "length": own.row.length, "speed": own.row.speed}
         values |= dict(zip(table.law.signals, own.signals, strict=True))
+        if np.any(table.channels >= 0):
+            values["input"] = own.row.command
         if table.law.scale is not None:
             values["state"] = own.row.state
         for name, value in values.items():

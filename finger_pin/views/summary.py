@@ -19,6 +19,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
+from finger_pin.views.trees import is_tree
 
 _SETTLING = 1.0
 _LONG = 2.0
@@ -32,8 +33,9 @@ def summarize(result: xr.Dataset) -> str:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
     head = [*_head(result), *_own(result), *_warnings(result)]
-    moved = [head, _tracking(result), _tension(result), *_motors(result)]
-    blocks = [*moved, _energy(result), *_convergence(result), _cost(result)]
+    motion = [_joints(result), *_actuators(result)] if is_tree(result) else [_tracking(result)]
+    pulled = [_tension(result)] if result.sizes["tendon"] else []
+    blocks = [head, *motion, *pulled, *_motors(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
@@ -119,6 +121,20 @@ def _tracking(result: xr.Dataset) -> list[str]:
         for joint, column in zip(result["joint"].values, degrees.T, strict=True)
     ]
     return [f"Tracking error, deg ({span})", *_table(("", "rms", "max"), rows)]
+
+
+def _joints(result: xr.Dataset) -> list[str]:
+    position = result["joint_position"]
+    rows = [_range(str(name), np.asarray(position.sel(joint=name))) for name in result["joint"].values]
+    return ["Positions of the joints, rad or m", *_table(("", "least", "greatest"), rows)]
+
+
+def _actuators(result: xr.Dataset) -> list[list[str]]:
+    if "actuator_force" not in result:
+        return []
+    force = result["actuator_force"]
+    rows = [_range(str(name), np.asarray(force.sel(actuator=name))) for name in result["actuator"].values]
+    return [["Forces of the actuators, N or N m", *_table(("", "least", "greatest"), rows)]]
 
 
 def _tension(result: xr.Dataset) -> list[str]:

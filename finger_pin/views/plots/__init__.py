@@ -19,6 +19,7 @@ from finger_pin.views.plots.fig6 import plot_fig6
 from finger_pin.views.plots.force_capability import plot_force_polytope, plot_radius_sensitivity
 from finger_pin.views.plots.friction_influence import plot_friction_influence
 from finger_pin.views.plots.friction_law import plot_friction_law
+from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.losses import plot_losses
 from finger_pin.views.plots.pareto import plot_pareto
 from finger_pin.views.plots.passive_delivery import plot_passive_delivery
@@ -27,6 +28,7 @@ from finger_pin.views.plots.servo import plot_servo
 from finger_pin.views.plots.sweep import plot_sweep
 from finger_pin.views.plots.transmission import plot_transmission
 from finger_pin.views.plots.workspace import plot_workspace
+from finger_pin.views.trees import is_tree
 
 __all__ = [
     "compare",
@@ -38,6 +40,7 @@ __all__ = [
     "plot_force_polytope",
     "plot_friction_influence",
     "plot_friction_law",
+    "plot_hand_motion",
     "plot_losses",
     "plot_pareto",
     "plot_passive_delivery",
@@ -61,7 +64,7 @@ def draw_all(result: xr.Dataset, folder: str | Path) -> list[Path]:
         result: Dataset of `simulate`.
         folder: Where to write; a file of the same name is replaced whole or not at all.
     """
-    figures = dict(_FIGURES)
+    figures = {"motion": plot_hand_motion, "energy": plot_energy} if is_tree(result) else dict(_FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
     if "motor_current" in result:
