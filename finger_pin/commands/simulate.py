@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import warnings
 from contextlib import nullcontext
 from pathlib import Path
@@ -45,14 +44,10 @@ def simulate(
         print_text(listing())
         return
     with Interrupts() as interrupts, without_dask(), Drawing() if figures else nullcontext() as drawing:
-        # Imports leave no garbage to look for.
-        gc.disable()
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
         from finger_pin.views.summary import summarize
-
-        gc.enable()
 
         loaded = load_scenario(scenario, changed)
         output = output or Path("results", default_name(loaded, settings, duration, method))
@@ -128,7 +123,7 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
     """Draw animation and figures, all or none; return what went wrong if anything did."""
     try:
         if drawing is not None:
-            drawing.start(folder.stage)
+            drawing.start(result, folder.stage / "figures")
         from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")
@@ -138,6 +133,8 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
         raise
     except (KeyboardInterrupt, Exception) as error:
         # A result is worth more than its pictures.
+        if drawing is not None:
+            drawing.stop()
         folder.discard_views()
         if isinstance(error, KeyboardInterrupt):
             return error
