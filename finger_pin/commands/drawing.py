@@ -6,6 +6,7 @@ output what went wrong.
 
 from __future__ import annotations
 
+import gc
 import json
 import multiprocessing
 import os
@@ -13,12 +14,13 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+from finger_pin.commands.imports import without
 from finger_pin.exceptions import FingerPinError
 
 if TYPE_CHECKING:
@@ -30,22 +32,6 @@ Answer = tuple[int, str]
 
 class NotDrawn(FingerPinError):
     """Figures or animation cannot be drawn; the data are kept."""
-
-
-@contextmanager
-def without_dask() -> Iterator[None]:
-    """Keep xarray from importing Dask, which takes half a second, only because it is installed.
-
-    xarray remembers what there is: this is for a process that has not imported it yet, and does nothing in another.
-    """
-    if {"xarray", "dask"} & sys.modules.keys():
-        yield
-        return
-    sys.modules["dask"] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        del sys.modules["dask"]
 
 
 class Drawing:
@@ -108,7 +94,9 @@ class Drawing:
 
 def serve() -> None:
     """Draw the figures of the result that standard input gives, and answer an error number and a text."""
-    with without_dask():
+    # It lives too shortly for garbage.
+    gc.disable()
+    with without("dask", "xarray"):
         from finger_pin.views.plots import saving
     with suppress(EOFError):
         result, folder = pickle.load(sys.stdin.buffer)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
-from finger_pin.commands.drawing import Drawing, NotDrawn, without_dask
+from finger_pin.commands.drawing import Drawing, NotDrawn
+from finger_pin.commands.imports import load_numba, without
 from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
 from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
 
@@ -43,7 +44,7 @@ def simulate(
     if listed:
         print_text(listing())
         return
-    with Interrupts() as interrupts, without_dask(), Drawing() if figures else nullcontext() as drawing:
+    with Interrupts() as interrupts, without("dask", "xarray"), Drawing() if figures else nullcontext() as drawing:
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
@@ -93,6 +94,7 @@ def compute(
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.simulate import simulate
 
+    load_numba()
     if live:
         from finger_pin.views.viewer import LiveView
 
