@@ -83,6 +83,14 @@ class Signal:
         coefficients[-1] = values
         return cls(np.zeros((values.shape[1], 4)), knots, coefficients)
 
+    @classmethod
+    def joined(cls, signals: Sequence[Signal]) -> Signal:
+        """Return the functions of several signals one after the other."""
+        from scipy.interpolate import PPoly
+
+        columns = [PPoly(column.T, each.knots) for each in signals for column in each.coefficients.T]
+        return cls(np.concatenate([each.harmonics for each in signals]), *_joined(columns))
+
     @cached_property
     def is_harmonic(self) -> bool:
         """Whether there are sinusoids only."""

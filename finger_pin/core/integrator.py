@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.charts import angular_velocity
@@ -115,6 +117,7 @@ def integrate_compiled(
     knots: Array | None = None,
     watch: Watch | None = None,
     chunk: int = 256,
+    together: bool = False,
     stop: Stop | None = None,
 ) -> Trajectory:
     """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
@@ -125,8 +128,10 @@ def integrate_compiled(
         names: Names of the numbers of the state, for messages.
         held: A controller that holds its tensions in between.
         knots: Times at which an input may jump, in order, s: steps end there.
-        watch: Called with the simulated time and the state after every chunk of steps.
+        watch: Called with the simulated time that all have reached and the state after every chunk of steps.
         chunk: Most steps between two calls.
+        together: Whether islands stop at the same times to be watched, which cuts some of their steps; otherwise a
+            state that is watched has each where it has got to.
         stop: Asked now and then; true ends the integration there.
     """
     # Advancing by nothing compiles, which is no part of an integration's cost.
@@ -143,15 +148,13 @@ def integrate_compiled(
             if stepper.time >= held.instant:
                 stepper.hold(held.act(stepper.x))
             end = min(end, held.instant)
-        elif not alone and watch is not None:
+        elif not alone and together:
             end = min(end, stepper.time + duration / _SLICES)
         # At a knot itself the value after the jump counts: a step that ends there must not see it.
         jump = end in knotted
         goal = float(np.nextafter(end, 0.0)) if jump else end
-        if alone:
-            statuses = [recorders[0].advance(goal, 1)]
-        else:
-            statuses = in_threads(partial(_Recorder.advance, end=goal), recorders)
+        chunks = -1 if together and not alone else 1
+        statuses = in_threads(partial(_Recorder.advance, end=goal, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
             places = stepper.places(recorder.part.island)
             reason = reason or failure(recorder.part, status, [names[at] for at in places])
@@ -187,4 +190,14 @@ def integrate_compiled(
         interrupted=interrupted,
         # Of a controller that acts in between, the linearised flow knows nothing.
         estimated_error=np.nan if held is not None else stepper.estimated_error,
+        islands=()
+        if alone or any(len(each.attitude) for each in steps)
+        else tuple(_apart(each, stepper) for each in steps),
     )
+
+
+def _apart(steps: _Steps, stepper: Stepper) -> tuple[NDArray[np.int64], Array, Callable[[Array], Array]]:
+    """Return an island's places in the whole, the ends of its steps up to where all have got, and its states."""
+    times = steps.times
+    ends = np.unique(np.append(times[times < stepper.time], stepper.time))
+    return stepper.places(steps.part.island), ends, lambda at: steps.interpolate(at)[0]

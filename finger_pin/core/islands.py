@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.inputs import PLANNED, Control, Signal
+from finger_pin.core.path_tables import select_paths
 from finger_pin.core.tables import Tables
 
 Indices = NDArray[np.int64]
@@ -46,7 +47,7 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
     if planned:
-        reads = (control.inverse != 0.0) & (control.gain != 0.0)
+        reads = (control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0))
         tensions, read = np.nonzero(reads)
         links.append((loop_at + control.loop[tensions], read))
         loop_of = np.full(channels, -1)
@@ -121,6 +122,8 @@ def select(tables: Tables, island: Island) -> Tables:
         arm=tables.arm[arms],
         measure=tables.measure[arms],
         state=state,
+        touch=tables.touch[rows],
+        touching=bool(tables.touch[rows].any()),
         channel=_mapped(channel, tables.channel[rows]),
         input_start=input_start,
         load_start=len(inputs) + load_start,
@@ -132,6 +135,7 @@ def select(tables: Tables, island: Island) -> Tables:
         bend_at=coordinate[tables.bend_at[bends]],
         bend=tables.bend[bends],
         curvature_offset=tables.curvature_offset[rows],
+        paths=select_paths(tables.paths, rows, bodies, lambda old: _mapped(body, old), _entries),
     )
 
 
@@ -152,13 +156,17 @@ def select_control(control: Control, island: Island) -> Control:
         offset=control.offset[coordinates],
         schedule=_chosen(control.schedule, channels),
         force=_chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel()),
+        damping=control.damping[coordinates],
         desired=np.zeros(len(coordinates)),
         rate=np.zeros(len(coordinates)),
+        acceleration=np.zeros(len(coordinates)),
         planned=np.zeros(len(planned)),
         active=np.zeros(len(loops), dtype=np.int64),
         level=np.zeros(len(loops)),
         base=np.zeros(len(control.base)),
+        slope=np.zeros(len(control.slope)),
         by_position=np.zeros((len(channels), len(coordinates))),
+        by_velocity=np.zeros((len(channels), len(coordinates))),
         by_time=np.zeros(len(channels)),
     )
 

@@ -114,7 +114,7 @@ class Simulator:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            tension: f^a, shape (a,), N.
+            tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon.
             dt: s.
             fingertip_force: F over the step, shape (3,), N, base frame; none by default.
 
@@ -124,7 +124,8 @@ class Simulator:
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
         command = _vector("tension", tension, self._tension.size)
-        if np.any(command < 0.0):
+        tensions = np.delete(command, self.finger.actuators.voltages)
+        if np.any(tensions < 0.0):
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)

@@ -12,16 +12,24 @@ from finger_pin.files import replacing
 from finger_pin.views.plots.convergence import plot_convergence
 from finger_pin.views.plots.energy import plot_energy
 from finger_pin.views.plots.fig6 import plot_fig6
+from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.losses import plot_losses
+from finger_pin.views.plots.servo import plot_servo
+from finger_pin.views.trees import is_tree
 
-#: What is drawn of every result.
+#: What is drawn of every result of a finger, and of a hand.
 FIGURES = {"fig6": plot_fig6, "losses": plot_losses, "energy": plot_energy}
+FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
 
 
 def figures_of(result: xr.Dataset) -> dict[str, Callable[[xr.Dataset], Figure]]:
     """Return the figures that are drawn of a result, by name."""
-    checked = "convergence_difference" in result
-    return {**FIGURES, "convergence": plot_convergence} if checked else dict(FIGURES)
+    figures: dict[str, Callable[[xr.Dataset], Figure]] = dict(FIGURES_OF_TREES if is_tree(result) else FIGURES)
+    if "convergence_difference" in result:
+        figures["convergence"] = plot_convergence
+    if "motor_current" in result:
+        figures["servo"] = plot_servo
+    return figures
 
 
 def draw_all(result: xr.Dataset, folder: str | Path, names: Iterable[str] | None = None) -> list[Path]:
