@@ -68,7 +68,7 @@ def shown(tmp_path_factory):
         patch.setattr(loading, "resources", SimpleNamespace(files=lambda package: shipped))
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.serving.Viewing.wait", lambda viewing: viewing.close())
-        patch.setattr("finger_pin.views.plots.save_figure", not_painted)
+        patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)
         # The comparison of controllers leaves out the start.
         patch.setattr("finger_pin.studies.comparison.SETTLED", 0.0)
         meshcat = importlib.import_module("meshcat")
