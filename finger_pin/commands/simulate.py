@@ -165,10 +165,15 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
 
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
-    from finger_pin.description.loading import list_fingers, list_hands, list_scenarios
+    from finger_pin.description.loading import list_fingers, list_hands, list_motors, list_scenarios
     from finger_pin.description.scenario import METHODS
 
-    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Hands": list_hands()}
-    tables["Methods"] = dict.fromkeys(METHODS, "")
+    tables = {
+        "Scenarios": list_scenarios(),
+        "Fingers": list_fingers(),
+        "Hands": list_hands(),
+        "Motors": list_motors(),
+        "Methods": dict.fromkeys(METHODS, ""),
+    }
     rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}
     return "\n\n".join("\n".join([title, *lines]) for title, lines in rows.items())
