@@ -174,6 +174,7 @@ class Finger:
             ],
             self.routing.passive_names,
             self.tendons.mass,
+            moved=description.hand is not None and description.hand.palm.path is not None,
         )
 
     def __repr__(self) -> str:
@@ -251,7 +252,9 @@ class Finger:
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         return x
 
-    def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
+    def evaluate(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
         """Return all signals of (18) at a packed state.
 
         Args:
@@ -259,8 +262,9 @@ class Finger:
             command: f^a, shape (a,) or (m, a), N.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
+            base: How the palm of a hand moves, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
         """
-        return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force))
+        return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force, base))
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
@@ -301,18 +305,23 @@ class Finger:
             mechanism=found,
         )
 
-    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+    def powers(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
-        found = self.mechanism.evaluate(x, command, fingertip_force)
+        found = self.mechanism.evaluate(x, command, fingertip_force, base)
         return np.stack(list(found.account()[1].values()), axis=-1), found.external
 
     def static_torque(self, position: Array) -> Array:
         """Return what tendons have to exert at rest at theta, shape (n,): G and the springs' torque, N m."""
         return self.rigid_body.gravity_torque(position) + self.springs.torque(position, np.zeros_like(position))
 
-    def motion(self, position: Array, velocity: Array) -> Motion:
-        """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n)."""
-        found = self.rigid_body.kinematics(position, velocity)
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
+        """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n).
+
+        With a base that moves, energies are those of the motion in the world, where the base has no height.
+        """
+        found = self.rigid_body.kinematics(position, velocity, base)
         return Motion(found.tip, found.kinetic_energy, found.potential_energy)
 
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:

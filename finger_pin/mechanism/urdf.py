@@ -36,6 +36,8 @@ def to_urdf(description: FingerDescription) -> str:
     Raises:
         InputError: If a joint has no link, or a name that the URDF needs itself.
     """
+    if description.hand is not None:
+        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     links = _links(description)
     shapes = link_shapes(description, links)
     first, last = next(iter(links)), next(reversed(links.values()))

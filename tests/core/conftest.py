@@ -4,7 +4,17 @@ from dataclasses import replace
 
 import example_robot_data
 import pytest
-from core_cases import FORCE, Case, lugre, none_passive, on_model, tree_model, two_passive, without_abduction_link
+from core_cases import (
+    FORCE,
+    Case,
+    carried,
+    lugre,
+    none_passive,
+    on_model,
+    tree_model,
+    two_passive,
+    without_abduction_link,
+)
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -41,6 +51,7 @@ def scenarios():
 def cases(scenarios):
     """All loops by name, each with and without a fingertip force."""
     loops = {name: ClosedLoop.from_scenario(scenario) for name, scenario in scenarios.items()}
+    loops["carried"] = ClosedLoop.from_scenario(carried())
     loops["meeting_axes"] = without_abduction_link(loops["fig6"])
     pushed = {f"{name}_pushed": replace(loop, fingertip_force=FORCE) for name, loop in loops.items()}
     return {name: Case.of(loop) for name, loop in (loops | pushed).items()}

@@ -21,7 +21,7 @@ BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
     name + push
     for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes")
+    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "carried")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
@@ -104,6 +104,16 @@ def lugre():
     }
     table["finger"]["joint_friction"] |= {"micro_damping": [2e-3, 1e-3, 0.0, 2.5e-3], "stribeck_exponent": [1, 2, 2, 1]}
     return fp.Scenario.model_validate(table)
+
+
+def carried():
+    """The thumb of a hand whose palm swings about and along all axes."""
+    names, rates = ("x", "y", "z", "roll", "pitch", "yaw"), (1.1, 1.7, 2.3, 1.3, 0.9, 1.9)
+    path = {
+        name: {"amplitude": 0.05 if index < 3 else 0.5, "frequency": rate, "phase": 0.3 * index}
+        for index, (name, rate) in enumerate(zip(names, rates, strict=True))
+    }
+    return fp.load_scenario("hand", {"hand.palm.path": path}).parts()["thumb"]
 
 
 def without_abduction_link(loop):

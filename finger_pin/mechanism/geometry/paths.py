@@ -147,6 +147,7 @@ class TendonGeometry:
         pieces: dict[str, tuple[Span | Arc, ...]] = {}
         pulleys, lanes, first = [], [], 0
         visuals, widths, sizes = list(_palm(hand)), list[float](), []
+        travel = sum(hand.palm.on_path(axis).greatest for axis in ("x", "y", "z"))
         for name, finger in hand.built().items():
             own, placed, begin = TendonGeometry(finger, resolution=resolution), hand.fingers[name], first
             place = pin.SE3(placed.rotation, np.array(placed.position))
@@ -157,7 +158,7 @@ class TendonGeometry:
                 visuals.append(replace(each, name=f"{name}.{each.name}", **at))
             lanes.append((begin, own.lanes))
             widths += own.widths
-            sizes.append(float(np.linalg.norm(placed.position)) + own.size)
+            sizes.append(float(np.linalg.norm(placed.position)) + own.size + travel)
             first += len(finger.joints)
         self._pieces = {name: pieces[name] for name in self.description.tendons}
         self.pulleys, self.visuals, self.widths, self.size = tuple(pulleys), tuple(visuals), tuple(widths), max(sizes)
@@ -171,8 +172,13 @@ class TendonGeometry:
         }
         self.lanes = Lanes(offsets, min(own.spacing for _, own in lanes), families)
 
-    def poses(self, joint_position: ArrayLike) -> LinkPoses:
-        """Return where the links are at theta, shape (..., n), rad."""
+    def poses(self, joint_position: ArrayLike, base: LinkPoses | None = None) -> LinkPoses:
+        """Return where the links are at theta, shape (..., n), rad.
+
+        Args:
+            joint_position: theta.
+            base: Poses of the base, shapes (..., 3, 3) and (..., 3), where it moves.
+        """
         q = self._checked(joint_position)
         flat, count = np.ascontiguousarray(q.reshape(-1, self.model.nq)), self.model.njoints
         rotation, translation = np.empty((len(flat), count, 3, 3)), np.empty((len(flat), count, 3))
@@ -182,6 +188,10 @@ class TendonGeometry:
             for index, placement in enumerate(data.oMi):
                 rotation[row, index], translation[row, index] = placement.rotation, placement.translation
         leading = q.shape[:-1]
+        if base is not None:
+            turned, moved = base.rotation.reshape(-1, 1, 3, 3), base.translation.reshape(-1, 1, 3)
+            translation = (turned @ translation[..., None])[..., 0] + moved
+            rotation = turned @ rotation
         return LinkPoses(rotation.reshape(*leading, count, 3, 3), translation.reshape(*leading, count, 3))
 
     def paths(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +19,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 
@@ -61,10 +63,13 @@ def write_animation(
 def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghost: xr.Dataset | None = None) -> str:
     """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
     motion = Motion.of(result)
-    in_view = motion.position[:: max(1, len(motion.time) // _POSITIONS_IN_VIEW)]
+    every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
+    seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
     beside = Motion.of(ghost).ghost(motion.time) if ghost is not None else None
-    header = motion.scene.header(motion.title, in_view, motion.largest, live=False, forces=forces, ghost=beside)
-    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension)
+    header = motion.scene.header(
+        motion.title, motion.position[every], motion.largest, live=False, forces=forces, ghost=beside, palm=seen
+    )
+    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
         chunk["ghost"] = beside.chunk()
     return render({**header, "chunks": [chunk]})
@@ -96,6 +101,7 @@ class Motion:
         time: Shape (m,), s: samples of the result.
         position: theta, shape (m, n), rad.
         tension: Of every strand, shape (m, s), N.
+        palm: Where the palm is, m poses, if it moves.
     """
 
     scene: Scene
@@ -103,6 +109,7 @@ class Motion:
     time: Array
     position: Array
     tension: Array
+    palm: LinkPoses | None = None
 
     @property
     def largest(self) -> float:
@@ -112,6 +119,7 @@ class Motion:
     def ghost(self, time: Array) -> Ghost:
         """Return it as seen beside another motion, with frames at other times, shape (m,), s; it ends where it ends."""
         position = np.stack([np.interp(time, self.time, column) for column in self.position.T], axis=-1)
+        # A palm is shown at rest beside another one.
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
@@ -139,7 +147,7 @@ class Motion:
             if not np.isfinite(values).all():
                 raise InputError(f"result.{name}", "must be finite")
         title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
-        return cls(scene, title, time[frames], position, tension)
+        return cls(scene, title, time[frames], position, tension, _palm(result, frames))
 
 
 def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
@@ -153,6 +161,14 @@ def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array
     proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
     halves = np.stack([proximal, distal], axis=-1).reshape(len(frames), 2 * passive)
     return np.concatenate([tension[:, :actuated], halves], axis=1)
+
+
+def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:
+    if "palm_position" not in result:
+        return None
+    quaternions = _variable(result, "palm_orientation")[frames]
+    rotations = np.array([pin.Quaternion(each).toRotationMatrix() for each in quaternions])
+    return LinkPoses(rotations, _variable(result, "palm_position")[frames])
 
 
 def _frame_indices(time: Array, rate: float) -> Indices:

@@ -119,6 +119,7 @@ class Scene:
         live: bool,
         forces: ForcePolytope | None = None,
         ghost: Ghost | None = None,
+        palm: LinkPoses | None = None,
     ) -> dict[str, Any]:
         """Return what the page needs to know before the first frame.
 
@@ -129,9 +130,10 @@ class Scene:
             live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
             ghost: Another finger, drawn faintly beside this one, if given.
+            palm: Where the palm is at those positions, if it moves.
         """
         geometry, tube = self.geometry, self.tube_radius
-        poses = geometry.poses(joint_positions)
+        poses = geometry.poses(joint_positions, palm)
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
@@ -163,16 +165,19 @@ class Scene:
             "chunks": [],
         }
 
-    def chunk(self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike) -> dict[str, str]:
+    def chunk(
+        self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike, palm: LinkPoses | None = None
+    ) -> dict[str, str]:
         """Return frames for the page.
 
         Args:
             time: Shape (m,), s.
             joint_position: theta, shape (m, n), rad.
             tension: Of every strand, shape (m, s), N.
+            palm: Where the palm is, if it moves.
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
-        poses = self.geometry.poses(q)
+        poses = self.geometry.poses(q, palm)
         paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
         return {
             "time": _encode(time, "<f8"),

@@ -104,7 +104,7 @@ class _Film:
         """Set the stage: camera, legend, and what stays."""
         scene = motion.scene
         self.motion = motion
-        self.poses = scene.geometry.poses(motion.position)
+        self.poses = scene.geometry.poses(motion.position, motion.palm)
         self.solids = tuple(_solids(scene))
         self.scale = scale_above(motion.largest)
         away = np.array(_AWAY) / np.linalg.norm(_AWAY)
