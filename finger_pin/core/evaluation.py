@@ -72,7 +72,7 @@ class CompiledMechanism:
             externals[at],
             acceleration[at],
             rate[at],
-            base_power=np.asarray(booked[at][..., -1]) if mechanism.moved else None,
+            base_power=booked[at][..., -1:] if mechanism.moved else None,
             booked=booked[at],
         )
 

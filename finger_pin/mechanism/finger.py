@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -120,6 +121,7 @@ class Finger:
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
         further: Tables of rows that were added.
+        visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
     """
 
     def __init__(
@@ -157,6 +159,7 @@ class Finger:
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
         self.further = tuple(rows)
+        self.visuals: pin.GeometryModel | None = None
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
             self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows), ringing
@@ -189,14 +192,18 @@ class Finger:
     @classmethod
     def from_model(
         cls,
-        description: FingerDescription,
+        description: FingerDescription | HandDescription,
         model: pin.Model,
-        joints: Mapping[str, str],
-        tip_frame: str,
+        joints: Mapping[str, str] | Mapping[str, Mapping[str, str]],
+        tip_frame: str | Mapping[str, str],
         configuration: Array | None = None,
-        base_axis: Sequence[float] = (1.0, 0.0, 0.0),
+        base_axis: Sequence[float] | Mapping[str, Sequence[float]] = (1.0, 0.0, 0.0),
+        visuals: pin.GeometryModel | None = None,
     ) -> Finger:
         """Route tendons on some joints of any Pinocchio model; its other joints are locked.
+
+        Of a hand several fingers are routed at once: ``joints``, ``tip_frame`` and ``base_axis`` are then by finger.
+        The places in its description do not count.
 
         Args:
             description: Joints (no links needed), tendons and friction; its gravity replaces the model's.
@@ -205,17 +212,24 @@ class Finger:
             tip_frame: Frame of the fingertip in the model.
             configuration: Where the other joints are locked, shape (nq,); neutral by default.
             base_axis: e_1 of (17), the unit vector along which the tendons run at the base; model's base frame.
+            visuals: Solids of the model, meshes among them, for `view` and `write_animation` with ``finger=``.
 
         Raises:
             InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates,
                 or the configuration has the wrong size.
         """
-        for name in description.joints:
-            if name not in joints:
+        joined = description.joined() if isinstance(description, HandDescription) else description
+        fingers = tuple(description.fingers) if isinstance(description, HandDescription) else ("",)
+        named = _by_joint(joints)
+        tips, axes = (
+            _by_finger(each, fingers, what) for each, what in ((tip_frame, "tip_frame"), (base_axis, "base_axis"))
+        )
+        for name in joined.joints:
+            if name not in named:
                 raise InputError(f"joints.{name}", "is missing: name the model's joint")
-        chosen = [joints[name] for name in description.joints]
-        for name, wanted in joints.items():
-            if name not in description.joints or not model.existJointName(wanted):
+        chosen = [named[name] for name in joined.joints]
+        for name, wanted in named.items():
+            if name not in joined.joints or not model.existJointName(wanted):
                 raise InputError(f"joints.{name}", "no such joint in the description or the model", wanted)
         indices = [int(model.getJointId(name)) for name in chosen]
         if indices != sorted(set(indices)):
@@ -224,9 +238,17 @@ class Finger:
         posture = pin.neutral(model) if configuration is None else np.asarray(configuration, dtype=float)
         if posture.shape != (model.nq,):
             raise InputError("configuration", f"must be {model.nq} numbers, one per coordinate of the model", posture)
-        reduced = pin.buildReducedModel(model, locked, posture)
-        reduced.gravity.linear[:] = description.gravity
-        return cls(description, RigidBody(reduced, tip_frame, base_axis))
+        solids = pin.GeometryModel() if visuals is None else visuals
+        reduced, shown = pin.buildReducedModel(model, solids, locked, posture)
+        reduced.gravity.linear[:] = joined.gravity
+        body = RigidBody(reduced, tips)
+        for index, name in enumerate(joined.joints, start=1):
+            if body.carriers[index] == 0:
+                own = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
+                body.proximal_axes[index] = np.asarray(axes[own], dtype=float)
+        finger = cls(joined, body)
+        finger.visuals = shown
+        return finger
 
     @property
     def coupling(self) -> Array:
@@ -327,3 +349,23 @@ class Finger:
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
         return self.mechanism.evaluate(x, command, fingertip_force).rate
+
+
+def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Return names of a model's joints by those of a description, which have dots in a hand."""
+    found: dict[str, str] = {}
+    for name, given in joints.items():
+        found |= {name: given} if isinstance(given, str) else {f"{name}.{own}": each for own, each in given.items()}
+    return found
+
+
+def _by_finger(given: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
+    """Return one item for each finger, of one for all or of a table by finger."""
+    if not isinstance(given, Mapping):
+        if entry == "tip_frame" and len(fingers) > 1:
+            raise InputError(entry, f"must be a table with a frame for each of {', '.join(fingers)}", given)
+        return [given] * len(fingers)
+    for name in fingers:
+        if name not in given:
+            raise InputError(f"{entry}.{name}", f"is missing: there must be one for each of {', '.join(fingers)}")
+    return [given[name] for name in fingers]

@@ -65,7 +65,7 @@ class Evaluation:
         external: J^T F, shape (..., N).
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
-        base_power: That of a base that moves, shape (...), W.
+        base_power: That of a base that moves, shape (..., 1), W.
         booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
     """
 
@@ -95,7 +95,7 @@ class Evaluation:
             for name, value in flows.items():
                 powers[name] = powers[name] + value
         if self.base_power is not None:
-            powers[BASE] = self.base_power
+            powers[BASE] = self.base_power[..., 0]
         return energies, powers
 
 
@@ -264,7 +264,7 @@ class Mechanism:
             torque=torque,
             external=external,
             acceleration=acceleration,
-            base_power=np.zeros(lead) if power is None and self.moved else power,
+            base_power=np.zeros((*lead, 1)) if power is None and self.moved else power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 
@@ -278,7 +278,7 @@ class Mechanism:
     def _base_power(self, q: Array, v: Array, a: Array, base: Array) -> Array:
         if q.ndim > 1:
             return np.array([self._base_power(*each) for each in zip(q, v, a, base, strict=True)])
-        return np.asarray(base[:6] @ self.body.base_dynamics(q, v, a, base)[0])
+        return np.array([base[:6] @ self.body.base_dynamics(q, v, a, base)[0]])
 
     def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
         total = np.zeros((*lead, len(table.names)))

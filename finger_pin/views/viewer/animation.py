@@ -19,6 +19,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
@@ -37,6 +38,7 @@ def write_animation(
     *,
     forces: ForcePolytope | None = None,
     ghost: xr.Dataset | None = None,
+    finger: Finger | None = None,
 ) -> Path:
     """Write a result as one HTML file that plays it, without a network.
 
@@ -47,6 +49,7 @@ def write_animation(
         path: Of the file.
         forces: Drawn at the fingertip of its posture, if given.
         ghost: Another result, whose finger moves faintly beside this one at the same times, if given.
+        finger: What has moved, where it stands on a model of the user's own (`Finger.from_model`).
 
     Returns:
         The path of the file.
@@ -54,15 +57,20 @@ def write_animation(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    target, text = Path(path), animation_page(result, forces, ghost)
+    target, text = Path(path), animation_page(result, forces, ghost, finger)
     with replacing(target) as temporary:
         Path(temporary).write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghost: xr.Dataset | None = None) -> str:
+def animation_page(
+    result: xr.Dataset,
+    forces: ForcePolytope | None = None,
+    ghost: xr.Dataset | None = None,
+    finger: Finger | None = None,
+) -> str:
     """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
-    motion = Motion.of(result)
+    motion = Motion.of(result, finger=finger)
     every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
     seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
     beside = Motion.of(ghost).ghost(motion.time) if ghost is not None else None
@@ -75,15 +83,16 @@ def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghos
     return render({**header, "chunks": [chunk]})
 
 
-def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
+def posture_page(finger: Finger | FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
     """Return the page of a finger at rest in the posture of its fingertip forces.
 
     Args:
-        description: The finger.
+        finger: The finger, or its description.
         forces: Its forces.
         strands: Tensions to show, shape (s,), N; none by default.
     """
-    scene = Scene(description)
+    scene = Scene(finger)
+    description = scene.geometry.description
     tension = np.zeros((1, len(scene.strands))) if strands is None else np.asarray(strands, dtype=float)[None]
     position = forces.position[None]
     title = description.title or description.name
@@ -123,12 +132,13 @@ class Motion:
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
-    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE) -> Motion:
+    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE, finger: Finger | None = None) -> Motion:
         """Choose the frames of a result.
 
         Args:
             result: What `simulate` returned or saved.
             rate: Frames per second of motion; fewer where the motion is long or the result has fewer samples.
+            finger: What has moved, if it stands on a model of the user's own.
 
         Raises:
             InputError: If the result lacks something that is shown.
@@ -136,7 +146,7 @@ class Motion:
         scenario = _scenario(result)
         hand = scenario.get("hand")
         described = FingerDescription.model_validate(scenario["finger"]) if hand is None else _joined(hand)
-        scene = Scene(described)
+        scene = Scene(finger or described)
         time = _variable(result, "time")
         if len(time) == 0:
             raise InputError("result.time", "must have at least one sample")
