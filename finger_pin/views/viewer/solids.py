@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import coal
 import numpy as np
 
 from finger_pin.description.routing import Array
@@ -39,7 +40,7 @@ def solid_commands(
         colour: Of all solids, red, green and blue; by default each has its own.
 
     Raises:
-        InputError: If a visual is no box, cylinder or sphere.
+        InputError: If a visual is no box, cylinder, sphere or mesh.
     """
     links = link_names(geometry)
     for visual in geometry.visuals:
@@ -66,10 +67,32 @@ def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
         return _cylinder(shape.radius, 2.0 * shape.halfLength), _Y_TO_Z
     if kind == "Sphere":
         return {"type": "SphereGeometry", "radius": shape.radius, "widthSegments": 40, "heightSegments": 28}, np.eye(3)
+    if is_mesh(shape):
+        return _mesh_geometry(shape), np.eye(3)
     if kind == "Box":
         width, height, depth = (2.0 * float(half) for half in shape.halfSide)
         return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, np.eye(3)
-    raise InputError(f"visual {name}", "must be a box, a cylinder or a sphere", kind)
+    raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere or a mesh", kind)
+
+
+def is_mesh(shape: Any) -> bool:
+    """Return whether a geometry of Pinocchio is a mesh."""
+    return isinstance(shape, coal.BVHModelBase)
+
+
+def _mesh_geometry(shape: Any) -> Command:
+    """Return a mesh with a normal for each face, so that its edges show."""
+    corners = np.asarray(shape.vertices())
+    faces = np.array([[triangle[i] for i in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))])
+    points = corners[faces]
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    buffers = {"position": np.round(points.reshape(-1, 3), 5), "normal": np.round(np.repeat(normals, 3, axis=0), 2)}
+    attributes = {
+        name: {"itemSize": 3, "type": "Float32Array", "array": values.ravel().tolist()}
+        for name, values in buffers.items()
+    }
+    return {"type": "BufferGeometry", "data": {"attributes": attributes}}
 
 
 def _cylinder(radius: float, height: float) -> Command:
