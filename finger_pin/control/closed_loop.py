@@ -98,7 +98,8 @@ class ClosedLoop:
             InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
                 or are not finite, or tensions are negative.
         """
-        finger, start = finger or Finger(scenario.finger), scenario.simulation.start_time
+        finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
+        start = scenario.simulation.start_time
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),

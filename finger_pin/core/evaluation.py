@@ -139,6 +139,10 @@ class CompiledFinger:
         """Read a finger."""
         self.finger = finger
         self._mechanism = CompiledMechanism(finger.mechanism)
+        # Fingertip and energies are those of the finger alone.
+        self._alone = self._mechanism
+        if finger.surroundings is not None:
+            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, []))
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
@@ -151,7 +155,7 @@ class CompiledFinger:
 
     def motion(self, position: Array, velocity: Array) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""
-        return self._mechanism.motion(position, velocity)
+        return self._alone.motion(position, velocity)
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...]) -> Array:

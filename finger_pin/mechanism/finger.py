@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.loading import load_finger
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -20,6 +21,7 @@ from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.urdf import build_rigid_body
 
@@ -119,6 +121,7 @@ class Finger:
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
         further: Tables of rows that were added.
+        surroundings: Objects and contacts; None without any.
     """
 
     def __init__(
@@ -126,6 +129,7 @@ class Finger:
         description: FingerDescription | str | Path,
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
+        objects: Mapping[str, Object] | None = None,
     ) -> None:
         """Build a finger.
 
@@ -134,9 +138,11 @@ class Finger:
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
+            objects: What its links may touch, by name; without any they do not touch each other either.
 
         Raises:
-            InputError: If the joints of the two differ, or one has several coordinates.
+            InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no
+                size, or an object the name of a joint.
         """
         if isinstance(description, str | Path):
             description = load_finger(description)
@@ -171,6 +177,11 @@ class Finger:
             self.routing.passive_names,
             self.tendons.mass,
         )
+        self.surroundings = None if objects is None else Surroundings.of(objects, description, self.mechanism)
+        if self.surroundings is not None:
+            self.mechanism = self.surroundings.around(self.mechanism)
+            free, contacts = tuple(self.surroundings.free), self.surroundings.contacts.names
+            self.layout = replace(self.layout, objects=free, contacts=contacts)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -242,6 +253,9 @@ class Finger:
         state.position[:] = position
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
+        if self.surroundings is not None:
+            assert state.object_pose is not None and state.object_velocity is not None
+            state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
         return x
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
@@ -256,7 +270,7 @@ class Finger:
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        joints = len(self.routing.joints)
+        joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
@@ -275,7 +289,7 @@ class Finger:
                 level=both(lambda tendons: tendons["level"]),
                 stiction_rate=both(lambda tendons: tendons.rate),
                 strands=np.concatenate([driven.force, halves.force], axis=-1),
-                passive_acceleration=found.acceleration[..., joints:],
+                passive_acceleration=found.acceleration[..., bodies : bodies + self.routing.passive],
             ),
             joints=JointForces(
                 reaction=pins["normal_force"],

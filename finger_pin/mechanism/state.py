@@ -1,9 +1,10 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta | p | theta' | p' | F^s of the tendons | F^s of the joints |
-    |   n   | p |   n    | p  |         t          |         n         |
+    | theta |  o  | p | theta' |  o' | p' |  z  | F^s of the tendons | F^s of the joints |
+    |   n   | 7 f | p |   n    | 6 f | p  | 2 c |         t          |         n         |
 
-n joints, t tendons, p of them passive: 19 numbers for the paper's finger.
+n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
+c contacts with bristles bent by z: 19 numbers for the paper's finger alone.
 """
 
 from __future__ import annotations
@@ -15,6 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+# The blocks of the packed state, in order.
+_ORDER = (
+    "position",
+    "object_pose",
+    "passive_position",
+    "velocity",
+    "object_velocity",
+    "passive_velocity",
+    "contact_bend",
+    "tendon_stiction",
+    "joint_stiction",
+    "further",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +43,10 @@ class State:
         passive_velocity: p_5', shape (..., p), m/s.
         tendon_stiction: F^s of the tendons, shape (..., t), N.
         joint_stiction: F^s of the joints, shape (..., n), N m.
-        further: States of rows of one's own, shape (..., f); zero if left out.
+        further: States of rows of one's own, shape (..., f); zero if left out, as what follows.
+        object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
+        object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
+        contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
     """
 
     position: Array
@@ -38,6 +56,9 @@ class State:
     tendon_stiction: Array
     joint_stiction: Array
     further: Array | None = None
+    object_pose: Array | None = None
+    object_velocity: Array | None = None
+    contact_bend: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -50,6 +71,8 @@ class Layout:
         passive: Number of passive tendons.
         further: Name and scale of every state of further rows, which follow.
         ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
+        objects: Names of the free objects.
+        contacts: Names of the contacts.
     """
 
     joints: tuple[str, ...]
@@ -57,12 +80,14 @@ class Layout:
     passive: int
     further: tuple[tuple[str, float], ...] = ()
     ringing: tuple[float, ...] = ()
+    objects: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Sizes of the blocks, in order."""
-        n, p, t = len(self.joints), self.passive, len(self.tendons)
-        return n, p, n, p, t, n, len(self.further)
+        n, p, t, f = len(self.joints), self.passive, len(self.tendons), len(self.objects)
+        return n, 7 * f, p, n, 6 * f, p, 2 * len(self.contacts), t, n, len(self.further)
 
     @cached_property
     def size(self) -> int:
@@ -78,11 +103,22 @@ class Layout:
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
         passive = self.tendons[len(self.tendons) - self.passive :]
+        poses, rates, bends = (
+            tuple(f"{name}.{part}" for name in names for part in parts.split())
+            for names, parts in (
+                (self.objects, "x y z qx qy qz qw"),
+                (self.objects, "vx vy vz wx wy wz"),
+                (self.contacts, "1 2"),
+            )
+        )
         groups = (
             ("joint_position", self.joints),
+            ("object_pose", poses),
             ("passive_position", passive),
             ("joint_velocity", self.joints),
+            ("object_velocity", rates),
             ("passive_velocity", passive),
+            ("contact_bend", bends),
             ("tendon_stiction", self.tendons),
             ("joint_stiction", self.joints),
         )
@@ -91,19 +127,11 @@ class Layout:
 
     def pack(self, state: State) -> Array:
         """Return the packed vector, shape (..., size)."""
-        further = np.zeros((*state.position.shape[:-1], len(self.further))) if state.further is None else state.further
-        return np.concatenate(
-            [
-                state.position,
-                state.passive_position,
-                state.velocity,
-                state.passive_velocity,
-                state.tendon_stiction,
-                state.joint_stiction,
-                further,
-            ],
-            axis=-1,
-        )
+        lead, blocks = state.position.shape[:-1], []
+        for name, size in zip(_ORDER, self.sizes, strict=True):
+            given = getattr(state, name)
+            blocks.append(np.zeros((*lead, size)) if given is None else given)
+        return np.concatenate(blocks, axis=-1)
 
     def unpack(self, x: Array) -> State:
         """Return views of a packed vector, shape (..., size).
@@ -113,7 +141,7 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        return State(*[x[..., part] for part in self._parts])
+        return State(**{name: x[..., part] for name, part in zip(_ORDER, self._parts, strict=True)})
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).
@@ -125,10 +153,16 @@ class Layout:
         """
         scales = np.concatenate(
             [
-                np.repeat([1.0, 1e-3, 10.0, 0.1, 1.0, 1e-2], self.sizes[:-1]),
+                np.repeat([1.0, 1.0, 1e-3, 10.0, 10.0, 0.1, 1e-5, 1.0, 1e-2], self.sizes[:-1]),
                 [scale for _, scale in self.further],
             ]
         )
         if self.ringing:
-            scales[self._parts[3]] = np.maximum(scales[self._parts[3]], 1e-5 * np.array(self.ringing))
+            passive = self._parts[_ORDER.index("passive_velocity")]
+            scales[passive] = np.maximum(scales[passive], 1e-5 * np.array(self.ringing))
+        if self.objects:
+            # An object moves by centimetres where a joint turns by a radian.
+            poses, rates = (self._parts[_ORDER.index(name)] for name in ("object_pose", "object_velocity"))
+            scales[poses].reshape(-1, 7)[:, :3] = 1e-2
+            scales[rates].reshape(-1, 6)[:, :3] = 0.1
         return scales

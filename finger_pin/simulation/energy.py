@@ -59,7 +59,12 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     """Return the stored energies at the given signals by name, shape (...,), J."""
     lumps = 0.5 * np.sum(finger.mechanism.inertia * signals.state.passive_velocity**2, axis=-1)
     stored, _ = signals.mechanism.account()
-    return {"kinetic": motion.kinetic_energy + lumps, "gravity": motion.potential_energy, **stored}
+    found = {"kinetic": motion.kinetic_energy + lumps, "gravity": motion.potential_energy, **stored}
+    state = signals.state
+    if finger.surroundings is not None and state.object_pose is not None and state.object_velocity is not None:
+        kinetic, potential = finger.surroundings.energies(state.object_pose, state.object_velocity)
+        found |= {"objects_kinetic": kinetic, "objects_gravity": potential}
+    return found
 
 
 def powers(signals: FingerSignals) -> Flows:

@@ -10,6 +10,7 @@ LAYOUTS = {
     "paper": Layout(("a", "b", "c", "d"), ("T1", "T2", "T3", "T4", "T5"), 1),
     "no passive tendon": Layout(("a", "b"), ("T1", "T2", "T3"), 0),
     "three passive tendons": Layout(("a",), ("T1", "T2", "P1", "P2", "P3"), 3),
+    "objects": Layout(("a", "b"), ("T1", "P1"), 1, objects=("ball", "box"), contacts=("a-ball", "b-ball", "ball-box")),
 }
 
 
@@ -31,12 +32,14 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     state = layout.unpack(x)
     np.testing.assert_array_equal(layout.pack(state), x)
     n, t, p = len(layout.joints), len(layout.tendons), layout.passive
-    for name, size in zip(State.__annotations__, (n, p, n, p, t, n, 0), strict=True):
+    f, c = len(layout.objects), len(layout.contacts)
+    for name, size in zip(State.__annotations__, (n, p, n, p, t, n, 0, 7 * f, 6 * f, 2 * c), strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 
 
-def test_sizes_add_up_to_three_per_joint_one_per_tendon_and_two_per_passive_tendon(layout):
-    assert layout.size == 3 * len(layout.joints) + len(layout.tendons) + 2 * layout.passive
+def test_sizes_add_up_to_three_per_joint_one_per_tendon_and_two_per_passive_tendon_and_contact(layout):
+    alone = 3 * len(layout.joints) + len(layout.tendons) + 2 * layout.passive
+    assert layout.size == alone + 13 * len(layout.objects) + 2 * len(layout.contacts)
     assert sum(layout.sizes) == layout.size
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.files import replacing
 from finger_pin.views.plots.comparing import compare
+from finger_pin.views.plots.contact import plot_contact
 from finger_pin.views.plots.convergence import plot_convergence
 from finger_pin.views.plots.energy import plot_energy
 from finger_pin.views.plots.fig6 import plot_fig6
@@ -30,6 +31,7 @@ from finger_pin.views.plots.workspace import plot_workspace
 __all__ = [
     "compare",
     "draw_all",
+    "plot_contact",
     "plot_convergence",
     "plot_critical_friction",
     "plot_energy",
@@ -62,6 +64,8 @@ def draw_all(result: xr.Dataset, folder: str | Path) -> list[Path]:
     figures = dict(_FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
+    if "contact_force" in result:
+        figures["contact"] = plot_contact
     return [save_figure(draw(result), Path(folder) / f"{name}.png") for name, draw in figures.items()]
 
 

@@ -33,6 +33,9 @@ _STORED = {
     "joint_springs": "joints' springs",
     "tendon_bristles": "tendon bristles",
     "joint_bristles": "joint bristles",
+    "contacts": "contacts",
+    "objects_kinetic": "objects, kinetic",
+    "objects_gravity": "objects, gravity",
 }
 _SUPPLIED = ("actuators", "fingertip")
 _LOST = {
@@ -45,6 +48,9 @@ _LOST = {
     "limiter": ("stroke limiters", GREEN),
     "joint_springs": ("joints' springs", "saddlebrown"),
     "slack": ("tensions cut at zero", PURPLE),
+    "contacts_impact": ("contacts, impact", "darkcyan"),
+    "contacts_sliding": ("contacts sliding", "deeppink"),
+    "contacts_micro_damping": ("contacts' bristles", "tan"),
 }
 _MILLI = 1e3
 
