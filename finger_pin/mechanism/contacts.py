@@ -41,7 +41,7 @@ class Solid:
         radius: Of the segment, m.
         points: Where it touches what is flat: spheres in the frame of the joint, shape (m, 3), m.
         rounding: Their radius, m.
-        surface: Its surface; None for links, whose contacts have the surface of what they touch.
+        surface: Its surface; None for links and where it is left out, which touch with that of what they touch.
     """
 
     name: str
@@ -108,7 +108,7 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
 
 
 def law_numbers(one: Surface | None, other: Surface | None) -> tuple[float, ...]:
-    """Return the numbers of the law where two surfaces meet: of each the smaller."""
+    """Return the numbers of the law where two surfaces meet: of each the smaller; None leaves it to the other."""
     surfaces = [each for each in (one, other) if each is not None] or [Surface()]
     number = {name: min(getattr(each, name) for each in surfaces) for name in Surface.model_fields}
     kinetic = number["friction"]
