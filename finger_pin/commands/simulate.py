@@ -6,7 +6,7 @@ import gc
 import warnings
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -36,8 +36,11 @@ def simulate(
     check: Annotated[
         bool, typer.Option("--check", help="Repeat the run at a tighter tolerance, and report where the two part.")
     ] = False,
+    mujoco: Annotated[
+        Path | None, typer.Option(metavar="XML", help="Instead of a scenario: move the hand of a MuJoCo model.")
+    ] = None,
     quiet: Quiet = False,
-    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers and methods, and exit.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers, hands, methods, and exit.")] = False,
 ) -> None:
     """Simulate a scenario, write its results, and print a summary."""
     changed = overrides(settings, duration=duration, method=method)
@@ -54,7 +57,7 @@ def simulate(
 
         gc.enable()
 
-        loaded = load_scenario(scenario, changed)
+        loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
         output = output or Path("results", default_name(loaded, settings, duration, method))
         if check:
             tightened(loaded)
@@ -83,6 +86,19 @@ def simulate(
             from finger_pin.views.viewer import view as show
 
             show(result)
+
+
+def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
+    """Return a scenario that moves the hand of a MuJoCo model, and say what of the model is not carried over."""
+    from finger_pin.description.exercise import exercise
+    from finger_pin.description.loading import read_scenario
+    from finger_pin.mechanism.from_mujoco import from_mujoco
+
+    description = from_mujoco(path, path.stem)
+    assert description.tree is not None
+    if not quiet and description.tree.left_out:
+        print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
+    return read_scenario(exercise(description), changed)
 
 
 def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
@@ -129,9 +145,11 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
     try:
         if drawing is not None:
             drawing.start(folder.stage)
+        from finger_pin.views.trees import is_tree
         from finger_pin.views.viewer import write_animation
 
-        write_animation(result, folder.stage / "animation.html")
+        if not is_tree(result):
+            write_animation(result, folder.stage / "animation.html")
         if drawing is not None:
             drawing.wait()
     except OSError:
@@ -148,9 +166,10 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
 
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
-    from finger_pin.description.loading import list_fingers, list_scenarios
+    from finger_pin.description.loading import list_fingers, list_hands, list_scenarios
     from finger_pin.description.scenario import METHODS
 
-    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Methods": dict.fromkeys(METHODS, "")}
+    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Hands": list_hands()}
+    tables["Methods"] = dict.fromkeys(METHODS, "")
     rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}
     return "\n\n".join("\n".join([title, *lines]) for title, lines in rows.items())

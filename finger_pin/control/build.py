@@ -12,6 +12,7 @@ from finger_pin.analysis import critical_friction
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Distribution, PseudoInverse
 from finger_pin.control.fingertip import FingertipForce
+from finger_pin.control.hand import joined_controller
 from finger_pin.control.joint_compensation import JointCompensation
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
@@ -32,7 +33,8 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
 
     Tensions in open loop, or the paper's, unless an entry asks for more; then a `CompensatedController`, inside a
     `PassiveTensionLoop` if asked. A finger without force closure has no internal tension (22) to raise: its tensions
-    are the least of at least f0 that exert tau^d and hold the springs, or come nearest (`LimitedDistribution`).
+    are the least of at least f0 that exert tau^d and hold the springs, or come nearest (`LimitedDistribution`). In a
+    hand every finger has its own.
 
     Args:
         scenario: The scenario.
@@ -42,6 +44,10 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
         InputError: If the joint friction that it is to compensate is believed to lock the finger.
     """
     finger = finger or Finger(scenario.finger)
+    parts = scenario.parts()
+    if len(parts) > 1:
+        return joined_controller([build_controller(part) for part in parts.values()], finger.routing)
+    scenario = next(iter(parts.values()))
     settings = scenario.controller
     if settings.kind == "tensions":
         return OpenLoopTensions.from_scenario(scenario, finger.routing)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_serializer, field_validator
 
+from finger_pin.description.by_finger import flat, given, nested
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.signals import ForceSignal, of_axes
+from finger_pin.description.signals import ForceSignal, InputSignal, of_axes
 from finger_pin.description.validation import (
     Description,
+    FullName,
     Name,
     Numbers,
     check_size,
@@ -99,6 +101,9 @@ class ControllerSettings(Description):
 
     With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
     columns are ``time`` and actuated tendons, and become samples of ``tensions``.
+
+    In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
+    ``sampling`` is the same for all.
     """
 
     file_keys = ("file",)
@@ -106,8 +111,11 @@ class ControllerSettings(Description):
     kind: Annotated[Literal["proportional", "tensions"], choice("proportional", "tensions")] = quantity(
         "proportional", unit="1", source="(19)", doc="Which controller; tensions: open loop."
     )
-    tensions: dict[Name, ForceSignal] | None = Field(
+    tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."
+    )
+    inputs: dict[Name, InputSignal] | None = Field(
+        None, description="By actuator of a tree; one without a signal has zero input."
     )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
@@ -134,29 +142,30 @@ class ControllerSettings(Description):
     distribution: DistributionSettings | None = Field(None, description="Quadratic programme with tension limits.")
     sampling: SamplingSettings | None = Field(None, description="Sampled execution; continuous without it.")
 
-    @model_validator(mode="after")
-    def _sampled(self) -> Self:
-        if self.passive_tension_loop is not None and self.sampling is None:
-            raise problem("passive_tension_loop", "works from sample to sample: set controller.sampling.period too")
-        return self
+    fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, what differs there.")
+
+    _flat = field_validator("tensions", mode="before")(flat)
+    _nested = field_serializer("tensions", mode="wrap")(nested)
+    _sparse = field_serializer("fingers")(given)
 
     @property
     def is_paper(self) -> bool:
-        """Whether it is the paper's controller and nothing else, sampled or not."""
+        """Whether it is the paper's controller, perhaps damped, and nothing else, sampled or not."""
         added = (
             self.tendon_friction_feedforward,
             self.joint_friction_compensation,
             self.passive_tension_loop,
             self.distribution,
         )
-        damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
-        plain = plain and not self.fingertip_force
-        return plain and not any(damping) and all(each is None for each in added)
+        return plain and not self.fingertip_force and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
     """Raise the error of an entry that does not fit the finger, or another entry."""
+    if settings.passive_tension_loop is not None and settings.sampling is None:
+        entry = "controller.passive_tension_loop"
+        raise problem(entry, "works from sample to sample: set controller.sampling.period too")
     _check_tensions(settings, finger)
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
@@ -208,7 +217,16 @@ _CLOSED_LOOP = (
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
+    actuators = tuple(finger.tree.actuators) if finger.tree else ()
+    for name in settings.inputs or {}:
+        if name not in actuators:
+            near = nearest(name, actuators)
+            hint = f"; did you mean {near}?" if near else ""
+            allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
+            raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
+        if finger.tree is not None and (actuators or not finger.tendons):
+            raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
         if settings.tensions is not None:
             raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return

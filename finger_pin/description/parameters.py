@@ -6,10 +6,12 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from finger_pin.description.actuators import Actuator, check_actuators
+from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -25,6 +27,9 @@ from finger_pin.description.validation import (
     vector,
 )
 from finger_pin.exceptions import toml_like
+
+if TYPE_CHECKING:
+    from finger_pin.description.hand import HandDescription
 
 _MILLIMETRES = " m (is it in millimetres?)"
 
@@ -260,11 +265,14 @@ class FingerDescription(Description):
         (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="In the base frame."
     )
     joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
-    tendons: dict[Name, Tendon] = Field(min_length=1, description="By name.")
+    tendons: dict[Name, Tendon] = Field(description="By name; at least one, unless there is a tree.")
     tendon_friction: TendonFriction = TendonFriction()
     joint_friction: JointFriction = JointFriction()
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
+    actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    _hand: Any = PrivateAttr(None)
+    tree: Tree | None = Field(None, description="Bodies that are no chain of links, and what drives them.")
 
     @field_validator("tendons")
     @classmethod
@@ -274,11 +282,16 @@ class FingerDescription(Description):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         joints, tendons = tuple(self.joints), tuple(self.tendons)
+        if not self.tendons and self.tree is None:
+            raise problem("tendons", "must have at least one entry")
+        if self.tree is not None and tuple(self.tree.joints) != joints:
+            raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
         for name, tendon in self.tendons.items():
             for joint in tendon.crossings:
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        check_actuators(self.actuators, self.actuated_names, self.passive_names)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),
@@ -288,6 +301,12 @@ class FingerDescription(Description):
             for field, value in getattr(self, group):
                 check_size(value, names, f"{group}.{field}", what)
         return self
+
+    @property
+    def hand(self) -> HandDescription | None:
+        """The hand whose fingers together this is; None for a finger."""
+        hand: HandDescription | None = self._hand
+        return hand
 
     @property
     def passive_names(self) -> tuple[str, ...]:

@@ -109,6 +109,17 @@ class JointReference(SignalSettings):
     )
 
 
+class InputSignal(SignalSettings):
+    """Input of an actuator of a tree, in the unit that its gain takes."""
+
+    offset: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _FORCE] | None = quantity(None, unit="1", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...], series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
+        None, unit="1", source="chosen", doc="At the points or samples."
+    )
+
+
 class ForceSignal(SignalSettings):
     """Tension of a tendon, or a component of a force."""
 

@@ -106,15 +106,23 @@ class Mechanism:
     """
 
     def __init__(
-        self, body: RigidBody, rows: Sequence[Rows], lumps: Sequence[str] = (), inertia: Array | None = None
+        self,
+        body: RigidBody,
+        rows: Sequence[Rows],
+        lumps: Sequence[str] = (),
+        inertia: Array | None = None,
+        channels: int = 0,
     ) -> None:
-        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps."""
+        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
+
+        There are as many inputs as rows have, or more if so many ``channels`` are asked for.
+        """
         self.body = body
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
         self.books = Books.of(self.rows)
-        self.channels = max((int(table.channels.max(initial=-1)) + 1 for table in self.rows), default=0)
+        self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
         for table in self.rows:
@@ -154,7 +162,7 @@ class Mechanism:
             joint, coordinate = joint + part.body.model.njoints - 1, coordinate + size
             lump, channel = lump + len(part.lumps), channel + part.channels
         lumps = [f"{name}.{each}" for name, part in parts.items() for each in part.lumps]
-        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]))
+        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]), channel)
 
     @property
     def coordinates(self) -> int:

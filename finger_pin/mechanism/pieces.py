@@ -8,21 +8,42 @@ velocity of every coordinate, and for a length it is the length's gradient.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.gaps.gap import Gap
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.spans.span import Span
 
-#: What a piece is, seen from its own frame: one wrench along a span; normal and two tangents of a gap.
-Shape = Span | Gap
+
+class Shape(Protocol):
+    """What a piece is, seen from its own frame: a span of a tendon, or a gap between surfaces.
+
+    Attributes:
+        name: For messages.
+        parameters: Names of its numbers.
+        value: (y, p, out) fills what the points y, six numbers, give; see `spans` and `gaps`.
+        slopes: (y, p, out) fills its derivatives by y.
+        columns: How many wrenches it has: one along a span; normal and two tangents of a gap.
+    """
+
+    columns: ClassVar[int]
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def value(self) -> Callable[..., None]: ...  # noqa: D102
+
+    @property
+    def slopes(self) -> Callable[..., None]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,10 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta |  o  | p | theta' |  o' | p' |  z  | F^s of the tendons | F^s of the joints |
-    |   n   | 7 f | p |   n    | 6 f | p  | 2 c |         t          |         n         |
+    | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s of tendons | of joints | of gearboxes |
+    |   n   | 7 f | p |    m    |   n    | 6 f | p  |    m     | 2 c |       t        |     n     |      m       |
 
 n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
-c contacts with bristles bent by z: 19 numbers for the paper's finger alone.
+m motors, c contacts with bristles bent by z: 19 numbers for the paper's finger, which has neither motors nor contacts.
 """
 
 from __future__ import annotations
@@ -16,20 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
-# The blocks of the packed state, in order.
-_ORDER = (
-    "position",
-    "object_pose",
-    "passive_position",
-    "velocity",
-    "object_velocity",
-    "passive_velocity",
-    "contact_bend",
-    "tendon_stiction",
-    "joint_stiction",
-    "further",
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +30,9 @@ class State:
         tendon_stiction: F^s of the tendons, shape (..., t), N.
         joint_stiction: F^s of the joints, shape (..., n), N m.
         further: States of rows of one's own, shape (..., f); zero if left out, as what follows.
+        motor_position: theta_m, shape (..., m), rad.
+        motor_velocity: theta_m', shape (..., m), rad/s.
+        gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
         object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
         object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
@@ -56,6 +45,9 @@ class State:
     tendon_stiction: Array
     joint_stiction: Array
     further: Array | None = None
+    motor_position: Array | None = None
+    motor_velocity: Array | None = None
+    gearbox_stiction: Array | None = None
     object_pose: Array | None = None
     object_velocity: Array | None = None
     contact_bend: Array | None = None
@@ -71,6 +63,7 @@ class Layout:
         passive: Number of passive tendons.
         further: Name and scale of every state of further rows, which follow.
         ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
+        motors: Names of the motors.
         objects: Names of the free objects.
         contacts: Names of the contacts.
     """
@@ -80,28 +73,13 @@ class Layout:
     passive: int
     further: tuple[tuple[str, float], ...] = ()
     ringing: tuple[float, ...] = ()
+    motors: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
     contacts: tuple[str, ...] = ()
 
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        """Sizes of the blocks, in order."""
-        n, p, t, f = len(self.joints), self.passive, len(self.tendons), len(self.objects)
-        return n, 7 * f, p, n, 6 * f, p, 2 * len(self.contacts), t, n, len(self.further)
-
     @cached_property
-    def size(self) -> int:
-        """Length of the packed state."""
-        return sum(self.sizes)
-
-    @cached_property
-    def _parts(self) -> tuple[slice, ...]:
-        ends = np.cumsum(self.sizes)
-        return tuple(slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """A name for every number of the packed state."""
+    def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
+        """Names and the scale of every block, in order."""
         passive = self.tendons[len(self.tendons) - self.passive :]
         poses, rates, bends = (
             tuple(f"{name}.{part}" for name in names for part in parts.split())
@@ -111,25 +89,52 @@ class Layout:
                 (self.contacts, "1 2"),
             )
         )
-        groups = (
-            ("joint_position", self.joints),
-            ("object_pose", poses),
-            ("passive_position", passive),
-            ("joint_velocity", self.joints),
-            ("object_velocity", rates),
-            ("passive_velocity", passive),
-            ("contact_bend", bends),
-            ("tendon_stiction", self.tendons),
-            ("joint_stiction", self.joints),
+        return {
+            "position": (self.joints, 1.0),
+            "object_pose": (poses, 1.0),
+            "passive_position": (passive, 1e-3),
+            "motor_position": (self.motors, 1.0),
+            "velocity": (self.joints, 10.0),
+            "object_velocity": (rates, 10.0),
+            "passive_velocity": (passive, 0.1),
+            "motor_velocity": (self.motors, 10.0),
+            "contact_bend": (bends, 1e-5),
+            "tendon_stiction": (self.tendons, 1.0),
+            "joint_stiction": (self.joints, 1e-2),
+            "gearbox_stiction": (self.motors, 1e-2),
+            "further": (tuple(name for name, _ in self.further), 1.0),
+        }
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Sizes of the blocks, in order."""
+        return tuple(len(names) for names, _ in self._blocks.values())
+
+    @cached_property
+    def size(self) -> int:
+        """Length of the packed state."""
+        return sum(self.sizes)
+
+    @cached_property
+    def _parts(self) -> dict[str, slice]:
+        ends = np.cumsum(self.sizes)
+        parts = (slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
+        return dict(zip(self._blocks, parts, strict=True))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for every number of the packed state."""
+        return tuple(
+            name if kind == "further" else f"{'joint_' if kind in ('position', 'velocity') else ''}{kind}[{name}]"
+            for kind, (names, _) in self._blocks.items()
+            for name in names
         )
-        named = tuple(f"{kind}[{name}]" for kind, names in groups for name in names)
-        return named + tuple(name for name, _ in self.further)
 
     def pack(self, state: State) -> Array:
         """Return the packed vector, shape (..., size)."""
         lead, blocks = state.position.shape[:-1], []
-        for name, size in zip(_ORDER, self.sizes, strict=True):
-            given = getattr(state, name)
+        for kind, size in zip(self._blocks, self.sizes, strict=True):
+            given = getattr(state, kind)
             blocks.append(np.zeros((*lead, size)) if given is None else given)
         return np.concatenate(blocks, axis=-1)
 
@@ -141,7 +146,7 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        return State(**{name: x[..., part] for name, part in zip(_ORDER, self._parts, strict=True)})
+        return State(**{kind: x[..., part] for kind, part in self._parts.items()})
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).
@@ -151,18 +156,14 @@ class Layout:
         velocity that goes with 1 % of its position: an oscillation too small to matter in the one is not followed
         in the other.
         """
-        scales = np.concatenate(
-            [
-                np.repeat([1.0, 1.0, 1e-3, 10.0, 10.0, 0.1, 1e-5, 1.0, 1e-2], self.sizes[:-1]),
-                [scale for _, scale in self.further],
-            ]
-        )
+        scales = np.repeat([scale for _, scale in self._blocks.values()], self.sizes)
+        scales[self._parts["further"]] = [scale for _, scale in self.further]
         if self.ringing:
-            passive = self._parts[_ORDER.index("passive_velocity")]
+            passive = self._parts["passive_velocity"]
             scales[passive] = np.maximum(scales[passive], 1e-5 * np.array(self.ringing))
         if self.objects:
             # An object moves by centimetres where a joint turns by a radian.
-            poses, rates = (self._parts[_ORDER.index(name)] for name in ("object_pose", "object_velocity"))
+            poses, rates = (self._parts[kind] for kind in ("object_pose", "object_velocity"))
             scales[poses].reshape(-1, 7)[:, :3] = 1e-2
             scales[rates].reshape(-1, 6)[:, :3] = 0.1
         return scales

@@ -13,6 +13,7 @@ from finger_pin.laws.law import Law, Row
 RANGES = {
     "lower": (-1.5, -0.1),
     "least": (-1.5, -0.1),
+    "lowest": (-0.4, 0.5),
     "surface": (0.1, 0.8),
     "ratio": (1.0, 2.0),
     "lag": (0.0, 0.5),

@@ -20,13 +20,16 @@ from finger_pin.views.plots.fig6 import plot_fig6
 from finger_pin.views.plots.force_capability import plot_force_polytope, plot_radius_sensitivity
 from finger_pin.views.plots.friction_influence import plot_friction_influence
 from finger_pin.views.plots.friction_law import plot_friction_law
+from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.losses import plot_losses
 from finger_pin.views.plots.pareto import plot_pareto
 from finger_pin.views.plots.passive_delivery import plot_passive_delivery
 from finger_pin.views.plots.self_locking import plot_critical_friction, plot_runaway, plot_self_locking_map
+from finger_pin.views.plots.servo import plot_servo
 from finger_pin.views.plots.sweep import plot_sweep
 from finger_pin.views.plots.transmission import plot_transmission
 from finger_pin.views.plots.workspace import plot_workspace
+from finger_pin.views.trees import is_tree
 
 __all__ = [
     "compare",
@@ -39,12 +42,14 @@ __all__ = [
     "plot_force_polytope",
     "plot_friction_influence",
     "plot_friction_law",
+    "plot_hand_motion",
     "plot_losses",
     "plot_pareto",
     "plot_passive_delivery",
     "plot_radius_sensitivity",
     "plot_runaway",
     "plot_self_locking_map",
+    "plot_servo",
     "plot_sweep",
     "plot_transmission",
     "plot_workspace",
@@ -61,11 +66,13 @@ def draw_all(result: xr.Dataset, folder: str | Path) -> list[Path]:
         result: Dataset of `simulate`.
         folder: Where to write; a file of the same name is replaced whole or not at all.
     """
-    figures = dict(_FIGURES)
+    figures = {"motion": plot_hand_motion, "energy": plot_energy} if is_tree(result) else dict(_FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
     if "contact_force" in result:
         figures["contact"] = plot_contact
+    if "motor_current" in result:
+        figures["servo"] = plot_servo
     return [save_figure(draw(result), Path(folder) / f"{name}.png") for name, draw in figures.items()]
 
 
