@@ -111,7 +111,7 @@ def test_the_compiled_evaluation_is_the_readable_one(name, request):
     x = np.tile(loop.initial_state(), (6, 1))
     x += 1e-3 * rng.normal(size=x.shape)
     x[:, 1] += 0.36 if name == "press" else 0.0
-    x[:, 6] -= 0.0 if name == "press" else 0.01
+    x[:, 6] -= 0.0 if name == "press" else 0.02
     state = loop.finger.layout.unpack(x)
     if state.object_pose.size:
         state.object_pose[:, 3:] /= np.linalg.norm(state.object_pose[:, 3:], axis=1, keepdims=True)
