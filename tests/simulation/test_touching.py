@@ -144,3 +144,20 @@ def test_an_object_cannot_have_the_name_of_a_joint(tmp_path):
     file.write_text('extends = "press"\n[environment.objects.medial]\nshape = "sphere"\nradius = 0.01\nmass = 0.01\n')
     with pytest.raises(fp.InputError, match="a joint has this name"):
         fp.simulate(fp.load_scenario(file))
+
+
+def test_two_fingers_hold_a_ball_until_friction_can_no_longer_carry_it():
+    """Its weight is carried by friction at two pads; it falls no earlier than mu times both normal forces allow."""
+    found = fp.simulate(fp.load_scenario("pinch", {"simulation.duration": 4.6}))
+    pads = found.sel(contact=["left.distal-ball", "right.distal-ball"])
+    held = found.time < 3.0
+    # Down is x, and the ball swings across: what carries it is its weight on average.
+    carried = -pads.contact_force.sel(axis="x").sum("contact").where(held & (found.time > 1.0), drop=True)
+    assert float(carried.mean()) == pytest.approx(-0.03 * 9.81, rel=1e-2)
+    slip = pads.contact_slip.where(held & (found.time > 0.5), drop=True)
+    assert float(slip.max()) < 1e-9
+    depth = found.object_position.sel(object="ball", axis="x")
+    assert float(depth.where(held, drop=True).max()) < 0.093 and float(depth[-1]) > 0.12
+    lost = int(np.argmax(depth.values > 0.1))
+    level = pads.contact_level.sum("contact")
+    assert float(level[lost - 60 : lost].min()) < 0.03 * 9.81 < float(level[3000])

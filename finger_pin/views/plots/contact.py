@@ -1,4 +1,4 @@
-"""What contacts do: normal force and friction over time, the friction cone, sliding, and where free objects are."""
+"""What contacts do: normal force and friction over time, the friction cone, sliding, and where free objects go."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.views.plots.lines import names, series, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.style import BLACK, BLUE, GREY, SKY, VERMILLION, new_figure, styled
+from finger_pin.views.plots.style import BLACK, BLUE, SKY, VERMILLION, new_figure, styled
 
 #: Most contacts that get a panel: those that push hardest.
 _MOST = 6
@@ -22,13 +22,13 @@ def plot_contact(result: xr.Dataset) -> Figure:
 
     (a) One panel per contact that ever closed, N: normal force, friction, and the most that friction can be; sticking
     is where friction is less. (b) Friction against normal force: the cone, whose edge is sliding. (c) Speed of sliding,
-    mm/s. (d) Height of free objects above where they were, mm, if there are any.
+    mm/s. (d) How far free objects have moved from where they were, mm, if there are any.
 
     Args:
         result: Dataset of `simulate`.
     """
     shown = touching(result)
-    below = ["sliding (mm/s)"] + (["objects' rise (mm)"] if "object_position" in result else [])
+    below = ["sliding (mm/s)"] + (["moved (mm)"] if "object_position" in result else [])
     figure = new_figure(12.0, max(6.4, 1.5 * len(shown)))
     panels = stack(figure, 0.0, 6.4, [labelled(name, "N") for name in shown] or ["force (N)"])
     title(panels[0], "(a) contact forces" if shown else "(a) contact forces: nothing ever touched")
@@ -48,7 +48,7 @@ def plot_contact(result: xr.Dataset) -> Figure:
         cone.legend(loc="upper left")
     title(others[0], "(c) speed of sliding")
     if len(others) > 1:
-        _rise(others[1], result)
+        _moved(others[1], result)
     return figure
 
 
@@ -82,11 +82,13 @@ def _cone(axes: Axes, contact: xr.Dataset, name: str, colour: str) -> None:
     title(axes, "(b) friction cone")
 
 
-def _rise(axes: Axes, result: xr.Dataset) -> None:
-    time = result["time"].values
-    for index, name in enumerate(names(result, "object")):
-        height = result["object_position"].sel(object=name, axis="z").values
-        trace(axes, time, _MILLI * (height - height[0]), label=name, linewidth=1.1, **series(index))
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
-    axes.legend(loc="upper right")
+def _moved(axes: Axes, result: xr.Dataset) -> None:
+    time, index = result["time"].values, 0
+    for name in names(result, "object"):
+        for axis in names(result, "axis"):
+            place = result["object_position"].sel(object=name, axis=axis).values
+            label = f"{name} {axis}"
+            trace(axes, time, _MILLI * (place - place[0]), label=label, linewidth=1.1, **series(index))
+            index += 1
+    axes.legend(loc="upper left", ncols=3)
     title(axes, "(d) free objects")
