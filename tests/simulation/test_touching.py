@@ -152,7 +152,7 @@ def test_two_fingers_hold_a_ball_until_friction_can_no_longer_carry_it():
     pads = found.sel(contact=["left.distal-ball", "right.distal-ball"])
     held = found.time < 3.0
     # Down is x, and the ball swings across: what carries it is its weight on average.
-    carried = -pads.contact_force.sel(axis="x").sum("contact").where(held & (found.time > 1.0), drop=True)
+    carried = pads.contact_force.sel(axis="x").sum("contact").where(held & (found.time > 1.0), drop=True)
     assert float(carried.mean()) == pytest.approx(-0.03 * 9.81, rel=1e-2)
     slip = pads.contact_slip.where(held & (found.time > 0.5), drop=True)
     assert float(slip.max()) < 1e-9
