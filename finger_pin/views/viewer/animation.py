@@ -20,6 +20,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
+from finger_pin.views.viewer.things import Things
 
 Indices = NDArray[np.intp]
 
@@ -67,6 +68,12 @@ def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghos
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension)
     if beside is not None:
         chunk["ghost"] = beside.chunk()
+    scene = motion.scene
+    tips = scene.tips(scene.geometry.poses(in_view)).reshape(-1, 3)
+    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0))
+    if things is not None:
+        header |= things.header(scene.view())
+        chunk |= things.chunk()
     return render({**header, "chunks": [chunk]})
 
 
