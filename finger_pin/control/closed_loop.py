@@ -123,7 +123,7 @@ class ClosedLoop:
             parts = tuple(cls.from_scenario(each) for each in scenarios.values())
             routing = Routing.from_description(scenario.finger)
             controller = joined_controller([part.controller for part in parts], routing)
-        finger = finger or Finger(scenario.finger)
+        finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),
@@ -138,7 +138,8 @@ class ClosedLoop:
             reference=_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
-            parts=parts,
+            # Fingers that may touch something are not apart.
+            parts=parts if finger.surroundings is None else (),
             palm=PalmPath.of(scenario.hand, start),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]

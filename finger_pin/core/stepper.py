@@ -192,12 +192,13 @@ class Stepper:
             x: Packed state, shape (mechanism.size,).
             tableau: The method.
             rtol: Relative tolerance.
-            atol: Absolute tolerances, shape (2 N + states,).
+            atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
         tables = build_tables(mechanism)
         tables.tip_force[:] = 0.0 if force is None else force
+        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         laws = [table.law for table in mechanism.rows]
         self._width = mechanism.coordinates
@@ -223,7 +224,7 @@ class Stepper:
                     attitude[free].copy(),
                     tableau,
                     float(rtol),
-                    np.asarray(atol, dtype=float)[at].copy(),
+                    tolerances[at].copy(),
                     memory,
                 )
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import load_finger
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -24,6 +25,7 @@ from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
@@ -150,6 +152,7 @@ class Finger:
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
+        surroundings: Objects and contacts; None without any.
     """
 
     def __init__(
@@ -157,6 +160,7 @@ class Finger:
         description: FingerDescription | HandDescription | str | Path,
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
+        objects: Mapping[str, Object] | None = None,
     ) -> None:
         """Build a finger.
 
@@ -166,9 +170,11 @@ class Finger:
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
+            objects: What its links may touch, by name; without any they do not touch each other either.
 
         Raises:
-            InputError: If the joints of the two differ, or one has several coordinates.
+            InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no
+                size, or an object the name of a joint.
         """
         if isinstance(description, str | Path):
             description = load_finger(description)
@@ -220,6 +226,11 @@ class Finger:
             self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
+        self.surroundings = None if objects is None else Surroundings.of(objects, description, self.mechanism)
+        if self.surroundings is not None:
+            self.mechanism = self.surroundings.around(self.mechanism)
+            free, contacts = tuple(self.surroundings.free), self.surroundings.contacts.names
+            self.layout = replace(self.layout, objects=free, contacts=contacts)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -317,6 +328,9 @@ class Finger:
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         state.motor_position[:] = self.actuators.angle(state.position, tension)
         state.motor_velocity[:] = self.actuators.rate(state.velocity)
+        if self.surroundings is not None:
+            assert state.object_pose is not None and state.object_velocity is not None
+            state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
         return x
 
     def evaluate(
@@ -335,7 +349,7 @@ class Finger:
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        joints, masses = len(self.routing.joints), len(self.routing.joints) + self.routing.passive
+        joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
         delivered, torque, motors = driven.force, driven.force @ driven.rows.arm + halves.force @ halves.rows.arm, None
         if self.actuators.names:
@@ -361,7 +375,7 @@ class Finger:
                 stiction_rate=both(lambda tendons: tendons.rate),
                 entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
                 strands=np.concatenate([delivered, halves.force], axis=-1),
-                passive_acceleration=found.acceleration[..., joints:masses],
+                passive_acceleration=found.acceleration[..., bodies : bodies + self.routing.passive],
             ),
             joints=JointForces(
                 reaction=pins["normal_force"],

@@ -161,11 +161,8 @@ class Mechanism:
             for table in part.rows:
                 rows.append(
                     replace(
-                        table,
+                        table.spread(places, width),
                         group=f"{name}.{table.group}",
-                        arm=_spread(table.arm, places, width),
-                        measure=_spread(table.measure, places, width),
-                        bends=_spread(table.bends, places, width),
                         channels=np.where(table.channels >= 0, table.channels + channel, -1),
                         pins=np.where(table.pins >= 0, table.pins + joint, -1),
                         paths=moved(table.paths, joint),
@@ -344,10 +341,3 @@ def _touching(force: Array, directions: Array, arms: int) -> Array:
     vectors = force[..., None] * directions
     total: Array = vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2)
     return total
-
-
-def _spread(matrix: Array, places: NDArray[np.int64], width: int) -> Array:
-    """Return a matrix with its columns at some places among more."""
-    wide = np.zeros((len(matrix), width))
-    wide[:, places] = matrix
-    return wide

@@ -113,6 +113,10 @@ def simulate(
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
+    if loop.finger.surroundings is not None:
+        start = loop.finger.layout.unpack(loop.initial_state())
+        assert start.object_pose is not None
+        loop.finger.surroundings.check(start.position, start.object_pose)
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     # The margin is that of the paper's controller on the scenario's reference.
     planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())

@@ -106,6 +106,11 @@ class Scene:
         ]
         self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
+    @property
+    def size(self) -> float:
+        """Length of the finger, m."""
+        return self._size
+
     def header(
         self,
         title: str,
