@@ -214,8 +214,9 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
             allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
             raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
-        if finger.tree is not None and (actuators or not finger.tendons):
-            raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
+        routed = any(tendon.along for tendon in finger.tendons.values())
+        if finger.tree is not None and (actuators or routed or not finger.tendons):
+            raise problem("controller.kind", 'must be "tensions": a tree is driven in open loop', settings.kind)
         if settings.tensions is not None:
             raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return

@@ -56,6 +56,9 @@ class Routing:
                 radii[column[joint], order] = crossing.radius
                 bends[column[joint], order] = float(crossing.bends)
                 crossed[column[joint], order] = 1.0
+            if tendon.along is not None and description.tree is not None:
+                # Its arms depend on the posture; which joints it crosses does not.
+                crossed = np.array([[float(joint in description.tree.crossed(tendon.along))] for joint in joints])
             coupling.append(radii.sum(axis=1))
             curvature.append(bends.sum(axis=1))
             split = tendon.proximal_crossings

@@ -226,6 +226,27 @@ class Tree(Description):
         _check("tip.body", self.tip.body, self.bodies, "body")
         return self
 
+    def crossed(self, tendon: str) -> frozenset[str]:
+        """Return the joints that a tendon crosses: those that move one piece of its path and not the next."""
+        described, found = self.tendons[tendon], set[str]()
+        before: set[str] | None = None
+        for each in (described.path or {}).values():
+            if each.kind == "pulley":
+                before = None
+                continue
+            movers = self._movers(each.body)
+            found |= movers ^ before if before is not None else set()
+            before = movers
+        return frozenset(found or {name for name, coefficient in (described.joints or {}).items() if coefficient})
+
+    def _movers(self, body: str | None) -> set[str]:
+        """Return the joints that move a body."""
+        found = set[str]()
+        while body is not None:
+            found |= {name for name, joint in self.joints.items() if joint.body == body}
+            body = self.bodies[body].parent
+        return found
+
 
 def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:
     known = list(names)

@@ -22,7 +22,7 @@ from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import build_tree, tree_rows
+from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -166,10 +166,13 @@ class Finger:
             self.routing.joints, self.routing.tendons, self.routing.passive, further_states(self.further), ringing
         )
         joints = self.routing.joints
+        halves, driven, sliding = self.tendons.rows()
         self.mechanism = Mechanism(
             self.rigid_body,
             [
-                *self.tendons.rows(),
+                halves,
+                along_paths(description, self.paths, driven) if self.paths else driven,
+                sliding,
                 self.joint_friction.rows(joints, self.routing.actuated, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
@@ -293,12 +296,23 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=(driven.force @ driven.rows.arm + halves.force @ halves.rows.arm)[..., :joints],
+            tendon_torque=(driven.force @ driven.rows.arm + halves.force @ halves.rows.arm)[..., :joints]
+            + self._routed_torque(self.layout.unpack(x).position, driven.force),
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             mechanism=found,
         )
+
+    def _routed_torque(self, position: Array, tension: Array) -> Array:
+        """Return what driven tendons along paths exert, shape (..., n)."""
+        along = [tendon.along for tendon in self.description.tendons.values()][: self.routing.actuated]
+        chosen = [k for k, name in enumerate(along) if name is not None]
+        if self.paths is None or not chosen:
+            return np.zeros_like(position)
+        places = [list(self.paths.routes).index(str(along[k])) for k in chosen]
+        arms = self.paths.arms(position)[..., places, :] - self.paths.fixed[places]
+        return -(tension[..., None, chosen] @ arms)[..., 0, :]
 
     def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""

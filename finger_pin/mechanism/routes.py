@@ -73,6 +73,12 @@ class Routes:
             routes[name] = Route(coefficients, _legs(tendon.path or {}, placed))
         return cls(body, routes)
 
+    @property
+    def fixed(self) -> Array:
+        """What of dL/dq does not depend on the posture, shape (t, n)."""
+        rows = [route.coefficients for route in self.routes.values()]
+        return np.array(rows).reshape(-1, int(self.body.model.nv))
+
     def length(self, q: Array) -> Array:
         """Return the lengths at q, shape (..., n), as MuJoCo's ``ten_length``: shape (..., t), m."""
         return self._reached(q)[0]
@@ -92,8 +98,7 @@ class Routes:
             length, arms, turn = (np.array(part) for part in zip(*each, strict=True))
             return length, arms, turn
         found = reach(self.body, q, [route.legs for route in self.routes.values()], len(q))
-        fixed = np.array([route.coefficients for route in self.routes.values()]).reshape(-1, len(q))
-        return found.length + fixed @ q, found.arm + fixed, found.turn
+        return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
 
 
 def _legs(path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> tuple[Leg, ...]:
