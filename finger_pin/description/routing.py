@@ -108,7 +108,12 @@ class Routing:
         return index if index < self.actuated else 2 * index - self.actuated + int(distal)
 
     def force_closure(self) -> ForceClosure:
-        """Report whether tensions exist that are all positive and turn no joint."""
+        """Report whether tensions exist that are all positive and turn no joint.
+
+        It does not hold where a tendon runs along a path through space: its arms depend on the posture.
+        """
+        if not np.any(self.coupling, axis=1).all():
+            return ForceClosure(np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons)
         return ForceClosure.of(self.coupling, self.tendons)
 
     def curvature(self, position: Array) -> Array:

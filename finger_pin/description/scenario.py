@@ -140,7 +140,8 @@ class Scenario(Description):
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
-        if self.controller.kind == "proportional" and not closure.holds:
+        routed = any(tendon.along for tendon in finger.tendons.values())
+        if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
         initial = self.simulation.initial or InitialSettings()
         tables: dict[str, Iterable[str]] = {

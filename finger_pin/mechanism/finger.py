@@ -296,23 +296,31 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=(driven.force @ driven.rows.arm + halves.force @ halves.rows.arm)[..., :joints]
-            + self._routed_torque(self.layout.unpack(x).position, driven.force),
+            tendon_torque=self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints],
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             mechanism=found,
         )
 
-    def _routed_torque(self, position: Array, tension: Array) -> Array:
-        """Return what driven tendons along paths exert, shape (..., n)."""
-        along = [tendon.along for tendon in self.description.tendons.values()][: self.routing.actuated]
-        chosen = [k for k, name in enumerate(along) if name is not None]
-        if self.paths is None or not chosen:
-            return np.zeros_like(position)
-        places = [list(self.paths.routes).index(str(along[k])) for k in chosen]
-        arms = self.paths.arms(position)[..., places, :] - self.paths.fixed[places]
-        return -(tension[..., None, chosen] @ arms)[..., 0, :]
+    def coupling_at(self, position: Array) -> Array:
+        """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
+        position = np.asarray(position, dtype=float)
+        coupling = np.broadcast_to(self.routing.coupling, (*position.shape[:-1], *self.routing.coupling.shape)).copy()
+        along = [tendon.along for tendon in self.description.tendons.values()]
+        routed = [k for k, name in enumerate(along) if name is not None]
+        if self.paths is not None and routed:
+            places = [list(self.paths.routes).index(str(along[k])) for k in routed]
+            coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
+        return coupling
+
+    def _driven_torque(self, x: Array, driven: RowSignals) -> Array:
+        """Return what the driven tendons exert, shape (..., n), N m."""
+        joints, actuated = len(self.routing.joints), self.routing.actuated
+        if not driven.rows.routed:
+            return (driven.force @ driven.rows.arm)[..., :joints]
+        coupling = self.coupling_at(x[..., :joints])[..., :actuated, :]
+        return np.asarray((driven.force[..., None, :] @ coupling)[..., 0, :])
 
     def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
