@@ -54,7 +54,13 @@ def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None
         samples: Instants of the reference; directions that last for less than their distance may be missed.
         most: Greatest number of combinations to look at, those that seem closest to locking; all by default. A finger
             of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
+
+    Of a hand it is that of the finger that is closest, with the position and the directions of its own joints.
     """
+    parts = scenario.parts()
+    if len(parts) > 1:
+        return min((self_locking_margin(part, samples, most) for part in parts.values()), key=lambda each: each.margin)
+    scenario = next(iter(parts.values()))
     tendons = Tendons.from_description(scenario.finger)
     routing = tendons.routing
     # Midpoints: a reference that starts or ends at rest moves there.
@@ -92,7 +98,8 @@ def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
         scenario: The scenario.
         stacklevel: Of `warnings.warn`, as seen by the caller of this function.
     """
-    most = max(1, _CASES // 2 ** len(scenario.finger.passive_names))
+    passive = max(len(part.finger.passive_names) for part in scenario.parts().values())
+    most = max(1, _CASES // 2**passive)
     # Parameters at the edge of what numbers hold have no margin: warnings of arithmetic would not help.
     with np.errstate(all="ignore"):
         margin = self_locking_margin(scenario, most=most).margin

@@ -40,7 +40,7 @@ def simulate(
         Path | None, typer.Option(metavar="XML", help="Instead of a scenario: move the hand of a MuJoCo model.")
     ] = None,
     quiet: Quiet = False,
-    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers and methods, and exit.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers, hands, methods, and exit.")] = False,
 ) -> None:
     """Simulate a scenario, write its results, and print a summary."""
     changed = overrides(settings, duration=duration, method=method)
@@ -166,9 +166,10 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
 
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
-    from finger_pin.description.loading import list_fingers, list_scenarios
+    from finger_pin.description.loading import list_fingers, list_hands, list_scenarios
     from finger_pin.description.scenario import METHODS
 
-    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Methods": dict.fromkeys(METHODS, "")}
+    tables = {"Scenarios": list_scenarios(), "Fingers": list_fingers(), "Hands": list_hands()}
+    tables["Methods"] = dict.fromkeys(METHODS, "")
     rows = {title: [f"  {name:15}{text}".rstrip() for name, text in table.items()] for title, table in tables.items()}
     return "\n\n".join("\n".join([title, *lines]) for title, lines in rows.items())

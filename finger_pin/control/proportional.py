@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array, Routing
@@ -44,35 +45,52 @@ class Controller(Protocol):
 class ProportionalController:
     """The paper's controller: proportional torque, distributed over the tendons by the pseudo-inverse.
 
+    The paper has no damping; where there is some, tau^d = K_P (theta^d - theta) + K_D (theta^d' - theta').
+
     Attributes:
         gain: K_P, shape (n,), N m/rad.
         minimum: f0, shape (t,), N.
         inverse: Pseudo-inverse of H_c^T, shape (t, n), 1/m.
         internal: f^k, shape (t,), internal tensions with the largest entry 1.
+        damping: K_D, shape (n,), N m s/rad.
+        loop: The finger that each tendon belongs to, shape (t,): each has a lambda of its own; one for all by default.
     """
 
     gain: Array
     minimum: Array
     inverse: Array
     internal: Array
+    damping: Array
+    loop: NDArray[np.int64] | None = None
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> ProportionalController:
         """Read the paper's part of a scenario's controller; `build_controller` returns the whole."""
         gain = expand(scenario.controller.gain, len(routing.joints))
         minimum = expand(scenario.controller.minimum_tension, len(routing.tendons))
-        return cls.from_routing(routing, gain, minimum)
+        damping = expand(scenario.controller.damping, len(routing.joints))
+        return cls.from_routing(routing, gain, minimum, damping)
 
     @classmethod
-    def from_routing(cls, routing: Routing, gain: Array, minimum: Array) -> ProportionalController:
-        """Prepare (21) for a routing with force closure."""
-        return cls(gain, minimum, np.asarray(np.linalg.pinv(routing.coupling.T)), routing.force_closure().tension)
+    def from_routing(
+        cls, routing: Routing, gain: Array, minimum: Array, damping: Array | None = None
+    ) -> ProportionalController:
+        """Prepare (21) for a routing with force closure; without damping by default."""
+        inverse = np.asarray(np.linalg.pinv(routing.coupling.T))
+        none = np.zeros(len(routing.joints))
+        return cls(gain, minimum, inverse, routing.force_closure().tension, none if damping is None else damping)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return tau^d of (19) and f_hat of (21) with lambda of (22)."""
         torque = proportional_torque(self.gain, reference.position, position)
+        torque = torque + self.damping * (reference.velocity - velocity)
         minimal = torque @ self.inverse.T
-        level = np.max(internal_level(self.minimum, minimal, self.internal), axis=-1, keepdims=True)
+        levels = internal_level(self.minimum, minimal, self.internal)
+        if self.loop is None:
+            level = np.max(levels, axis=-1, keepdims=True)
+        else:
+            fingers = [np.max(levels[..., self.loop == each], axis=-1) for each in range(int(self.loop.max()) + 1)]
+            level = np.stack(fingers, axis=-1)[..., self.loop]
         return ControlSignals(torque, minimal + level * self.internal)

@@ -137,6 +137,7 @@ def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
             if channel >= 0:
                 for c in range(width):
                     command[c] += control.by_position[channel, c]
+                    command[width + c] += control.by_velocity[channel, c]
                 command[last] += control.by_time[channel]
             for c in range(wide):
                 row[c] += of_command * command[c]

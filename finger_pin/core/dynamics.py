@@ -129,7 +129,7 @@ def evaluate(tables: Any, control: Any, time: float, x: Any, work: Any, rate: An
     """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
     size, width = tables.parents.size, work.torque.size
     q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
-    inputs(control, time, q, work.command)
+    inputs(control, time, q, v, work.command)
     move(tables, q, v, work)
     if tables.loaded:
         tip_forces(control, time, tables)

@@ -125,7 +125,7 @@ class CompiledMechanism:
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
         motion_many(self._models[0].address, _rows(position, shape), _rows(velocity, shape), tips, kinetic, potential)
         at = 0 if np.ndim(position) == 1 else slice(None)
-        return Motion(tips[at, 0] if np.ndim(position) == 1 else tips[:, 0], kinetic[at], potential[at])
+        return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
 
 
 class CompiledFinger:

@@ -47,7 +47,7 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
     if planned:
-        reads = (control.inverse != 0.0) & (control.gain != 0.0)
+        reads = (control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0))
         tensions, read = np.nonzero(reads)
         links.append((loop_at + control.loop[tensions], read))
         loop_of = np.full(channels, -1)
@@ -156,13 +156,17 @@ def select_control(control: Control, island: Island) -> Control:
         offset=control.offset[coordinates],
         schedule=_chosen(control.schedule, channels),
         force=_chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel()),
+        damping=control.damping[coordinates],
         desired=np.zeros(len(coordinates)),
         rate=np.zeros(len(coordinates)),
+        acceleration=np.zeros(len(coordinates)),
         planned=np.zeros(len(planned)),
         active=np.zeros(len(loops), dtype=np.int64),
         level=np.zeros(len(loops)),
         base=np.zeros(len(control.base)),
+        slope=np.zeros(len(control.slope)),
         by_position=np.zeros((len(channels), len(coordinates))),
+        by_velocity=np.zeros((len(channels), len(coordinates))),
         by_time=np.zeros(len(channels)),
     )
 

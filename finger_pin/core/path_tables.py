@@ -120,7 +120,7 @@ def read_paths(
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
-    rows = np.flatnonzero([len(each) > 0 for each in paths])
+    rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
     for body, parent in enumerate(parents):
         if parent >= 0:
@@ -141,7 +141,7 @@ def read_paths(
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
         carries=carries,
         rows=rows,
-        leg_start=np.cumsum([0, *(len(paths[k]) for k in rows)]),
+        leg_start=np.cumsum([0, *(len(each) for each in paths if each)]),
         piece=np.array([number[leg.piece] for leg in legs], dtype=np.int64),
         column=np.array([leg.column for leg in legs], dtype=np.int64),
         follows=np.array([leg.follows for leg in legs], dtype=np.int64),
@@ -166,8 +166,8 @@ def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[ND
         while at >= 0:
             moves[at, which] = 1
             at = int(parents[at])
-    at = np.flatnonzero(moves.any(axis=1))
-    return at, np.ascontiguousarray(moves[at])
+    moved = np.flatnonzero(moves.any(axis=1))
+    return moved, np.ascontiguousarray(moves[moved])
 
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:

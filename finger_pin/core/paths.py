@@ -63,9 +63,7 @@ def _frame(paths: Any, e: int, work: Any) -> None:
 def _turned(rotation: Any, out: Any, first: int, vector: Any) -> None:
     """Fill three numbers of a wrench with a vector that a frame sees."""
     for r in range(3):
-        vector[r] = (
-            rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
-        )
+        vector[r] = rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
 
 
 @compiled

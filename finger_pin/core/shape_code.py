@@ -24,7 +24,6 @@ _intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsi
 _shape: Any = None
 
 
-@cache
 def shape_addresses(shape: Shape) -> tuple[int, int]:
     """Return where a shape's value and slopes are, compiled; they live as long as the process."""
     return _address(shape.value), _address(shape.slopes)
@@ -34,9 +33,10 @@ def _fill(y: Any, p: Any, out: Any) -> None:
     _shape(y, p, out)
 
 
+@cache
 def _address(function: Callable[..., Any]) -> int:
     world = {**globals(), "_shape": inlined(function)}
-    twin = FunctionType(_fill.__code__, world, _fill.__name__)  # type: ignore[attr-defined]
+    twin = FunctionType(_fill.__code__, world, _fill.__name__)
     # Numba names what it keeps on disk after this.
     twin.__qualname__ = f"_fill[{function.__module__}.{function.__qualname__}]"
     pointer = types.CPointer(types.float64)  # type: ignore[no-untyped-call]

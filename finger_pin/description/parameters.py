@@ -6,10 +6,11 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from finger_pin.description.actuators import Actuator, check_actuators
 from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
     IN_RADIANS,
@@ -26,6 +27,9 @@ from finger_pin.description.validation import (
     vector,
 )
 from finger_pin.exceptions import toml_like
+
+if TYPE_CHECKING:
+    from finger_pin.description.hand import HandDescription
 
 _MILLIMETRES = " m (is it in millimetres?)"
 
@@ -275,6 +279,8 @@ class FingerDescription(Description):
     joint_friction: JointFriction = JointFriction()
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
+    actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    _hand: Any = PrivateAttr(None)
     tree: Tree | None = Field(None, description="Bodies that are no chain of links, and what drives them.")
 
     @field_validator("tendons")
@@ -298,6 +304,12 @@ class FingerDescription(Description):
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        check_actuators(self.actuators, self.actuated_names, self.passive_names)
+        for name, actuator in self.actuators.items():
+            for pulled in actuator.tendons:
+                if self.tendons[pulled].along is not None:
+                    allowed = "runs along a path through space: motors pull tendons with crossings"
+                    raise problem(f"actuators.{name}.tendons", allowed, pulled)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),
@@ -307,6 +319,12 @@ class FingerDescription(Description):
             for field, value in getattr(self, group):
                 check_size(value, names, f"{group}.{field}", what)
         return self
+
+    @property
+    def hand(self) -> HandDescription | None:
+        """The hand whose fingers together this is; None for a finger."""
+        hand: HandDescription | None = self._hand
+        return hand
 
     @property
     def passive_names(self) -> tuple[str, ...]:

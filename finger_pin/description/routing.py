@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from finger_pin.description.parameters import FingerDescription
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 # Below this share of the largest, an internal tension counts as none.
 _SLACK = 1e-9
@@ -33,6 +34,7 @@ class Routing:
         curvature_matrix: Phi, shape (t, n), zeros and ones, equation (15).
         curvature_offset: phi_off, shape (t,), rad.
         loads: Shape (n, s), one where a strand loads a joint, equation (17).
+        fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
     """
 
     joints: tuple[str, ...]
@@ -43,11 +45,13 @@ class Routing:
     curvature_matrix: Array
     curvature_offset: Array
     loads: Array
+    fingers: tuple[tuple[Indices, Indices], ...]
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Routing:
         """Build the matrices from the crossings of every tendon."""
-        joints = tuple(description.joints)
+        joints, tendons = tuple(description.joints), tuple(description.tendons)
+        names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
         column = {name: index for index, name in enumerate(joints)}
         coupling, curvature, strands, loads = [], [], [], []
         for tendon in description.tendons.values():
@@ -68,13 +72,14 @@ class Routing:
                 loads.append(crossed[:, half].sum(axis=1))
         return cls(
             joints=joints,
-            tendons=tuple(description.tendons),
+            tendons=tendons,
             actuated=len(description.actuated_names),
             coupling=np.array(coupling).reshape(-1, len(joints)),
             strand_coupling=np.array(strands).reshape(-1, len(joints)),
             curvature_matrix=np.array(curvature).reshape(-1, len(joints)),
             curvature_offset=np.array([t.curvature_offset for t in description.tendons.values()]),
             loads=np.array(loads).reshape(-1, len(joints)).T,
+            fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
         )
 
     @property
@@ -108,13 +113,24 @@ class Routing:
         return index if index < self.actuated else 2 * index - self.actuated + int(distal)
 
     def force_closure(self) -> ForceClosure:
-        """Report whether tensions exist that are all positive and turn no joint.
+        """Report whether tensions exist that are all positive and turn no joint, finger by finger.
 
         It does not hold where a tendon runs along a path through space: its arms depend on the posture.
         """
         if not np.any(self.coupling, axis=1).all():
             return ForceClosure(np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons)
-        return ForceClosure.of(self.coupling, self.tendons)
+        found = [
+            ForceClosure.of(self.coupling[np.ix_(own, joints)], tuple(self.tendons[index] for index in own))
+            for joints, own in self.fingers
+        ]
+        if len(found) == 1:
+            return found[0]
+        tension, basis = np.zeros(len(self.tendons)), []
+        for (_, own), each in zip(self.fingers, found, strict=True):
+            tension[own] = each.tension
+            basis.append(np.zeros((len(self.tendons), each.null_space.shape[1])))
+            basis[-1][own] = each.null_space
+        return ForceClosure(np.hstack(basis), tension, self.tendons)
 
     def curvature(self, position: Array) -> Array:
         """Return phi(theta) of (15), shape (..., t), rad, at joint positions of shape (..., n)."""
@@ -180,6 +196,10 @@ class ForceClosure:
             balance = _largest_one(self.null_space[:, 0])
         worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
+
+
+def _beginning(names: tuple[str, ...], start: str) -> Indices:
+    return np.flatnonzero([name.startswith(start) for name in names])
 
 
 def _largest_one(vector: Array) -> Array:

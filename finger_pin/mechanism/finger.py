@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
@@ -40,6 +42,7 @@ class TendonForces:
         normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
         level: max(F^n M, g_min), N.
         stiction_rate: F^s', N/s, (9a).
+        entering: f^a, what pulls at the canal's entrance, N; of a passive tendon its proximal half.
         strands: f of (12), shape (..., s), N.
         passive_acceleration: p_5'', shape (..., p), m/s2, (13).
     """
@@ -51,6 +54,7 @@ class TendonForces:
     normal: Array
     level: Array
     stiction_rate: Array
+    entering: Array
     strands: Array
     passive_acceleration: Array
 
@@ -73,13 +77,32 @@ class JointForces:
 
 
 @dataclass(frozen=True, eq=False)
+class MotorForces:
+    """What the motors do; shapes (..., m).
+
+    Attributes:
+        current: i, A.
+        voltage: U, V.
+        torque: tau = K_t i, N m.
+        friction: tau_g, N m, (9c).
+        load: N, the torque that the gears carry, N m.
+    """
+
+    current: Array
+    voltage: Array
+    torque: Array
+    friction: Array
+    load: Array
+
+
+@dataclass(frozen=True, eq=False)
 class FingerSignals:
     """Everything that (18) is made of, at one state or at many (leading dimensions are kept).
 
     Attributes:
         state: The state, unpacked.
         command: f^a, shape (..., a), N.
-        fingertip_force: F, shape (3,) or (..., 3), N, base frame.
+        fingertip_force: F, shape (3,) or (..., 3), of several fingers (f, 3) or (..., f, 3), N, base frame.
         tendons: Tendon forces and friction.
         joints: Joint reaction and friction.
         limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
@@ -90,6 +113,7 @@ class FingerSignals:
         acceleration: theta'', shape (..., n), rad/s2, (18).
         rate: Time derivative of the packed state, shape (..., size).
         mechanism: The same of the mechanism, with what every row does.
+        motors: What motors do; None without any.
     """
 
     state: State
@@ -105,6 +129,7 @@ class FingerSignals:
     acceleration: Array
     rate: Array
     mechanism: Evaluation
+    motors: MotorForces | None = None
 
 
 class Finger:
@@ -115,6 +140,7 @@ class Finger:
         rigid_body: M, C, G, J and forward dynamics, on Pinocchio.
         routing: H_c, H_c2, curvature matrix, crossing sets, force closure.
         tendons: The tendon layer.
+        actuators: The motors that pull tendons.
         joint_friction: The friction of the joints.
         stroke_limiter: The stroke limiters.
         springs: The springs of the joints.
@@ -126,23 +152,26 @@ class Finger:
 
     def __init__(
         self,
-        description: FingerDescription | str | Path,
+        description: FingerDescription | HandDescription | str | Path,
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
     ) -> None:
         """Build a finger.
 
         Args:
-            description: The finger, or what `load_finger` takes: the name of one, or the path of a file.
+            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand is all
+                its fingers together, whose joints and tendons have dotted names.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
-            rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
+            rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
 
         Raises:
             InputError: If the joints of the two differ, or one has several coordinates.
         """
         if isinstance(description, str | Path):
             description = load_finger(description)
+        if isinstance(description, HandDescription):
+            description = description.joined()
         self.description = description
         self.paths: Routes | None = None
         if description.tree is None:
@@ -156,35 +185,47 @@ class Finger:
                 raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
         self.tendons = Tendons.from_description(description)
         self.routing = self.tendons.routing
+        self.actuators = Actuators.from_description(description, self.routing)
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
-        width = len(self.routing.joints) + self.routing.passive
+        joints, motors = self.routing.joints, self.actuators.names
+        width = len(joints) + self.routing.passive + len(motors)
         self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
-            self.routing.joints, self.routing.tendons, self.routing.passive, further_states(self.further), ringing
+            self.routing.joints,
+            self.routing.tendons,
+            self.routing.passive,
+            further_states(self.further),
+            ringing,
+            self.actuators.names,
         )
-        joints = self.routing.joints
-        halves, driven, sliding = self.tendons.rows()
+        pulling = self.tendons.rows(self.actuators)
+        if self.paths:
+            pulling = [along_paths(description, self.paths, table) for table in pulling]
         self.mechanism = Mechanism(
             self.rigid_body,
             [
-                halves,
-                along_paths(description, self.paths, driven) if self.paths else driven,
-                sliding,
-                self.joint_friction.rows(joints, self.routing.actuated, width),
+                *pulling,
+                self.joint_friction.rows(joints, self.actuators.pulled, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
+                *(self.actuators.rotor_rows(width) if motors else []),
                 *self.further,
             ],
-            self.routing.passive_names,
-            self.tendons.mass,
+            (*self.routing.passive_names, *motors),
+            np.concatenate([self.tendons.mass, self.actuators.inertia]),
+            # Also where a tendon's input goes nowhere: the second one of a spool has none.
+            self.routing.actuated,
         )
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
         described = self.description
+        if described.hand is not None:
+            sizes = f"{len(described.joints)} joints, {len(described.tendons)} tendons"
+            return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
         return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
 
@@ -240,18 +281,22 @@ class Finger:
         """H_c2, shape (s, n), m, (10)."""
         return self.routing.strand_coupling
 
-    def rest_state(self, position: Array, velocity: Array | None = None) -> Array:
-        """Return a packed state with relaxed bristles and the masses of passive tendons in the middle, taut.
+    def rest_state(self, position: Array, velocity: Array | None = None, tension: Array | None = None) -> Array:
+        """Return a packed state with relaxed bristles, the masses of passive tendons in the middle, taut, and spools.
 
         Args:
             position: theta, shape (n,), rad.
-            velocity: theta', shape (n,), rad/s, with which the masses go; at rest by default.
+            velocity: theta', shape (n,), rad/s, with which masses and spools go; at rest by default.
+            tension: Of the elastic tendons on spools, shape (a,), N; by default they are just taut.
         """
         x = np.zeros(self.layout.size)
         state, middle = self.layout.unpack(x), self.tendons.rest_position
+        assert state.motor_position is not None and state.motor_velocity is not None
         state.position[:] = position
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
+        state.motor_position[:] = self.actuators.angle(state.position, tension)
+        state.motor_velocity[:] = self.actuators.rate(state.velocity)
         return x
 
     def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
@@ -259,15 +304,23 @@ class Finger:
 
         Args:
             x: Packed state, shape (size,) or (m, size).
-            command: f^a, shape (a,) or (m, a), N.
-            fingertip_force: F, shape (3,) or (m, 3), N, base frame; none by default.
+            command: f^a, shape (a,) or (m, a), N; of a motor in position drive its voltage, V, at its first tendon.
+            fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
+                default.
         """
         return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force))
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        joints = len(self.routing.joints)
+        joints, masses = len(self.routing.joints), len(self.routing.joints) + self.routing.passive
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
+        delivered, motors = driven.force, None
+        torque = self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
+        if self.actuators.names:
+            elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
+            delivered = delivered + elastic.force @ self.actuators.pulled.T
+            torque = torque + (elastic.force @ elastic.rows.arm)[..., :joints]
+            motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
             return np.concatenate([of(driven), of(passive)], axis=-1)
@@ -275,7 +328,7 @@ class Finger:
         return FingerSignals(
             state=self.layout.unpack(x),
             command=command,
-            fingertip_force=np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float),
+            fingertip_force=np.asarray(np.zeros(3) if fingertip_force is None else fingertip_force, dtype=float),
             tendons=TendonForces(
                 curvature=both(lambda tendons: tendons.row.curvature),
                 coefficient=both(lambda tendons: tendons["coefficient"]),
@@ -284,8 +337,9 @@ class Finger:
                 normal=both(lambda tendons: tendons["normal_force"]),
                 level=both(lambda tendons: tendons["level"]),
                 stiction_rate=both(lambda tendons: tendons.rate),
-                strands=np.concatenate([driven.force, halves.force], axis=-1),
-                passive_acceleration=found.acceleration[..., joints:],
+                entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
+                strands=np.concatenate([delivered, halves.force], axis=-1),
+                passive_acceleration=found.acceleration[..., joints:masses],
             ),
             joints=JointForces(
                 reaction=pins["normal_force"],
@@ -296,11 +350,12 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints],
+            tendon_torque=torque,
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             mechanism=found,
+            motors=motors,
         )
 
     def coupling_at(self, position: Array) -> Array:

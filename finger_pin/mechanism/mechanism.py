@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,15 +106,23 @@ class Mechanism:
     """
 
     def __init__(
-        self, body: RigidBody, rows: Sequence[Rows], lumps: Sequence[str] = (), inertia: Array | None = None
+        self,
+        body: RigidBody,
+        rows: Sequence[Rows],
+        lumps: Sequence[str] = (),
+        inertia: Array | None = None,
+        channels: int = 0,
     ) -> None:
-        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps."""
+        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
+
+        There are as many inputs as rows have, or more if so many ``channels`` are asked for.
+        """
         self.body = body
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
         self.books = Books.of(self.rows)
-        self.channels = max((int(table.channels.max(initial=-1)) + 1 for table in self.rows), default=0)
+        self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
         for table in self.rows:
@@ -156,7 +165,7 @@ class Mechanism:
             joint, coordinate = joint + part.body.model.njoints - 1, coordinate + size
             lump, channel = lump + len(part.lumps), channel + part.channels
         lumps = [f"{name}.{each}" for name, part in parts.items() for each in part.lumps]
-        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]))
+        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]), channel)
 
     @property
     def coordinates(self) -> int:
@@ -220,7 +229,7 @@ class Mechanism:
         for table, part in zip(self.rows, self.states, strict=True):
             routed = self._routed(table, turning)
             arm = table.arm + routed.arm
-            row = table.law.sees(
+            row: Any = table.law.sees(
                 linear @ table.measure.T + table.offset + routed.length,
                 (arm @ v[..., None])[..., 0],
                 z[..., part] if table.states else np.zeros((*lead, table.count)),
@@ -271,7 +280,12 @@ class Mechanism:
         return total
 
     def _load(
-        self, table: Rows, found: dict[str, RowSignals], q: Array, forces: Array, touching: Sequence[tuple[Paths, Array]]
+        self,
+        table: Rows,
+        found: dict[str, RowSignals],
+        q: Array,
+        forces: Array,
+        touching: Sequence[tuple[Paths, Array]],
     ) -> Array:
         """Return N: the magnitude of what earlier rows add up to, or of -e S + F for the pins of joints (17)."""
         load = np.zeros((*q.shape[:-1], table.count))

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -31,11 +31,19 @@ class Shape(Protocol):
         columns: How many wrenches it has: one along a span; normal and two tangents of a gap.
     """
 
-    name: str
-    parameters: tuple[str, ...]
-    value: Callable[..., None]
-    slopes: Callable[..., None]
-    columns: int
+    columns: ClassVar[int]
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def value(self) -> Callable[..., None]: ...  # noqa: D102
+
+    @property
+    def slopes(self) -> Callable[..., None]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +141,6 @@ def reach(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> Reach:
     width = int(body.model.nv)
     placements, twists = body.placements(q)
 
-    def velocity(joint: int, point: Array) -> Array:
-        """Return the columns of the velocity of a body's point, shape (3, nv)."""
-        columns = twists[joint]
-        return columns[:3] - np.cross(point, columns[3:], axisb=0).T
-
     found = Reach(
         np.zeros(len(paths)), np.zeros((len(paths), coordinates)), np.zeros(len(paths)), np.zeros((len(paths), 3))
     )
@@ -158,9 +161,10 @@ def reach(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> Reach:
                 loads = [(rotation @ out[axis : axis + 3], frame.act(out[4:7]))] if out[0] < 0.0 else []
             arm = np.zeros(width)
             for (force, point), end in zip(loads, piece.ends, strict=False):
-                arm += force @ (velocity(end.joint, point) - velocity(piece.joint, point))
+                wrench = np.concatenate([force, pin.skew(point) @ force])
+                arm += wrench @ (twists[end.joint] - twists[piece.joint])
             found.length[k] += leg.length_weight * length
-            found.arm[k, : width] += leg.arm * arm
+            found.arm[k, :width] += leg.arm * arm
             found.turn[k] += turn
             if leg.follows:
                 found.turn[k] += _angle(before, -loads[0][0])
@@ -183,4 +187,4 @@ def _value(piece: Piece, frame: pin.SE3, points: Sequence[Array]) -> Array:
 
 
 def _angle(first: Array, second: Array) -> Any:
-    return np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second)
+    return np.arctan2(np.linalg.norm(pin.skew(first) @ second), first @ second)

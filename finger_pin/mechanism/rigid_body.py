@@ -20,9 +20,9 @@ class Kinematics:
     """Positions and velocities of the rigid body; leading dimensions such as time are kept.
 
     Attributes:
-        tip: p, fingertip position, shape (..., 3), m.
-        tip_velocity: p', shape (..., 3), m/s.
-        jacobian: J of (6), shape (..., 3, n).
+        tip: p, fingertip position, shape (..., 3), m; of several shape (..., t, 3).
+        tip_velocity: p', shape (..., 3), m/s, of the first.
+        jacobian: J of (6), shape (..., 3, n), of the first.
         directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
@@ -41,7 +41,7 @@ class Motion:
     """Where the fingertip is and what energy the rigid body has; leading dimensions are kept.
 
     Attributes:
-        tip: p, shape (..., 3), m.
+        tip: p, shape (..., 3), m; of several shape (..., t, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
     """
@@ -107,8 +107,13 @@ class RigidBody:
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
 
     @classmethod
-    def join(cls, parts: Mapping[str, RigidBody]) -> RigidBody:
+    def join(cls, parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:
         """Return several bodies on one base; names of joints and tips begin with that of their part and a dot.
+
+        Args:
+            parts: By name.
+            places: Where the base frames of parts stand on the common base; there itself by default. Gravity is that
+                of the common base.
 
         Raises:
             InputError: If gravity is not the same for all.
@@ -118,11 +123,13 @@ class RigidBody:
         model.gravity = next(iter(parts.values())).model.gravity
         for part, body in parts.items():
             own, shift = body.model, model.njoints - 1
+            place = (places or {}).get(part, pin.SE3.Identity())
             if own.gravity != model.gravity:
                 raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", own.gravity.linear)
             for index in range(1, own.njoints):
                 parent = int(own.parents[index])
                 joint, placement = own.joints[index], own.jointPlacements[index]
+                placement = placement if parent else place * placement
                 at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
                 # Appending bodies, or frames with theirs, would round.
                 model.inertias[at] = own.inertias[index]
@@ -132,8 +139,10 @@ class RigidBody:
                 frame = own.frames[tip]
                 holder = frame.parentJoint and frame.parentJoint + shift
                 tips.append(f"{part}.{frame.name}")
-                model.addFrame(pin.Frame(tips[-1], holder, 0, frame.placement, pin.FrameType.OP_FRAME), False)
-            axes += body.proximal_axes[1:]
+                held = frame.placement if holder else place * frame.placement
+                model.addFrame(pin.Frame(tips[-1], holder, 0, held, pin.FrameType.OP_FRAME), False)
+            along = zip(body.proximal_axes[1:], body.carriers[1:], strict=True)
+            axes += [axis if carrier else place.rotation @ axis for axis, carrier in along]
             carriers += [carrier and carrier + shift for carrier in body.carriers[1:]]
         joined = cls(model, tips)
         joined.proximal_axes, joined.carriers = axes, carriers
@@ -229,12 +238,14 @@ class RigidBody:
             each = [self.kinematics(*row) for row in zip(q, v, strict=True)]
             return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
-        tip = np.array(self._data.oMf[self.tip_frame].translation)
         # Pinocchio's kinetic energy is without what turns with the joints' motors.
         kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
+        pin.framesForwardKinematics(self.model, self._data, q)
+        tips = np.array([self._data.oMf[each].translation for each in self.tips])
+        tip = tips[0] if len(tips) == 1 else tips
         return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
 
     def _directions(self) -> Array:

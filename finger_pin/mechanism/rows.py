@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.laws.law import ContactLaw, Law, Row, Touch
+from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.pieces import Leg
 
 
@@ -117,14 +117,14 @@ class RowSignals:
 
     Attributes:
         rows: The table.
-        row: What they see.
+        row: What they see, a `Row`, or a `Touch` for contacts.
         force: phi.
         rate: z'.
         signals: What the law shows, in its order.
     """
 
     rows: Rows
-    row: Row | Touch
+    row: Any
     force: Array
     rate: Array
     signals: tuple[Array, ...]
@@ -144,8 +144,9 @@ class RowSignals:
 
 def further_states(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
     """Return name and scale of every state of tables of rows."""
-    found = []
+    found: list[tuple[str, float]] = []
     for table in rows:
-        for name in table.names if table.law.scale is not None else ():
-            found += [(f"{table.group}[{name}]", table.law.scale)] * table.law.states
+        if table.law.scale is not None:
+            for name in table.names:
+                found += [(f"{table.group}[{name}]", table.law.scale)] * table.law.states
     return tuple(found)

@@ -70,8 +70,10 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
 
 
 def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
-    """Return the table of driven tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
+    """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
     assert description.tree is not None
+    if table.group != "driven_tendons":
+        return table
     arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
     rest = np.array([joint.reference for joint in description.tree.joints.values()])
     lengths = dict(zip(routes.routes, routes.length(rest), strict=True))

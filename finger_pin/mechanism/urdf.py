@@ -5,8 +5,10 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
+import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -66,10 +68,21 @@ def effort_limit(description: FingerDescription, joint: str) -> float:
 
 
 def build_rigid_body(description: FingerDescription) -> RigidBody:
-    """Return the rigid body of a finger: its URDF read by Pinocchio, with its gravity."""
+    """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
+    if description.hand is not None:
+        return build_hand(description.hand)
     model = pin.buildModelFromXML(to_urdf(description))
     model.gravity.linear[:] = description.gravity
     return RigidBody(model, TIP_FRAME)
+
+
+def build_hand(hand: HandDescription) -> RigidBody:
+    """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
+    parts = {name: build_rigid_body(finger) for name, finger in hand.built().items()}
+    for body in parts.values():
+        body.model.gravity.linear[:] = hand.gravity
+    places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
+    return RigidBody.join(parts, places)
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:

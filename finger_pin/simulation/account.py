@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,19 +51,30 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         motion: Fingertip and energies of the rigid body at those times.
     """
     booked = powers(signals.finger)
-    works = Flows(_works(loop, trajectory, times, len(booked.names)), booked.names, booked.supplies)
+    count = len(booked.names)
+    done = [_works(*part, times, count) for part in _apart(loop, trajectory)]
+    works = Flows(np.sum(done, axis=0), booked.names, booked.supplies)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     return Account(stored=stored, powers=booked, works=works, residual=total - total[0] - works.net)
 
 
-def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array, count: int) -> Array:
+def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[tuple[ClosedLoop, Array, Callable[[Array], Array]]]:
+    """Return loops with their breakpoints and states: of the fingers of a hand that move apart, or of the whole."""
+    sizes = [part.finger.layout.size for part in loop.parts]
+    if sizes and sizes == [len(places) for places, _, _ in trajectory.islands]:
+        # Islands stand in the order of their first joint, as fingers do.
+        return [(part, ends, states) for part, (_, ends, states) in zip(loop.parts, trajectory.islands, strict=True)]
+    return [(loop, trajectory.breakpoints, trajectory.interpolate)]
+
+
+def _works(loop: ClosedLoop, breakpoints: Array, states: Callable[[Array], Array], times: Array, count: int) -> Array:
     """Return the integrals of all powers from the start to the saved times, shape (m, count).
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
     """
-    begin, length = trajectory.breakpoints[:-1], np.diff(trajectory.breakpoints)
+    begin, length = breakpoints[:-1], np.diff(breakpoints)
     works, reached = np.zeros((len(times), count)), np.zeros(count)
     if len(length) == 0:
         return works
@@ -70,7 +82,7 @@ def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array, count: int) -
     for first in range(0, len(begin), _CHUNK):
         part = slice(first, first + _CHUNK)
         nodes = (begin[part, None] + length[part, None] * _NODES).ravel()
-        values = loop.powers(nodes, trajectory.interpolate(nodes))
+        values = loop.powers(nodes, states(nodes))
         values = values.reshape(-1, len(_NODES), count) * length[part, None, None]
         steps = sum(weight * values[:, node] for node, weight in enumerate(_WEIGHTS))
         before = reached + np.cumsum(steps, axis=0) - steps

@@ -4,7 +4,18 @@ from dataclasses import replace
 
 import example_robot_data
 import pytest
-from core_cases import FORCE, Case, lugre, none_passive, on_model, tree_model, two_passive, without_abduction_link
+from core_cases import (
+    FORCE,
+    Case,
+    Unpowered,
+    lugre,
+    none_passive,
+    on_model,
+    servos,
+    tree_model,
+    two_passive,
+    without_abduction_link,
+)
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -34,6 +45,7 @@ def scenarios():
         "two_passive": two_passive(),
         "none_passive": none_passive(),
         "lugre": lugre(),
+        "servos": servos(),
     }
 
 
@@ -41,6 +53,7 @@ def scenarios():
 def cases(scenarios):
     """All loops by name, each with and without a fingertip force."""
     loops = {name: ClosedLoop.from_scenario(scenario) for name, scenario in scenarios.items()}
+    loops["servos"] = replace(loops["servos"], drives=Unpowered())
     loops["meeting_axes"] = without_abduction_link(loops["fig6"])
     pushed = {f"{name}_pushed": replace(loop, fingertip_force=FORCE) for name, loop in loops.items()}
     return {name: Case.of(loop) for name, loop in (loops | pushed).items()}

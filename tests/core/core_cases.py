@@ -21,7 +21,7 @@ BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
     name + push
     for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes")
+    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
@@ -107,6 +107,30 @@ def lugre():
     return fp.Scenario.model_validate(table)
 
 
+def servos():
+    """`fig6` with damping, two tendons on one spool in position drive, one in tension drive, and one ideal source."""
+    # Soft tendons: differences of the friction of stiff ones would have to be finer than rounding allows.
+    both = {"tendons": ["T4", "T1"], "spool_radius": [0.006, 0.004], "drive": "position", "pretension": [2.0, 3.0]}
+    one = {"tendons": ["T3"], "spool_radius": 0.005, "friction_compensation": 0.7}
+    actuators = {
+        "both": {"motor": "STS3215", "tendon_rigidity": 500.0, **both},
+        "one": {"motor": "XL330-M288", "tendon_rigidity": 500.0, **one},
+    }
+    return fp.load_scenario("fig6", {"controller.damping": [0.02, 0.01, 0.0, 0.03], "finger.actuators": actuators})
+
+
+class Unpowered:
+    """Position drives that are switched off."""
+
+    channels = slice(3, 4)
+
+    def voltages(self, time):
+        return np.zeros((*np.shape(time), 1))
+
+    def planned(self, time, reference, control):
+        return control
+
+
 def without_abduction_link(loop):
     """A loop whose first two joint axes meet in a point."""
     model = loop.finger.rigid_body.model.copy()
@@ -187,6 +211,9 @@ class Case:
             passive_velocity=spread(self.layout.passive, -4.0, -1.0),
             tendon_stiction=spread(tendons, -2.0, 0.8),
             joint_stiction=spread(len(lower), -5.0, -2.0),
+            motor_position=finger.actuators.angle(q) + spread(len(self.layout.motors), -3.0, -1.0),
+            motor_velocity=spread(len(self.layout.motors), -2.0, 1.0),
+            gearbox_stiction=spread(len(self.layout.motors), -4.0, -2.0),
         )
         return self.layout.pack(state)
 

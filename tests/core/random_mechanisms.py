@@ -2,15 +2,15 @@
 
 import numpy as np
 import pinocchio as pin
-from ball import BALL
 from law_cases import every_law, random_parameters
 
 from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.gaps import PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.pieces import Leg, Piece, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.spans.straight import STRAIGHT
+from finger_pin.mechanism.spans import SPHERE, STRAIGHT
 
 KINDS = (
     pin.JointModelRX,
@@ -59,23 +59,28 @@ def random_path(rng, joints):
         follows = last is not None and rng.random() < 0.7
         first = last if follows else Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
         last = Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
-        piece = Piece(STRAIGHT, np.zeros(0), (first, last), int(rng.integers(0, joints + 1)), random_placement(rng))
+        shape, numbers = (STRAIGHT, ()) if rng.random() < 0.6 else (SPHERE, (0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
+        frame = int(rng.integers(0, joints + 1))
+        piece = Piece(shape, np.array(numbers), (first, last), frame, random_placement(rng))
         measure = None if rng.random() < 0.5 else rng.normal()
         legs.append(Leg(piece, arm=rng.normal(), measure=measure, follows=follows))
     return tuple(legs)
 
 
 def random_contacts(rng, joints, width):
-    """Three or four contacts of points with balls so large that most are inside; they slide or stick."""
+    """Three or four contacts of capsules with balls so large that most are inside; they slide or stick."""
     count = int(rng.integers(3, 5))
     paths = []
     for _ in range(count):
-        end = Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
-        piece = Piece(BALL, np.array([rng.uniform(2.0, 6.0)]), (end, end), int(rng.integers(0, joints + 1)))
+        holder, frame = int(rng.integers(0, joints + 1)), int(rng.integers(0, joints + 1))
+        ends = Place(holder, rng.normal(size=3)), Place(holder, rng.normal(size=3))
+        numbers = np.array([0.3, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
+        piece = Piece(PRISM, numbers, ends, frame, random_placement(rng))
         paths += [(Leg(piece, column),) for column in range(3)]
-    # Stiffness, damping, exponent, static and kinetic friction, that of the bristles, lag, Stribeck velocity, floor.
-    numbers = [(1.0, 2.0), (0.0, 0.1), (1.0, 1.5), (0.8, 1.0), (0.3, 0.7), (1.0, 3.0), (0.1, 1.0), (0.5, 2.0), (0.1, 0.2)]
-    parameters = np.array([rng.uniform(*bounds, count) for bounds in numbers])
+    # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor.
+    least = [1.0, 0.0, 1.0, 0.8, 0.3, 1.0, 0.1, 0.5, 0.1]
+    most = [2.0, 0.1, 1.5, 1.0, 0.7, 3.0, 1.0, 2.0, 0.2]
+    parameters = rng.uniform(least, most, (count, len(least))).T
     names = tuple(f"contact{k}" for k in range(count))
     return Rows("contacts", CONTACT, names, parameters, np.zeros((3 * count, width)), paths=paths)
 

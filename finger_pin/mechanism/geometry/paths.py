@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry.cuts import Cut, Groove, cuts
-from finger_pin.mechanism.geometry.lanes import tendon_lanes
-from finger_pin.mechanism.geometry.winding import Arc, Span, wind
-from finger_pin.mechanism.urdf import build_rigid_body
+from finger_pin.mechanism.geometry.lanes import Lanes, tendon_lanes
+from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, Span, wind
+from finger_pin.mechanism.shapes import MATERIALS
+from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
 
 #: Drawn sag of a loose span in parts of its length, and lift of a loose arc off its pulley in parts of its radius.
 SAG, LIFT = 0.12, 0.15
@@ -66,14 +71,37 @@ class Pulley:
     offset: float
 
 
+@dataclass(frozen=True)
+class Visual:
+    """A solid that is fixed to a link.
+
+    Attributes:
+        name: Of the solid.
+        link: Index of the link, 0 for the base.
+        shape: Geometry of Pinocchio: a box, a cylinder, a sphere or a mesh.
+        placement: In the frame of the link.
+        colour: Red, green, blue and opacity, 0 to 1.
+    """
+
+    name: str
+    link: int
+    shape: Any
+    placement: pin.SE3
+    colour: tuple[float, float, float, float]
+
+
 class TendonGeometry:
-    """The tendons of a finger: wound once, placed for any joint position.
+    """The tendons of a finger, or of all fingers of a hand: wound once, placed for any joint position.
 
     Attributes:
         description: What it was built from.
-        model: Pinocchio model of the generated URDF.
+        model: Pinocchio model; the axis of every joint is the z axis of its frame.
         lanes: How far along the joint axes each tendon runs.
         pulleys: Winding surfaces whose radius is not zero.
+        visuals: The solids.
+        tips: The fingertips: index of the link, and place in its frame, shape (3,), m.
+        size: How far the fingertips can be from the base, about, m.
+        widths: Of the links, m.
     """
 
     def __init__(self, description: FingerDescription, *, resolution: int = 8) -> None:
@@ -87,7 +115,21 @@ class TendonGeometry:
             InputError: If a joint carries no link.
         """
         self.description = description
-        self.model = build_rigid_body(description).model
+        body = build_rigid_body(description)
+        self.model = body.model
+        frames = [self.model.frames[tip] for tip in body.tips]
+        self.tips = tuple((int(tip.parentJoint), np.array(tip.placement.translation)) for tip in frames)
+        if description.hand is not None:
+            self._join(description.hand, resolution)
+            return
+        links = [joint.link for joint in description.joints.values() if joint.link is not None]
+        self.widths = tuple(link.width for link in links)
+        self.size = BASE_LEAD * links[0].width + sum(link.length for link in links)
+        solids = pin.buildGeomFromUrdfString(self.model, to_urdf(description), pin.GeometryType.VISUAL).geometryObjects
+        self.visuals = tuple(
+            Visual(each.name, int(each.parentJoint), each.geometry, each.placement, tuple(each.meshColor))
+            for each in solids
+        )
         self.lanes = tendon_lanes(description, self.model)
         self._pieces = {
             name: wind(description, self.model, self.lanes, name, resolution) for name in description.tendons
@@ -99,6 +141,35 @@ class TendonGeometry:
             for joint, crossing in tendon.crossings.items()
             if crossing.radius
         )
+
+    def _join(self, hand: HandDescription, resolution: int) -> None:
+        """Take over the geometries of the fingers of a hand, each in its place."""
+        pieces: dict[str, tuple[Span | Arc, ...]] = {}
+        pulleys, lanes, first = [], [], 0
+        visuals, widths, sizes = list(_palm(hand)), list[float](), []
+        for name, finger in hand.built().items():
+            own, placed, begin = TendonGeometry(finger, resolution=resolution), hand.fingers[name], first
+            place = pin.SE3(placed.rotation, np.array(placed.position))
+            pieces |= {f"{name}.{key}": _moved(each, place, begin) for key, each in own._pieces.items()}
+            pulleys += [replace(each, tendon=f"{name}.{each.tendon}", joint=begin + each.joint) for each in own.pulleys]
+            for each in own.visuals:
+                at = {"link": begin + each.link} if each.link else {"placement": place * each.placement}
+                visuals.append(replace(each, name=f"{name}.{each.name}", **at))
+            lanes.append((begin, own.lanes))
+            widths += own.widths
+            sizes.append(float(np.linalg.norm(placed.position)) + own.size)
+            first += len(finger.joints)
+        self._pieces = {name: pieces[name] for name in self.description.tendons}
+        self.pulleys, self.visuals, self.widths, self.size = tuple(pulleys), tuple(visuals), tuple(widths), max(sizes)
+        # Joints are looked at along the axes of the finger that reaches farthest.
+        begin, farthest = lanes[int(np.argmax(sizes))]
+        families = tuple(tuple(begin + joint for joint in family) for family in farthest.families)
+        offsets = {
+            (f"{name}.{tendon}", begin + joint): offset
+            for name, (begin, own) in zip(hand.fingers, lanes, strict=True)
+            for (tendon, joint), offset in own.offset.items()
+        }
+        self.lanes = Lanes(offsets, min(own.spacing for _, own in lanes), families)
 
     def poses(self, joint_position: ArrayLike) -> LinkPoses:
         """Return where the links are at theta, shape (..., n), rad."""
@@ -135,7 +206,7 @@ class TendonGeometry:
         return tuple(paths)
 
     def cuts(self, groove: Groove = Groove.DISTAL) -> tuple[Cut, ...]:
-        """Return where and in which direction every tendon crosses the joints; see `cuts`."""
+        """Return where and in which direction every tendon of a finger crosses the joints; see `cuts`."""
         found = (cuts(self.model, name, pieces, groove) for name, pieces in self._pieces.items())
         return tuple(cut for each in found for cut in each)
 
@@ -161,6 +232,25 @@ class TendonGeometry:
                 "joint_position", f"the last of its dimensions must be the {self.model.nq} joints", q.shape
             )
         return q
+
+
+def _moved(pieces: tuple[Span | Arc, ...], place: pin.SE3, begin: int) -> tuple[Span | Arc, ...]:
+    """Return the pieces of a finger's tendon as those of a hand, where its joints begin later."""
+    moved: list[Span | Arc] = []
+    for piece in pieces:
+        if isinstance(piece, Arc):
+            moved.append(replace(piece, joint=begin + piece.joint))
+        elif piece.link:
+            moved.append(replace(piece, link=begin + piece.link))
+        else:
+            moved.append(replace(piece, points=piece.points @ place.rotation.T + place.translation))
+    return tuple(moved)
+
+
+def _palm(hand: HandDescription) -> Iterator[Visual]:
+    if all(hand.palm.size):
+        place = pin.SE3(np.eye(3), np.array(hand.palm.centre))
+        yield Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"])
 
 
 def tendon_paths(

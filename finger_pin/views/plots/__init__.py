@@ -24,6 +24,7 @@ from finger_pin.views.plots.losses import plot_losses
 from finger_pin.views.plots.pareto import plot_pareto
 from finger_pin.views.plots.passive_delivery import plot_passive_delivery
 from finger_pin.views.plots.self_locking import plot_critical_friction, plot_runaway, plot_self_locking_map
+from finger_pin.views.plots.servo import plot_servo
 from finger_pin.views.plots.sweep import plot_sweep
 from finger_pin.views.plots.transmission import plot_transmission
 from finger_pin.views.plots.workspace import plot_workspace
@@ -46,6 +47,7 @@ __all__ = [
     "plot_radius_sensitivity",
     "plot_runaway",
     "plot_self_locking_map",
+    "plot_servo",
     "plot_sweep",
     "plot_transmission",
     "plot_workspace",
@@ -65,6 +67,8 @@ def draw_all(result: xr.Dataset, folder: str | Path) -> list[Path]:
     figures = {"motion": plot_hand_motion, "energy": plot_energy} if is_tree(result) else dict(_FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
+    if "motor_current" in result:
+        figures["servo"] = plot_servo
     return [save_figure(draw(result), Path(folder) / f"{name}.png") for name, draw in figures.items()]
 
 

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -125,7 +126,9 @@ class Motion:
             InputError: If the result lacks something that is shown.
         """
         scenario = _scenario(result)
-        scene = Scene(FingerDescription.model_validate(scenario["finger"]))
+        hand = scenario.get("hand")
+        described = FingerDescription.model_validate(scenario["finger"]) if hand is None else _joined(hand)
+        scene = Scene(described)
         time = _variable(result, "time")
         if len(time) == 0:
             raise InputError("result.time", "must have at least one sample")
@@ -169,6 +172,10 @@ def _scenario(result: xr.Dataset) -> dict[str, Any]:
         scenario = tomllib.loads(result.attrs["scenario"])
     except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
         raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
-    if not isinstance(scenario.get("finger"), dict):
-        raise InputError("result.attrs.scenario", "must hold the resolved table [finger]")
+    if not isinstance(scenario.get("finger", scenario.get("hand")), dict):
+        raise InputError("result.attrs.scenario", "must hold the resolved table [finger] or [hand]")
     return scenario
+
+
+def _joined(hand: dict[str, Any]) -> FingerDescription:
+    return HandDescription.model_validate(hand).joined()

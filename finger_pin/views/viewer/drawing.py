@@ -44,7 +44,7 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
     motion = Motion.of(result, rate / speed)
     root = visualizer.path.lower()
     scene, tube, scale = motion.scene, motion.scene.tube_radius, scale_above(motion.largest)
-    for command in solid_commands(scene.geometry, scene.urdf, tube):
+    for command in solid_commands(scene.geometry, tube):
         _send(visualizer, {**command, "path": root + command["path"]})
     started, last = time.monotonic(), len(motion.time) - 1
     for index, due in enumerate((motion.time - motion.time[0]) / speed):

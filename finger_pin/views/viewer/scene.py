@@ -17,8 +17,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import BASE_LEAD, LinkPoses, TendonGeometry
-from finger_pin.mechanism.urdf import TIP_FRAME, to_urdf
+from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, link_names, root_command, solid_commands
 
@@ -50,7 +49,7 @@ class Ghost:
     def header(self) -> dict[str, Any]:
         """Return what the page needs to know of it."""
         scene = self.scene
-        solids = solid_commands(scene.geometry, scene.urdf, scene.tube_radius, _GHOST, _GHOST_COLOUR)
+        solids = solid_commands(scene.geometry, scene.tube_radius, _GHOST, _GHOST_COLOUR)
         moving = [each for each in solids if not each["path"].startswith(f"{_GHOST}/base/")]
         return {"title": self.title, "links": link_names(scene.geometry)[1:], "commands": moving}
 
@@ -83,7 +82,6 @@ class Scene:
     Attributes:
         geometry: Its tendons in space.
         strands: Labels of the strands whose tension is shown: the actuated tendons, then two halves of each passive.
-        urdf: The finger's URDF, as text.
         tube_radius: Of the tubes that are drawn for tendons, m.
         tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots.
     """
@@ -99,17 +97,16 @@ class Scene:
                 allowed = "is missing; the viewer shows fingers whose joints all have links, not those on another model"
                 raise InputError(f"finger.joints.{name}.link", allowed)
         self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
-        self.urdf = to_urdf(description)
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self.strands = (*description.actuated_names, *halves)
-        links = [joint.link for joint in description.joints.values() if joint.link is not None]
-        self._widths = [link.width for link in links]
-        size = self._size = BASE_LEAD * links[0].width + sum(link.length for link in links)
+        self._widths, size = self.geometry.widths, self.geometry.size
+        self._size = size
         # Points travel as 16-bit integers; this is their unit, a few micrometres.
         self._quantum = 1.5 * size / _LARGEST
         self.tube_radius = min(_TUBE_IN_LANE * self.geometry.lanes.spacing, _TUBE_IN_LINK * min(self._widths))
         self.tendons = [
-            self._tendon(path.name, path.distal.tolist()) for path in self.geometry.paths(np.zeros(len(links)))
+            self._tendon(path.name, path.distal.tolist())
+            for path in self.geometry.paths(np.zeros(len(description.joints)))
         ]
         self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
@@ -138,7 +135,7 @@ class Scene:
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation, self.tips(poses)[:, None, :], *(path.points for path in paths)]
+        seen = [poses.translation, self.tips(poses), *(path.points for path in paths)]
         if shown is not None:
             seen.append(shown.corners)
         if ghost is not None:
@@ -148,7 +145,7 @@ class Scene:
         return {
             "title": title,
             "live": live,
-            "commands": [root_command(turn), *solid_commands(geometry, self.urdf, tube), *drawn],
+            "commands": [root_command(turn), *solid_commands(geometry, tube), *drawn],
             "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",
             "links": link_names(geometry),
@@ -158,6 +155,7 @@ class Scene:
             "tubeRadius": tube,
             "quantum": self._quantum,
             "grid": self._grid,
+            "tips": len(geometry.tips),
             "inView": np.round(_outermost(corners), 5).tolist(),
             "margin": 0.55 * max(self._widths),
             "tensionScale": scale_above(largest_tension),
@@ -185,15 +183,13 @@ class Scene:
             "joint": _encode(q, "<f4"),
         }
 
-    @property
-    def _tip_placement(self) -> pin.SE3:
-        model = self.geometry.model
-        return model.frames[model.getFrameId(TIP_FRAME)].placement
-
     def tips(self, poses: LinkPoses) -> Array:
-        """Return the fingertips, shape (..., 3), m, of poses of the links."""
-        offset = np.array(self._tip_placement.translation)
-        return np.asarray(poses.rotation[..., -1, :, :] @ offset + poses.translation[..., -1, :])
+        """Return the fingertips, shape (..., f, 3), m, of poses of the links."""
+        places = [
+            poses.rotation[..., link, :, :] @ offset + poses.translation[..., link, :]
+            for link, offset in self.geometry.tips
+        ]
+        return np.stack(places, axis=-2)
 
     def looseness(self, strand_tension: Array) -> Array:
         """Return how loose tendons are drawn, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""

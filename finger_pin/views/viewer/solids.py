@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -29,13 +28,12 @@ def link_names(geometry: TendonGeometry) -> list[str]:
 
 
 def solid_commands(
-    geometry: TendonGeometry, urdf: str, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
+    geometry: TendonGeometry, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
 ) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
     Args:
         geometry: The finger and its tendons.
-        urdf: Its URDF, as text.
         tube_radius: Radius with which tendons are drawn, m; grooves are smaller by as much.
         root: Path below which the links hang.
         colour: Of all solids, red, green and blue; by default each has its own.
@@ -44,12 +42,11 @@ def solid_commands(
         InputError: If a visual is no box, cylinder or sphere.
     """
     links = link_names(geometry)
-    visuals = pin.buildGeomFromUrdfString(geometry.model, urdf, pin.GeometryType.VISUAL)
-    for visual in visuals.geometryObjects:
+    for visual in geometry.visuals:
         placement = visual.placement
-        shape, turn = _primitive(visual.name, visual.geometry)
-        own, opacity = tuple(visual.meshColor[:3]), visual.meshColor[3] * SOLID_OPACITY
-        path = f"{root}/{links[visual.parentJoint]}/{visual.name}"
+        shape, turn = _primitive(visual.name, visual.shape)
+        own, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
+        path = f"{root}/{links[visual.link]}/{visual.name}"
         yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:

@@ -84,22 +84,23 @@ class TendonView {
   }
 }
 
-// The path of the fingertip: what is past in full colour, what is to come faint.
+// The path of a fingertip: what is past in full colour, what is to come faint.
 class Trace {
-  constructor(viewer, config, frames) {
+  constructor(viewer, config, frames, finger) {
     this.frames = frames;
+    this.first = 3 * finger;
     const look = { color: 0x000000, emissive: 0xff86b4 };
     this.past = new Tube(TRACE_POINTS, 0.6 * config.tubeRadius, look);
     this.rest = new Tube(TRACE_POINTS, 0.3 * config.tubeRadius, { ...look, transparent: true, opacity: 0.35 });
-    viewer.set_object([ROOT, "fingertip_trace", "past"], this.past.mesh);
-    viewer.set_object([ROOT, "fingertip_trace", "rest"], this.rest.mesh);
+    viewer.set_object([ROOT, "fingertip_trace", String(finger), "past"], this.past.mesh);
+    viewer.set_object([ROOT, "fingertip_trace", String(finger), "rest"], this.rest.mesh);
   }
 
   rebuild() {
     const tips = new Float32Array(3 * TRACE_POINTS);
     for (let i = 0; i < TRACE_POINTS; i++) {
       const frame = Math.round((i * (this.frames.count - 1)) / (TRACE_POINTS - 1));
-      tips.set(this.frames.columns.tip.row(frame), 3 * i);
+      tips.set(this.frames.columns.tip.row(frame).subarray(this.first, this.first + 3), 3 * i);
     }
     this.past.shape(tips);
     this.rest.shape(tips);
@@ -124,12 +125,15 @@ class FingerScene {
     for (const command of config.ghost?.commands ?? []) viewer.handle_command(command);
     this.ghostLinks = (config.ghost?.links ?? []).map((name) => viewer.scene_tree.find([ROOT, "ghost", name]).object);
     this.tendons = config.tendons.map((tendon) => new TendonView(viewer, config, tendon));
-    this.trace = new Trace(viewer, config, frames);
+    this.traces = Array.from({ length: config.tips }, (_, i) => new Trace(viewer, config, frames, i));
     this.root = viewer.scene_tree.find([ROOT]).object;
     this.box = [Math.min, Math.max].map((pick) => [0, 1, 2].map((i) => pick(...config.inView.map((point) => point[i]))));
-    this.labels = config.tendons.map((tendon) => {
+    // In a hand a finger's name stands for its tendons.
+    const named = config.tendons.map((tendon) => tendon.name.split(".")[0]);
+    this.labels = named.map((name, i) => {
+      if (named.indexOf(name) < i) return null;
       const label = document.createElement("div");
-      label.textContent = tendon.name;
+      label.textContent = name;
       document.getElementById("labels").append(label);
       return label;
     });
@@ -171,7 +175,7 @@ class FingerScene {
       tendon.show(points.subarray(first, first + size), colours);
       first += size;
     }
-    this.trace.show(place);
+    for (const trace of this.traces) trace.show(place);
     this.viewer.set_dirty();
   }
 
@@ -238,8 +242,8 @@ class FingerScene {
     const { camera } = this.viewer;
     const places = this.tendons.map((tendon, i) => {
       const at = this.root.localToWorld(new MeshCat.THREE.Vector3().fromArray(tendon.points || [0, 0, 0])).project(camera);
-      return { label: this.labels[i], x: ((at.x + 1) / 2) * window.innerWidth, y: ((1 - at.y) / 2) * window.innerHeight };
-    });
+      return this.labels[i] && { label: this.labels[i], x: ((at.x + 1) / 2) * window.innerWidth, y: ((1 - at.y) / 2) * window.innerHeight };
+    }).filter(Boolean);
     places.sort((a, b) => a.y - b.y);
     for (let pass = 0; pass < 40; pass++) {
       places.forEach((place, i) => places.slice(0, i).forEach((other) => {
