@@ -5,7 +5,7 @@ It reads descriptions, fingers, scenarios and results, and nothing of the simula
 
 from __future__ import annotations
 
-from finger_pin.analysis.closure import ClosureRange, closure_over_range, posed
+from finger_pin.analysis.closure import ClosureRange, closure_over_range, locking_over_range, posed
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import (
@@ -38,6 +38,7 @@ __all__ = [
     "joint_reactions",
     "largest_force",
     "locking_advice",
+    "locking_over_range",
     "pin_wrench",
     "posed",
     "self_locking_map",

@@ -10,8 +10,10 @@ import numpy as np
 import scipy
 
 from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.description.validation import finite_vector
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 # Postures from which the search for the worst goes on.
@@ -111,6 +113,28 @@ def closure_over_range(finger: Finger, samples: int = 512) -> ClosureRange:
         tendons=finger.routing.tendons,
         joints=finger.routing.joints,
     )
+
+
+def locking_over_range(finger: Finger, samples: int = 64) -> tuple[CriticalFriction, Array]:
+    """Return where over the joints' ranges a finger is closest to locking itself, and the posture, shape (n,), rad.
+
+    All joints move in their worst directions, which are 2^n, at evenly spread postures with force closure; tendons
+    along paths have their arms and turns there. The margin is the critical coefficient over the joints' M^c.
+
+    Args:
+        finger: A finger.
+        samples: Postures, best a power of two.
+
+    Raises:
+        InputError: If no posture has force closure.
+    """
+    found = closure_over_range(finger, samples)
+    taut = found.positions[np.all(found.tension > 0.0, axis=1)]
+    if not len(taut):
+        raise InputError("finger.tendons", str(found))
+    critical = [critical_friction(posed(finger, each), each) for each in taut]
+    worst = int(np.argmin([each.coefficient for each in critical]))
+    return critical[worst], np.asarray(taut[worst])
 
 
 def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:

@@ -65,9 +65,9 @@ class Told:
         """
         if not self._numbers:
             raise InputError("result", "is of steps, and there are none yet: call step")
-        steps = np.array(self._numbers).reshape(-1, 4 + finger.routing.actuated)
+        steps = np.array(self._numbers).reshape(-1, 4 + finger.mechanism.channels)
         knots, joints = np.append(self.start.time, steps[:, 0]), len(finger.routing.joints)
-        tension, force = np.split(steps[:, 1:], [finger.routing.actuated], axis=1)
+        tension, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
         description = finger.description
         table = {
             "name": description.name,

@@ -101,6 +101,15 @@ def test_statics_of_a_posed_finger_are_those_of_its_arms_there():
     assert critical.coefficient == pytest.approx(-upper, rel=1e-6)
 
 
+def test_locking_over_the_range_is_worst_where_an_arm_is_shortest():
+    """Without tendon friction the finger locks at the arm of the pulling tendon, which is least at an end."""
+    free = finger_table(limit=0.3) | {"tendon_friction": {"coulomb": 0.0}}
+    hinge = fp.Finger(fp.FingerDescription.model_validate(free))
+    critical, posture = fp.analysis.locking_over_range(hinge, samples=16)
+    assert abs(posture[0]) == pytest.approx(0.3, abs=1e-3)
+    assert critical.coefficient == pytest.approx(np.abs(hinge.coupling_at(posture)).min(), rel=1e-6)
+
+
 def test_the_controller_holds_tensions_at_the_minimum_and_follows_its_reference():
     moving = scenario({"amplitude": 0.2, "frequency": 1.0}, limit=0.3)
     controller = fp.control.build_controller(moving)

@@ -141,6 +141,20 @@ def test_entries_of_a_tree_are_changed_by_keys(hands, tmp_path):
             read_scenario(table, {f"finger.tree.{wrong}": 1.0})
 
 
+def test_a_hand_is_stepped_as_a_finger_is(hands):
+    hand = hands["routed"][1]
+    sim = fp.Simulator(hand, position=[0.0, 0.3, 0.01])
+    for step in range(20):
+        state = sim.step([2.0, 0.01 * step, 0.5], 1e-3)
+    result = sim.result()
+    np.testing.assert_array_equal(result.joint_position[-1], state.position)
+    np.testing.assert_allclose(result.actuator_input[-1], [0.19, 0.5])
+    assert np.abs(result.energy_residual).max() < 1e-5
+    with pytest.raises(fp.InputError, match="must be 3 numbers"):
+        sim.step([2.0], 1e-3)
+    assert repr(hand) == "<Finger hand: a tree of 3 joints, 4 tendons (1 pulled), 2 actuators>"
+
+
 def test_a_coupled_joint_follows_as_mujoco_s_equality_says():
     chain = LINK.replace("</body>", LINK.replace('"j"', '"k"').replace('"s"', '"z"') + "</body>")
     equality = '<equality><joint joint1="k" joint2="j" polycoef="0.1 0.5 0 0 0"/></equality>'
