@@ -228,7 +228,8 @@ class Finger:
             return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
         if described.tree is not None:
             tree, pulled = described.tree, len(described.tendons)
-            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled), {len(tree.actuators)} actuators"
+            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
+            sizes += f", {len(tree.actuators)} actuators"
             return f"<Finger {described.name}: a tree of {sizes}>"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
         return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"

@@ -101,6 +101,14 @@ def test_statics_of_a_posed_finger_are_those_of_its_arms_there():
     assert critical.coefficient == pytest.approx(-upper, rel=1e-6)
 
 
+def test_a_fingertip_that_no_joint_moves_has_no_forces():
+    table = finger_table()
+    del table["tree"]["tip"]
+    still = fp.analysis.posed(fp.Finger(fp.FingerDescription.model_validate(table)), [0.2])
+    with pytest.raises(fp.InputError, match="no joint moves the fingertip"):
+        fp.analysis.force_polytope(still, [0.2], limit=10.0)
+
+
 def test_locking_over_the_range_is_worst_where_an_arm_is_shortest():
     """Without tendon friction the finger locks at the arm of the pulling tendon, which is least at an end."""
     free = finger_table(limit=0.3) | {"tendon_friction": {"coulomb": 0.0}}
