@@ -32,6 +32,27 @@ Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
+class Solid(Description):
+    """What is seen of a body."""
+
+    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")]
+    radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of all but a box."
+    )
+    length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
+    )
+    sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
+    )
+    position: Annotated[Triple, _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
+    )
+
+
 class Body(Description):
     """A rigid body, placed on another one or on the base."""
 
@@ -47,6 +68,7 @@ class Body(Description):
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
+    solids: dict[Name, Solid] = Field({}, description="What is seen of it, by name.")
 
     @field_validator("orientation")
     @classmethod

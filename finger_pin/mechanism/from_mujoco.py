@@ -136,7 +136,30 @@ class _Reader:
             "mass": float(model.body_mass[i]),
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "solids": self._solids(i),
         }
+
+    def _solids(self, body: int) -> Table:
+        """Return what is seen of a body: its primitives, or boxes around its meshes if it moves and has none."""
+        model, kinds = self.model, self.mujoco.mjtGeom
+        primitives, boxes = {}, {}
+        for i in np.flatnonzero(model.geom_bodyid == body):
+            kind, size = model.geom_type[i], model.geom_size[i]
+            place = {"position": model.geom_pos[i].tolist(), "orientation": _quaternion(model.geom_quat[i])}
+            radius, length = float(size[0]), 2.0 * float(size[1])
+            if kind == kinds.mjGEOM_SPHERE:
+                primitives[self.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+            elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
+                name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
+                primitives[self.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+            elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
+                primitives[self.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+            elif kind == kinds.mjGEOM_MESH:
+                middle, half = np.split(model.geom_aabb[i], 2)
+                place["position"] = (model.geom_pos[i] + rotation(place["orientation"]) @ middle).tolist()
+                boxes[self.geoms[i]] = {"kind": "box", "sides": (2.0 * half).tolist(), **place}
+        # What stands still is only in the way.
+        return primitives or (boxes if model.body_weldid[body] else {})
 
     def _joint(self, i: int) -> Table:
         model, dof = self.model, int(self.model.jnt_dofadr[i])

@@ -57,10 +57,12 @@ class Routes:
     Attributes:
         body: The rigid body.
         routes: By name.
+        placed: Where the bodies of the tree stand, by name.
     """
 
     body: RigidBody
     routes: Mapping[str, Route]
+    placed: Mapping[str | None, Placed]
 
     @classmethod
     def of(cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed]) -> Routes:
@@ -71,7 +73,7 @@ class Routes:
             for joint, coefficient in (tendon.joints or {}).items():
                 coefficients[joints.index(joint)] = coefficient
             routes[name] = Route(coefficients, _legs(tendon.path or {}, placed))
-        return cls(body, routes)
+        return cls(body, routes, placed)
 
     @property
     def fixed(self) -> Array:

@@ -2,6 +2,7 @@
 
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
 from finger_pin.mechanism.geometry.paths import LinkPoses, Pulley, TendonGeometry, TendonPath, Visual, tendon_paths
+from finger_pin.mechanism.geometry.tree import TreeGeometry
 from finger_pin.mechanism.geometry.winding import BASE_LEAD
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "Pulley",
     "TendonGeometry",
     "TendonPath",
+    "TreeGeometry",
     "Visual",
     "tendon_paths",
 ]

@@ -17,7 +17,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry
+from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, link_names, root_command, solid_commands
 
@@ -93,10 +93,14 @@ class Scene:
             InputError: If a joint carries no link.
         """
         for name, joint in description.joints.items():
-            if joint.link is None:
+            if joint.link is None and description.tree is None:
                 allowed = "is missing; the viewer shows fingers whose joints all have links, not those on another model"
                 raise InputError(f"finger.joints.{name}.link", allowed)
-        self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
+        self.geometry: TendonGeometry | TreeGeometry
+        if description.tree is None:
+            self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
+        else:
+            self.geometry = TreeGeometry(description)
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self.strands = (*description.actuated_names, *halves)
         self._widths, size = self.geometry.widths, self.geometry.size
@@ -135,7 +139,7 @@ class Scene:
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation, self.tips(poses), *(path.points for path in paths)]
+        seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
         if shown is not None:
             seen.append(shown.corners)
         if ghost is not None:
@@ -173,7 +177,9 @@ class Scene:
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q)
-        paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
+        none = np.zeros((*q.shape[:-1], 0, 3))
+        drawn = [none, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
+        paths = np.concatenate(drawn, axis=-2)
         return {
             "time": _encode(time, "<f8"),
             "pose": _encode_poses(poses),
