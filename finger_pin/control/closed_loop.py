@@ -199,6 +199,8 @@ class ClosedLoop:
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
         command = self._command(time, control)
+        if self.drives is not None:
+            control = self.drives.planned(time, reference, control)
         return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:

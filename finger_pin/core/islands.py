@@ -58,7 +58,8 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
     first, second = (np.concatenate(side) for side in zip(*links, strict=True))
     total = loop_at + (int(control.loop.max(initial=-1)) + 1 if planned else 0)
     labels = _connected(first, second, total)
-    found = []
+    found: list[Island] = []
+    unread = np.setdiff1d(np.arange(channels), tables.channel)
     for label in dict.fromkeys(labels[:width].tolist()):
         rows = np.flatnonzero(labels[row_at:loop_at] == label)
         fed = tables.channel[rows]
@@ -68,7 +69,8 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
                 coordinates=np.flatnonzero(labels[:width] == label),
                 rows=rows,
                 states=states[states >= 0],
-                channels=np.unique(fed[fed >= 0]),
+                # What nobody reads is the first one's.
+                channels=np.union1d(fed[fed >= 0], unread if not found else []).astype(np.int64),
                 planned=np.flatnonzero(labels[loop_at + control.loop] == label)
                 if planned
                 else np.zeros(0, dtype=np.int64),
@@ -86,7 +88,7 @@ def select(tables: Tables, island: Island) -> Tables:
     body = _renumbered(bodies, size)
     row, channel = (
         _renumbered(rows, len(tables.state)),
-        _renumbered(island.channels, int(tables.channel.max(initial=0)) + 1),
+        _renumbered(island.channels, int(max(tables.channel.max(initial=0), island.channels.max(initial=0))) + 1),
     )
     charts = np.isin(tables.charts, bodies)
     counts = [np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups]

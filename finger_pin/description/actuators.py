@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from finger_pin.description.validation import Description, Name, Numbers, choice, problem, quantity, real, reals, vector
+from finger_pin.description.validation import (
+    Description,
+    Name,
+    Numbers,
+    choice,
+    expand,
+    problem,
+    quantity,
+    real,
+    reals,
+    vector,
+)
 
 
 class DataSheet(Description):
@@ -203,3 +216,31 @@ def check_actuators(actuators: dict[str, Actuator], actuated: tuple[str, ...], p
             if tendon in owner:
                 raise problem(entry, f"{tendon} has two sources: {owner[tendon]} pulls it already; leave one out")
             owner[tendon] = name
+
+
+def check_sources(actuators: dict[str, Actuator], tensions: Iterable[str]) -> None:
+    """Raise the error of a tendon that is given tensions while a motor holds its spool."""
+    for tendon in tensions:
+        for name, actuator in actuators.items():
+            if tendon in actuator.tendons and actuator.drive == "position":
+                allowed = f"has two sources: finger.actuators.{name} holds the angle of its spool; leave one out"
+                raise problem(f"controller.tensions.{tendon}", allowed)
+
+
+def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) -> None:
+    """Raise the error of a motor that cannot exert what keeps its tendons taut at rest, N by tendon."""
+    for name, actuator in actuators.items():
+        motor, count = actuator.motor, len(actuator.tendons)
+        radii = expand(actuator.spool_radius, count) * np.array([1.0, -1.0])[:count]
+        # Two tendons on a spool have the tension that they are built with.
+        taut = [tension[actuator.tendons[0]]] if count == 1 else expand(actuator.pretension, count)
+        constant, resistance, _ = motor.constants
+        needed = abs(float(radii @ taut)) / constant
+        if needed > min(motor.maximum_current, motor.voltage / resistance):
+            what = ", ".join(f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True))
+            if needed > motor.maximum_current:
+                entry, limit, unit = "maximum_current", motor.maximum_current, "A"
+            else:
+                entry, limit, needed, unit = "voltage", motor.voltage, needed * resistance, "V"
+            allowed = f"pretension alone needs {needed:.3g} {unit}: {what} at rest"
+            raise problem(f"finger.actuators.{name}.motor.{entry}", allowed, limit)

@@ -18,6 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.actuators import check_currents, check_sources
 from finger_pin.description.by_finger import flat, flat_numbers, given, nested, of_finger
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
@@ -239,6 +240,11 @@ class Scenario(Description):
         routed = any(tendon.along for tendon in self.finger.tendons.values())
         if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
+        check_sources(self.finger.actuators, self.controller.tensions or {})
+        rest = expand(self.controller.minimum_tension, len(routing.tendons))
+        if self.controller.kind == "proportional" and closure.holds:
+            rest = closure.tension * np.max(rest / closure.tension)
+        check_currents(self.finger.actuators, dict(zip(routing.tendons, rest, strict=True)))
         for name in self.reference.joints:
             if routing.joints.index(name) in followers:
                 raise problem(f"reference.joints.{name}", "follows from the passive tendon (20); leave it out")

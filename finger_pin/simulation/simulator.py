@@ -78,12 +78,13 @@ class Simulator:
         self._stepper = Stepper(
             mechanism,
             held_control(mechanism.channels, mechanism.coordinates),
-            finger.rest_state(_vector("position", start, len(finger.routing.joints))),
+            finger.rest_state(_numbers("position", start, (len(finger.routing.joints),))),
             TABLEAUS[method](),
             rtol,
             atol_scale * finger.layout.scales(),
         )
-        self._force = np.zeros(3)
+        tips = len(mechanism.body.tips)
+        self._force = np.zeros(3 if tips == 1 else (tips, 3))
         self._told = Told(self._stepper.copy())
         self._settings = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
 
@@ -102,7 +103,7 @@ class Simulator:
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
-        self._stepper.restart(_vector("x", value, self.finger.layout.size))
+        self._stepper.restart(_numbers("x", value, (self.finger.layout.size,)))
         self._told = Told(self._stepper.copy())
 
     @property
@@ -117,20 +118,21 @@ class Simulator:
             tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon. Inputs of a
                 tree's actuators follow.
             dt: s.
-            fingertip_force: F over the step, shape (3,), N, base frame; none by default.
+            fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
         Raises:
             InputError: If an argument is not finite or has the wrong size, or a tension is negative; nothing has moved
                 then.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        command = _vector("tension", tension, self._tension.size)
+        command = _numbers("tension", tension, self._tension.shape)
         tensions = np.delete(command[: self.finger.routing.actuated], self.finger.actuators.voltages)
         if np.any(tensions < 0.0):
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
-        force = np.zeros(3) if fingertip_force is None else _vector("fingertip_force", fingertip_force, 3)
+        shape = self._force.shape
+        force = np.zeros(shape) if fingertip_force is None else _numbers("fingertip_force", fingertip_force, shape)
         stepper = self._stepper
         if np.any(force != self._force):
             stepper.load(force)
@@ -173,13 +175,14 @@ class Simulator:
         return twin
 
 
-def _vector(name: str, value: ArrayLike, size: int) -> Array:
+def _numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    wanted = f"must be {' times '.join(map(str, shape))} numbers"
     try:
-        vector = np.array(value, dtype=float)
+        numbers = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(name, f"must be {size} numbers", value) from None
-    if vector.shape != (size,):
-        raise InputError(name, f"must be {size} numbers, not an array of shape {vector.shape}")
-    if not np.isfinite(vector).all():
-        raise InputError(name, "must be finite", vector.tolist())
-    return vector
+        raise InputError(name, wanted, value) from None
+    if numbers.shape != shape:
+        raise InputError(name, f"{wanted}, not an array of shape {numbers.shape}")
+    if not np.isfinite(numbers).all():
+        raise InputError(name, "must be finite", numbers.tolist())
+    return numbers

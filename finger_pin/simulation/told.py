@@ -42,8 +42,8 @@ class Told:
         self._numbers = array("d")
 
     def add(self, end: float, tension: Array, force: Array) -> None:
-        """Keep a step: when it ended, s, and what was held during it, shapes (a,) and (3,), N."""
-        self._numbers.extend((end, *tension, *force))
+        """Keep a step: when it ended, s, and what was held during it, N: shapes (a,), and (3,) or (f, 3)."""
+        self._numbers.extend((end, *tension, *force.ravel()))
 
     def copy(self) -> Told:
         """Return the same steps, to go on from independently."""
@@ -65,7 +65,8 @@ class Told:
         """
         if not self._numbers:
             raise InputError("result", "is of steps, and there are none yet: call step")
-        steps = np.array(self._numbers).reshape(-1, 4 + finger.mechanism.channels)
+        tips = finger.mechanism.body.tips
+        steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
         knots, joints = np.append(self.start.time, steps[:, 0]), len(finger.routing.joints)
         tension, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
         description = finger.description
@@ -85,6 +86,7 @@ class Told:
         loop = replace(
             ClosedLoop.from_scenario(scenario, reference=reference, finger=finger),
             controller=OpenLoopTensions(Signal.held(knots, tension), finger.routing),
+            fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
             varying_force=Signal.held(knots, force),
             dynamics=CompiledFinger(finger),
         )
@@ -123,6 +125,6 @@ class _Repeated:
     def act(self, x: Array) -> Array:
         """Begin a step: load it with its force, and return its tensions, shape (a,)."""
         step, self._step = self._step, self._step + 1
-        self._stepper.load(self._force[step])
+        self._stepper.load(self._force[step].reshape(-1, 3))
         tension: Array = self._tension[step]
         return tension

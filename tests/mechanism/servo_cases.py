@@ -19,6 +19,8 @@ def finger(motor, *, link=LINK, opposed=False, gravity=0.0, canal=0.0, **actuato
     """A finger with one joint; ``opposed`` adds a second tendon, on the same spool, that turns the joint back."""
     radii = {"flexor": RADIUS, "extensor": -RADIUS} if opposed else {"flexor": RADIUS}
     tendons = {name: {"curvature_offset": 1.0, "crossings": {"knuckle": {"radius": r}}} for name, r in radii.items()}
+    if isinstance(motor, str):
+        motor = motor_of(motor)
     return fp.Finger(
         fp.FingerDescription.model_validate(
             {

@@ -105,3 +105,17 @@ def test_a_wrong_sample_rate_is_named(finger: fp.Finger) -> None:
     with pytest.raises(fp.InputError) as caught:
         pushed(fp.Simulator(finger, START), 1, seed=6).result(sample_rate=-1.0)
     assert caught.value.entry == "simulation.sample_rate"
+
+
+def test_the_fingers_of_a_hand_have_forces_of_their_own_in_its_result() -> None:
+    scenario = fp.load_scenario("hand")
+    simulator = fp.Simulator(fp.Finger(scenario.finger))
+    force = np.arange(15.0).reshape(5, 3) / 30.0
+    for step in range(3):
+        simulator.step(np.full(20, 2.0), 1e-3, step * force)
+    result = simulator.result()
+    assert result.fingertip_force.dims == ("time", "finger", "axis")
+    np.testing.assert_allclose(result.fingertip_force[1], force, rtol=1e-15)
+    np.testing.assert_array_equal(result.joint_position[-1], simulator.state.position)
+    with pytest.raises(fp.InputError, match="5 times 3 numbers"):
+        simulator.step(np.full(20, 2.0), 1e-3, force[0])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
 from finger_pin.views.plots.lines import shade, trace
 from finger_pin.views.plots.panels import labelled, logarithmic, stack, title
 from finger_pin.views.plots.style import (
@@ -24,6 +25,9 @@ from finger_pin.views.plots.style import (
     power_of_ten,
     styled,
 )
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
 
 _STORED = {
     "kinetic": "kinetic",
