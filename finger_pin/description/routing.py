@@ -118,7 +118,9 @@ class Routing:
         It does not hold where a tendon runs along a path through space: its arms depend on the posture.
         """
         if not np.any(self.coupling, axis=1).all():
-            return ForceClosure(np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons)
+            return ForceClosure(
+                np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons, posed=False
+            )
         found = [
             ForceClosure.of(self.coupling[np.ix_(own, joints)], tuple(self.tendons[index] for index in own))
             for joints, own in self.fingers
@@ -157,11 +159,13 @@ class ForceClosure:
         tension: f^k, shape (t,): internal tensions with the largest entry 1 and the smallest as large as possible;
             zero where there are none.
         tendons: Names of the tendons.
+        posed: Whether arms are known; those of paths through space depend on the posture.
     """
 
     null_space: Array
     tension: Array
     tendons: tuple[str, ...]
+    posed: bool = True
 
     @classmethod
     def of(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
@@ -189,6 +193,8 @@ class ForceClosure:
         if self.holds:
             listed = ", ".join(f"{n} {f:.3g}" for n, f in zip(self.tendons, self.tension, strict=True))
             return f"force closure: internal tensions in the ratio {listed}"
+        if not self.posed:
+            return "force closure depends on the posture (fp.analysis.posed, fp.analysis.closure_over_range)"
         if self.null_space.shape[1] == 0:
             return "no force closure: no tensions balance each other at zero torque (too few tendons)"
         balance = self.tension

@@ -42,7 +42,8 @@ def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
         name: Of the hand.
 
     Raises:
-        InputError: If MuJoCo refuses the file, the model has no tendons, or it has muscles or ball joints.
+        InputError: If it is neither, MuJoCo refuses the file, the model has no tendons, or it has muscles or ball
+            joints.
     """
     try:
         import mujoco
@@ -53,6 +54,8 @@ def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
             model = mujoco.MjModel.from_xml_path(str(model))
         except ValueError as error:
             raise InputError(f"model {model}", " ".join(str(error).split())) from None
+    if not isinstance(model, mujoco.MjModel):
+        raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
     return validate(FingerDescription, _Reader(mujoco, model).table(name), ("finger",))
 
 

@@ -101,6 +101,11 @@ def test_statics_of_a_posed_finger_are_those_of_its_arms_there():
     assert critical.coefficient == pytest.approx(-upper, rel=1e-6)
 
 
+def test_what_needs_a_posture_says_so():
+    with pytest.raises(fp.InputError, match=r"depends on the posture \(fp\.analysis\.posed"):
+        fp.analysis.critical_friction(finger())
+
+
 def test_a_fingertip_that_no_joint_moves_has_no_forces():
     table = finger_table()
     del table["tree"]["tip"]

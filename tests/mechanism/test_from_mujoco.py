@@ -204,6 +204,8 @@ def test_a_file_that_mujoco_refuses_is_refused_in_its_words_on_one_line(tmp_path
     with pytest.raises(fp.InputError, match="unknown transmission target 'j9'") as refused:
         fp.from_mujoco(tmp_path / "hand.xml")
     assert "\n" not in str(refused.value)
+    with pytest.raises(fp.InputError, match=r"must be a mujoco\.MjModel"):
+        fp.from_mujoco(7)
     with pytest.raises(fp.InputError, match="no_such"):
         fp.from_mujoco(tmp_path / "no_such.xml")
 
