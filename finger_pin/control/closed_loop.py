@@ -19,6 +19,7 @@ from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
@@ -252,9 +253,8 @@ def _controller(given: Controller | Samples | None, scenario: Scenario, finger: 
         return build_controller(scenario, finger)
     if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    if isinstance(
-        given, ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
-    ):
+    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
+    if isinstance(given, own | RoutedController):
         return given
     kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
     return kind(given, finger.routing, scenario.simulation.start_time)

@@ -241,7 +241,8 @@ class Scenario(Description):
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
-        if self.controller.kind == "proportional" and not closure.holds:
+        routed = any(tendon.along for tendon in self.finger.tendons.values())
+        if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
         check_sources(self.finger.actuators, self.controller.tensions or {})
         rest = expand(self.controller.minimum_tension, len(routing.tendons))

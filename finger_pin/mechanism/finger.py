@@ -27,7 +27,7 @@ from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import build_tree, tree_rows
+from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -210,10 +210,13 @@ class Finger:
             ringing,
             self.actuators.names,
         )
+        pulling = self.tendons.rows(self.actuators)
+        if self.paths:
+            pulling = [along_paths(description, self.paths, table) for table in pulling]
         self.mechanism = Mechanism(
             self.rigid_body,
             [
-                *self.tendons.rows(self.actuators),
+                *pulling,
                 self.joint_friction.rows(joints, self.actuators.pulled, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
@@ -238,6 +241,11 @@ class Finger:
         if described.hand is not None:
             sizes = f"{len(described.joints)} joints, {len(described.tendons)} tendons"
             return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
+        if described.tree is not None:
+            tree, pulled = described.tree, len(described.tendons)
+            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
+            sizes += f", {len(tree.actuators)} actuators"
+            return f"<Finger {described.name}: a tree of {sizes}>"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
         return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
 
@@ -351,11 +359,12 @@ class Finger:
         """Return an evaluation of the mechanism by the names of the paper."""
         joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
-        delivered, torque, motors = driven.force, driven.force @ driven.rows.arm + halves.force @ halves.rows.arm, None
+        delivered, motors = driven.force, None
+        torque = self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
         if self.actuators.names:
             elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
             delivered = delivered + elastic.force @ self.actuators.pulled.T
-            torque = torque + elastic.force @ elastic.rows.arm
+            torque = torque + (elastic.force @ elastic.rows.arm)[..., :joints]
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
@@ -386,13 +395,32 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=torque[..., :joints],
+            tendon_torque=torque,
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             mechanism=found,
             motors=motors,
         )
+
+    def coupling_at(self, position: Array) -> Array:
+        """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
+        position = np.asarray(position, dtype=float)
+        coupling = np.broadcast_to(self.routing.coupling, (*position.shape[:-1], *self.routing.coupling.shape)).copy()
+        along = [tendon.along for tendon in self.description.tendons.values()]
+        routed = [k for k, name in enumerate(along) if name is not None]
+        if self.paths is not None and routed:
+            places = [list(self.paths.routes).index(str(along[k])) for k in routed]
+            coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
+        return coupling
+
+    def _driven_torque(self, x: Array, driven: RowSignals) -> Array:
+        """Return what the driven tendons exert, shape (..., n), N m."""
+        joints, actuated = len(self.routing.joints), self.routing.actuated
+        if not driven.rows.routed:
+            return (driven.force @ driven.rows.arm)[..., :joints]
+        coupling = self.coupling_at(x[..., :joints])[..., :actuated, :]
+        return np.asarray((driven.force[..., None, :] @ coupling)[..., 0, :])
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

@@ -130,7 +130,7 @@ class Motion:
     @property
     def largest(self) -> float:
         """Largest tension of all, N."""
-        return float(self.tension.max())
+        return float(self.tension.max(initial=0.0))
 
     def ghost(self, time: Array) -> Ghost:
         """Return it as seen beside another motion, with frames at other times, shape (m,), s; it ends where it ends."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.geometry import TendonGeometry
+from finger_pin.mechanism.geometry import TendonGeometry, TreeGeometry
 
 ROOT = "/finger_pin"
 Command = dict[str, Any]
@@ -23,13 +23,16 @@ GROOVE_COLOUR = (0.55, 0.62, 0.72)
 Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-def link_names(geometry: TendonGeometry) -> list[str]:
+def link_names(geometry: TendonGeometry | TreeGeometry) -> list[str]:
     """Return the names under which the base and the links stand in the scene."""
     return ["base", *(f"{name}_link" for name in geometry.description.joints)]
 
 
 def solid_commands(
-    geometry: TendonGeometry, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
+    geometry: TendonGeometry | TreeGeometry,
+    tube_radius: float,
+    root: str = ROOT,
+    colour: tuple[float, ...] | None = None,
 ) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
