@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
-from finger_pin.views.plots.panels import labelled, legend, stack, title
+from finger_pin.views.plots.panels import flatten_rounding, labelled, legend, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def _joints(figure: Figure, result: xr.Dataset) -> None:
         trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=1.0)
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
+        flatten_rounding(axes)
     title(panels[0], "(b) joint torque before and after joint friction")
     legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=4)
 
