@@ -162,9 +162,11 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
-        tension = None
-        if self.finger.actuators.names and isinstance(self.controller, _ANSWERS_ALIKE):
-            planned = self.controller.command(0.0, self.reference.at(0.0), position, velocity)
+        controller, tension = self.controller, None
+        if isinstance(controller, PassiveTensionLoop):
+            controller = controller.controller
+        if self.finger.actuators.names and isinstance(controller, _ANSWERS_ALIKE):
+            planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
 
