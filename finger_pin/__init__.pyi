@@ -21,6 +21,8 @@ from .exceptions import MicroDampingWarning as MicroDampingWarning
 from .exceptions import ScenarioWarning as ScenarioWarning
 from .exceptions import SelfLockingWarning as SelfLockingWarning
 from .mechanism.finger import Finger as Finger
+from .mechanism.finger import Hand as Hand
+from .mechanism.from_mujoco import from_mujoco as from_mujoco
 from .mechanism.mjcf import to_mjcf as to_mjcf
 from .simulation.convergence import check_convergence as check_convergence
 from .simulation.recording import load_result as load_result

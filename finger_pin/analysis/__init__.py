@@ -16,6 +16,7 @@ from finger_pin.analysis.locking_margin import (
 from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.reaction import JointReactions, ReactionDifference, fingertip_loads, joint_reactions
+from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
 from finger_pin.analysis.tip_statics import Friction
 
@@ -32,6 +33,7 @@ __all__ = [
     "critical_friction",
     "fingertip_loads",
     "force_polytope",
+    "gear_shares",
     "joint_reactions",
     "largest_force",
     "locking_advice",
@@ -39,5 +41,6 @@ __all__ = [
     "self_locking_map",
     "self_locking_margin",
     "tension_for_force",
+    "tension_limits",
     "warn_of_self_locking",
 ]

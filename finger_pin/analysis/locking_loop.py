@@ -64,6 +64,7 @@ class FrictionLoop:
         inverse: P, shape (t, n), 1/m.
         internal: k, shape (t,).
         tendons: The tendon layer.
+        gears: Share of a command that gears leave while its tendon is drawn in, and while it is let out, shape (2, a).
     """
 
     command: Array
@@ -72,14 +73,16 @@ class FrictionLoop:
     inverse: Array
     internal: Array
     tendons: Tendons
+    gears: Array
 
     @classmethod
-    def of(cls, tendons: Tendons, gain: Array | None) -> FrictionLoop:
+    def of(cls, tendons: Tendons, gain: Array | None, gears: Array | None = None) -> FrictionLoop:
         """Build the loop.
 
         Args:
             tendons: The tendon layer of a finger with force closure.
             gain: K_P, shape (n,), N m/rad, for passive tendons that are elastic; None for passive tendons as planned.
+            gears: As in `gear_shares`; ideal sources by default.
 
         Raises:
             InputError: If there is no force closure.
@@ -96,7 +99,8 @@ class FrictionLoop:
         else:
             elastic = 0.5 * tendons.half_stiffness[:, None] * routing.coupling[routing.actuated :] / gain
             passive = np.broadcast_to(elastic, (len(levels), *elastic.shape))
-        return cls(command, levels, passive, inverse, closure.tension, tendons)
+        shares = np.ones((2, routing.actuated)) if gears is None else gears
+        return cls(command, levels, passive, inverse, closure.tension, tendons, shares)
 
     def critical(self, position: Array, weights: Array, sliding: Array) -> tuple[Array, Array, Array]:
         """Return kappa_crit and its eigenvectors for m cases at once.
@@ -220,5 +224,7 @@ class FrictionLoop:
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
         friction = sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position))
         share = (1.0 - friction[:, :actuated]) / (1.0 + friction[:, :actuated])
+        drawn = sliding[:, :actuated]
+        share = share * np.where(drawn > 0.0, self.gears[0], np.where(drawn < 0.0, self.gears[1], 1.0))
         pairs = np.stack([1.0 + friction[:, actuated:], 1.0 - friction[:, actuated:]], axis=-1)
         return np.concatenate([share, pairs.reshape(len(position), -1)], axis=1)

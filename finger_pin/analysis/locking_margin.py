@@ -6,21 +6,27 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import sliding_velocity
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import SelfLockingWarning
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 
 #: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
 CLOSE_TO_LOCKING = 1.2
 # What a simulation spends on its warning: combinations of directions times cases of slack passive tendons.
 _CASES = 48
+# Of the search for the friction that motors cannot overcome: up to what share of the critical one, up to how many times
+# what there is, and in how many steps.
+_NEARLY, _MOST, _HALVINGS = 0.95, 1e3, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +47,9 @@ class SelfLockingMargin(Finding):
     directions: Array
 
 
-def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None = None) -> SelfLockingMargin:
+def self_locking_margin(
+    scenario: Scenario, samples: int = 500, most: int | None = None, servos: bool = False
+) -> SelfLockingMargin:
     """Return how far a scenario stays from self-locking on its reference.
 
     The stiction coefficients M^c are scaled in proportion, joints and tendons move as the reference does, tendons rub
@@ -54,12 +62,17 @@ def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None
         samples: Instants of the reference; directions that last for less than their distance may be missed.
         most: Greatest number of combinations to look at, those that seem closest to locking; all by default. A finger
             of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
+        servos: Whether gears and the limits of motors count: then the finger is also locked from where the tensions
+            that would move it slowly, with passive tendons as planned, are more than a motor can pull.
 
     Of a hand it is that of the finger that is closest, with the position and the directions of its own joints.
     """
     parts = scenario.parts()
     if len(parts) > 1:
-        return min((self_locking_margin(part, samples, most) for part in parts.values()), key=lambda each: each.margin)
+        return min(
+            (self_locking_margin(part, samples, most, servos=servos) for part in parts.values()),
+            key=lambda each: each.margin,
+        )
     scenario = next(iter(parts.values()))
     tendons = Tendons.from_description(scenario.finger)
     routing = tendons.routing
@@ -79,14 +92,51 @@ def self_locking_margin(scenario: Scenario, samples: int = 500, most: int | None
     weights = signs * expand(scenario.finger.joint_friction.stiction, size)
     gain = expand(scenario.controller.gain, size)
     # Without gain there is no lag that would say what passive tendons carry: they count as planned.
-    loop = FrictionLoop.of(tendons, gain if np.all(gain > 0.0) else None)
+    gears = gear_shares(scenario.finger) if servos else np.ones((2, routing.actuated))
+    loop = FrictionLoop.of(tendons, gain if np.all(gain > 0.0) else None, np.where(np.isfinite(gears), gears, 1.0))
     if most is not None and len(chosen) > most:
         worst_first = np.argsort(-loop.growth(motion.position[chosen], weights, sliding), kind="stable")[:most]
         chosen, signs, sliding, weights = (each[worst_first] for each in (chosen, signs, sliding, weights))
     kappa = loop.critical(motion.position[chosen], weights, sliding)[0]
+    if servos:
+        kappa = _within_reach(scenario, loop, motion.position[chosen], weights, sliding, kappa)
+        # Gears that no load turns let no tendon out, whatever joints do.
+        stuck = (sliding[:, : routing.actuated] < 0.0) & np.isinf(gears[1])
+        kappa = np.where(stuck.any(axis=1), 0.0, kappa)
     worst = int(np.argmin(kappa))
     where = chosen[worst]
     return SelfLockingMargin(float(kappa[worst]), float(times[where]), motion.position[where], signs[worst])
+
+
+def _within_reach(
+    scenario: Scenario, loop: FrictionLoop, position: Array, weights: Array, sliding: Array, critical: Array
+) -> Array:
+    """Return the scale of joint friction, shape (m,), up to which motors can pull what moves the finger slowly.
+
+    Where that is close to the critical scale, it is the critical one.
+    """
+    finger = Finger(scenario.finger)
+    limits, actuated = np.array(tension_limits(finger)), finger.routing.actuated
+    minimum = expand(scenario.controller.minimum_tension, len(finger.routing.tendons))
+    weight = np.array([finger.static_torque(each) for each in position])
+
+    def fits(scale: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
+        case = scale[:, None] * weights[at]
+        needed = loop.command_to_move(position[at], case, sliding[at], minimum, weight[at])[:, :actuated]
+        # What gears take is in the limit, and in the share of what is let out.
+        return np.asarray(np.all(needed * loop.gears[0] <= limits, axis=1), dtype=bool)
+
+    # Close to critical, tensions grow without bound and take long to find.
+    most = _NEARLY * np.minimum(critical, _MOST)
+    short = np.flatnonzero(~fits(most, np.arange(len(position))))
+    low, high = np.zeros(len(short)), most[short]
+    for _ in range(_HALVINGS if len(short) else 0):
+        middle = 0.5 * (low + high)
+        inside = fits(middle, short)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    reached = critical.copy()
+    reached[short] = low
+    return reached
 
 
 def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:

@@ -17,7 +17,9 @@ def force_capability(
         str | None,
         typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range."),
     ] = None,
-    limit: Annotated[str, typer.Option(metavar="N", help="Greatest tension.")] = "20",
+    limit: Annotated[
+        str, typer.Option(metavar="N|servos", help="Greatest tension, or what the finger's motors can pull.")
+    ] = "20",
     force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tensions are printed, N.")] = "0,0,1",
     output: Output = Path("results/force_capability"),
     view: Annotated[bool, typer.Option("--view", help="Show the forces at the fingertip in the viewer.")] = False,
@@ -25,16 +27,21 @@ def force_capability(
     """Report and draw the forces that a fingertip can exert at a posture, and the tension that one force needs."""
     talks(quiet=False)
     degrees = None if posture is None else numbers("--posture", posture)
-    most, wish = number("--limit", limit, positive=True), numbers("--force", force)
+    wish = numbers("--force", force)
+    most: float | tuple[float, ...] = () if limit == "servos" else number("--limit", limit, positive=True)
     import numpy as np
 
     import finger_pin as fp
-    from finger_pin.analysis import Friction, force_polytope, tension_for_force
+    from finger_pin.analysis import Friction, force_polytope, tension_for_force, tension_limits
     from finger_pin.description.validation import finite_vector
     from finger_pin.views.plots import plot_force_polytope, plot_radius_sensitivity, save_figure
 
     finite_vector("--force", wish, 3)
     built = fp.Finger(fp.load_finger(finger))
+    if limit == "servos":
+        most = tension_limits(built)
+        if not np.isfinite(most).all():
+            raise fp.InputError("--limit", "every tendon needs an actuator, or give a number", limit)
     limiter, joints = built.stroke_limiter, built.routing.joints
     angles = limiter.lower + (limiter.upper - limiter.lower) / 3.0 if degrees is None else np.deg2rad(degrees)
     if len(angles) != len(joints):
@@ -50,6 +57,9 @@ def force_capability(
         save_figure(figure, output / f"{name}.png")
     lines = [f"Largest tension for a force of {np.linalg.norm(wish):g} N, N"]
     lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
+    if limit == "servos":
+        pulled = zip(built.routing.tendons, tension_limits(built), strict=False)
+        lines += ["Greatest tension that motors can pull, N", *(f"  {name:19} {each:8.3f}" for name, each in pulled)]
     print_text("\n".join([*lines, f"Figures are in {output}"]))
     if view:
         from finger_pin.views.viewer import view_forces

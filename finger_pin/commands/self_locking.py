@@ -33,6 +33,11 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
     lines.append(
         f"On its reference, {loaded.name} stays a factor {margin.margin:.3g} below, least at {margin.time:.3g} s"
     )
+    if finger.actuators:
+        pulled = self_locking_margin(loaded, servos=True)
+        lines.append(
+            f"With its gears and what its motors can pull, a factor {pulled.margin:.3g}, at {pulled.time:.3g} s"
+        )
     figures = {
         "critical_friction": plot_critical_friction(finger),
         "map": plot_self_locking_map(self_locking_map(fp.Finger(finger))),

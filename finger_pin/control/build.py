@@ -11,15 +11,18 @@ import numpy as np
 from finger_pin.analysis import critical_friction
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Distribution, PseudoInverse
+from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.hand import joined_controller
 from finger_pin.control.joint_compensation import JointCompensation
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import Controller, ProportionalController
+from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
@@ -64,6 +67,7 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
         minimum=expand(settings.minimum_tension, tendons),
         tendons=_feedforward(scenario, finger),
         joints=_joint_compensation(scenario, finger),
+        fingertip=_fingertip(scenario, finger),
     )
     loop = settings.passive_tension_loop
     if loop is None:
@@ -121,6 +125,14 @@ def _joint_compensation(scenario: Scenario, finger: Finger) -> JointCompensation
             "raise it by as much (self-locking): lower share, coulomb or stiction",
         )
     return JointCompensation(believed, settings.share, settings.reversal_speed)
+
+
+def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
+    signals = scenario.controller.fingertip_force
+    if not signals:
+        return None
+    wanted = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES])
+    return FingertipForce(wanted.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
 
 
 def _belief(given: Numbers | None, actual: Array) -> Array:

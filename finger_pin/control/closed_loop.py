@@ -16,13 +16,14 @@ from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
+from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
-from finger_pin.description.scenario import AXES, Scenario
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
@@ -30,6 +31,9 @@ from finger_pin.mechanism.state import State
 
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
+
+# Controllers that remember nothing: asked for the start beforehand, they answer alike later.
+_ANSWERS_ALIKE = (ProportionalController, CompensatedController, OpenLoopTensions)
 
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
@@ -73,6 +77,7 @@ class ClosedLoop:
         dynamics: What evaluates the finger.
         varying_force: What varies of F, three signals for each finger, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
+        drives: Of motors in position drive; None without any.
         parts: Of a hand whose controller and reference are the scenario's, the loops of its fingers, each alone on the
             palm; otherwise none.
         palm: Along which path the palm of a hand moves; None at rest.
@@ -85,6 +90,7 @@ class ClosedLoop:
     dynamics: Dynamics
     varying_force: Signal | None = None
     start: Array | None = None
+    drives: PositionDrives | None = None
     parts: tuple[ClosedLoop, ...] = ()
     palm: PalmPath | None = None
 
@@ -149,8 +155,16 @@ class ClosedLoop:
             position = loop.reference.at(0.0).position
             moved = [initial.position.get(name, own) for name, own in zip(joints, position, strict=True)]
             velocity = [initial.velocity.get(name, 0.0) for name in joints]
-            loop = replace(loop, start=finger.rest_state(np.array(moved), np.array(velocity)))
+            loop = replace(loop, start=loop.rest_state(np.array(moved), np.array(velocity)))
         return loop
+
+    def rest_state(self, position: Array, velocity: Array) -> Array:
+        """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
+        tension = None
+        if self.finger.actuators.names and isinstance(self.controller, _ANSWERS_ALIKE):
+            planned = self.controller.command(0.0, self.reference.at(0.0), position, velocity)
+            tension = planned.tension[: self.finger.routing.actuated]
+        return self.finger.rest_state(position, velocity, tension)
 
     def compiled(self) -> ClosedLoop:
         """Return the same loop, whose finger is evaluated by the compiled core."""
@@ -159,7 +173,10 @@ class ClosedLoop:
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""
-        return self.finger.rest_state(self.reference.at(0.0).position) if self.start is None else self.start.copy()
+        if self.start is not None:
+            return self.start.copy()
+        position = self.reference.at(0.0).position
+        return self.rest_state(position, np.zeros_like(position))
 
     def force(self, time: Array | float) -> Array:
         """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame.
@@ -175,6 +192,8 @@ class ClosedLoop:
         """Return the times at which a signal may have a kink or a jump, s, in order."""
         owners = (self.reference, self.controller)
         signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
+        if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
+            signals.append(self.controller.fingertip.wanted)
         signals += [each for each in (self.varying_force, self.palm and self.palm.signal) if each]
         found = [each.knots for each in signals if not each.is_harmonic]
         return np.unique(np.concatenate([np.zeros(0), *found]))
@@ -188,7 +207,9 @@ class ClosedLoop:
         state = self.finger.layout.unpack(x)
         reference = self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        command = control.tension[..., : self.finger.routing.actuated]
+        command = self._command(time, control)
+        if self.drives is not None:
+            control = self.drives.planned(time, reference, control)
         finger = self.dynamics.evaluate(x, command, self.force(time), self.base(time))
         return LoopSignals(reference, control, finger)
 
@@ -203,12 +224,19 @@ class ClosedLoop:
             return found
         return self.palm.to_world(time, found, self.finger.rigid_body.mass)
 
+    def _command(self, time: Array | float, control: ControlSignals) -> Array:
+        """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
+        command = control.tension[..., : self.finger.routing.actuated]
+        if self.drives is not None:
+            command = command.copy()
+            command[..., self.drives.channels] = self.drives.voltages(time)
+        return command if control.inputs is None else np.concatenate([command, control.inputs], axis=-1)
+
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
         state, reference = self.finger.layout.unpack(x), self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        command = control.tension[..., : self.finger.routing.actuated]
-        rows, external = self.dynamics.powers(x, command, self.force(time), self.base(time))
+        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time), self.base(time))
         joints = state.velocity.shape[-1]
         fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)

@@ -11,17 +11,24 @@ from finger_pin.control.reference import SignalReference
 from finger_pin.control.signal import Signal
 from finger_pin.core import inputs
 from finger_pin.core.inputs import Control, held_control, planned_control, scheduled_control
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import Finger
 
 
 def compiled_control(loop: ClosedLoop) -> Control | None:
     """Return a loop's controller, reference and varying force as arrays, or None where the first two are Python."""
     controller, reference, mechanism = loop.controller, loop.reference, loop.finger.mechanism
     control = None
-    if isinstance(controller, OpenLoopTensions):
-        control = scheduled_control(_arrays(controller.signal), mechanism.coordinates)
+    if len(loop.finger.actuators.positioned) == loop.finger.routing.actuated:
+        # Nothing of what the controller plans goes to the finger at once.
+        control = held_control(mechanism.channels, mechanism.coordinates)
+    elif isinstance(controller, OpenLoopTensions):
+        schedule = _arrays(controller.signal)
+        schedule.harmonics[loop.finger.actuators.positioned] = 0.0
+        schedule.coefficients[..., loop.finger.actuators.positioned] = 0.0
+        control = scheduled_control(schedule, mechanism.coordinates)
     elif isinstance(controller, ProportionalController) and isinstance(reference, SignalReference):
-        control = paper_control(controller, reference, loop.finger.routing)
+        control = paper_control(controller, reference, loop.finger)
     return None if control is None else with_force(control, loop)
 
 
@@ -31,24 +38,31 @@ def sampled_control(loop: ClosedLoop) -> Control:
     return with_force(held_control(mechanism.channels, mechanism.coordinates), loop)
 
 
-def paper_control(controller: ProportionalController, reference: SignalReference, routing: Routing) -> Control:
-    """Return controller and reference as inputs of a finger's mechanism, whose coordinates are (theta, p)."""
+def paper_control(controller: ProportionalController, reference: SignalReference, finger: Finger) -> Control:
+    """Return controller and reference as inputs of a finger's mechanism, whose coordinates begin with the joints.
+
+    What it plans for tendons that motors in position drive pull is no input.
+    """
+    routing, mechanism = finger.routing, finger.mechanism
     tendons = np.arange(len(routing.tendons))
+    further = mechanism.coordinates - len(routing.joints)
+    positioned = np.isin(tendons, finger.actuators.positioned)
 
     def padded(values: Array) -> Array:
-        return np.concatenate([values, np.zeros((*values.shape[:-1], routing.passive))], axis=-1)
+        return np.concatenate([values, np.zeros((*values.shape[:-1], further))], axis=-1)
 
     matrix = reference.coupling.matrix
     return planned_control(
-        routing.actuated,
+        mechanism.channels,
         gain=padded(controller.gain),
         minimum=controller.minimum,
         inverse=padded(controller.inverse),
         internal=controller.internal,
-        channel=np.where(tendons < routing.actuated, tendons, -1),
+        channel=np.where((tendons < routing.actuated) & ~positioned, tendons, -1),
         reference=_arrays(reference.signal),
-        coupling=np.concatenate([matrix, np.zeros((routing.passive, len(matrix)))]),
+        coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
         offset=padded(reference.coupling.offset),
+        damping=padded(controller.damping),
         loop=controller.loop,
     )
 

@@ -32,12 +32,13 @@ def joined_controller(controllers: Sequence[Controller], routing: Routing) -> Co
 
 def _joined_paper(controllers: Sequence[ProportionalController], routing: Routing) -> ProportionalController:
     tendons, joints = len(routing.tendons), len(routing.joints)
-    gain, minimum, internal = np.zeros(joints), np.zeros(tendons), np.zeros(tendons)
+    gain, damping, minimum, internal = np.zeros(joints), np.zeros(joints), np.zeros(tendons), np.zeros(tendons)
     inverse, loop = np.zeros((tendons, joints)), np.zeros(tendons, dtype=np.int64)
     for index, (each, (turned, pulled)) in enumerate(zip(controllers, routing.fingers, strict=True)):
-        gain[turned], minimum[pulled], internal[pulled] = each.gain, each.minimum, each.internal
+        gain[turned], damping[turned] = each.gain, each.damping
+        minimum[pulled], internal[pulled] = each.minimum, each.internal
         inverse[np.ix_(pulled, turned)], loop[pulled] = each.inverse, index
-    return ProportionalController(gain, minimum, inverse, internal, loop)
+    return ProportionalController(gain, minimum, inverse, internal, damping, loop)
 
 
 class HandController:

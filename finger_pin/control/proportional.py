@@ -23,11 +23,13 @@ class ControlSignals:
         torque: tau^d, shape (..., n), N m.
         tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
         shortfall: What tension limits keep from being exerted of tau^d, shape (..., n), N m; None without limits.
+        inputs: Of the actuators of a tree, shape (..., k); None without any.
     """
 
     torque: Array
     tension: Array
     shortfall: Array | None = None
+    inputs: Array | None = None
 
 
 class Controller(Protocol):
@@ -43,11 +45,14 @@ class Controller(Protocol):
 class ProportionalController:
     """The paper's controller: proportional torque, distributed over the tendons by the pseudo-inverse.
 
+    The paper has no damping; where there is some, tau^d = K_P (theta^d - theta) + K_D (theta^d' - theta').
+
     Attributes:
         gain: K_P, shape (n,), N m/rad.
         minimum: f0, shape (t,), N.
         inverse: Pseudo-inverse of H_c^T, shape (t, n), 1/m.
         internal: f^k, shape (t,), internal tensions with the largest entry 1.
+        damping: K_D, shape (n,), N m s/rad.
         loop: The finger that each tendon belongs to, shape (t,): each has a lambda of its own; one for all by default.
     """
 
@@ -55,6 +60,7 @@ class ProportionalController:
     minimum: Array
     inverse: Array
     internal: Array
+    damping: Array
     loop: NDArray[np.int64] | None = None
 
     @classmethod
@@ -62,18 +68,24 @@ class ProportionalController:
         """Read the paper's part of a scenario's controller; `build_controller` returns the whole."""
         gain = expand(scenario.controller.gain, len(routing.joints))
         minimum = expand(scenario.controller.minimum_tension, len(routing.tendons))
-        return cls.from_routing(routing, gain, minimum)
+        damping = expand(scenario.controller.damping, len(routing.joints))
+        return cls.from_routing(routing, gain, minimum, damping)
 
     @classmethod
-    def from_routing(cls, routing: Routing, gain: Array, minimum: Array) -> ProportionalController:
-        """Prepare (21) for a routing with force closure."""
-        return cls(gain, minimum, np.asarray(np.linalg.pinv(routing.coupling.T)), routing.force_closure().tension)
+    def from_routing(
+        cls, routing: Routing, gain: Array, minimum: Array, damping: Array | None = None
+    ) -> ProportionalController:
+        """Prepare (21) for a routing with force closure; without damping by default."""
+        inverse = np.asarray(np.linalg.pinv(routing.coupling.T))
+        none = np.zeros(len(routing.joints))
+        return cls(gain, minimum, inverse, routing.force_closure().tension, none if damping is None else damping)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return tau^d of (19) and f_hat of (21) with lambda of (22)."""
         torque = proportional_torque(self.gain, reference.position, position)
+        torque = torque + self.damping * (reference.velocity - velocity)
         minimal = torque @ self.inverse.T
         levels = internal_level(self.minimum, minimal, self.internal)
         if self.loop is None:

@@ -77,6 +77,13 @@ class Signal:
         return cls(np.zeros((len(columns), 4)), *_joined([PchipInterpolator(times, each) for each in values.T]))
 
     @classmethod
+    def held(cls, knots: Array, values: Array) -> Signal:
+        """Return signals that are held between knots, shape (m + 1,), s, at values of shape (m, k)."""
+        coefficients = np.zeros((_ORDER, *values.shape))
+        coefficients[-1] = values
+        return cls(np.zeros((values.shape[1], 4)), knots, coefficients)
+
+    @classmethod
     def joined(cls, signals: Sequence[Signal]) -> Signal:
         """Return the functions of several signals one after the other."""
         from scipy.interpolate import PPoly

@@ -13,7 +13,6 @@ from finger_pin.core.signals import evaluate_many, motion_many
 from finger_pin.core.stepper import in_threads
 from finger_pin.core.tables import build_tables, build_work
 from finger_pin.description.routing import Array
-from finger_pin.laws.law import Row
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion
@@ -59,11 +58,14 @@ class CompiledMechanism:
         at = slice(None) if several else 0
         found, begin = {}, 0
         for table in mechanism.rows:
-            end = begin + len(table.names)
-            own = rows[:, at, begin:end]
-            seen = Row(*(own[c] for c in (LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE)))
-            shown = tuple(own[SIGNALS + i] for i in range(len(table.law.signals)))
-            found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE], shown)
+            end = begin + table.count
+            own, arms = rows[:, at, begin:end], table.law.arms
+            stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
+            seen = table.law.sees(
+                own[LENGTH], own[SPEED], own[STATE][..., stateful], *(own[c] for c in (LOAD, COMMAND, CURVATURE))
+            )
+            shown = tuple(own[SIGNALS + i, ..., ::arms] for i in range(len(table.law.signals)))
+            found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE][..., stateful], shown)
             begin = end
         return Evaluation(
             mechanism.books,

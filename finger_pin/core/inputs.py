@@ -14,7 +14,7 @@ from finger_pin.core.trigonometry import sine_cosine
 from finger_pin.description.routing import Array
 from finger_pin.laws import controller as controller_laws
 from finger_pin.laws import palm as palm_laws
-from finger_pin.laws.quintic import quintic, quintic_rate
+from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
 
 HELD, PLANNED, SCHEDULED = range(3)
 
@@ -23,6 +23,7 @@ _internal_level = inlined(controller_laws.internal_level)
 _base_motion = inlined(palm_laws.base_motion)
 _quintic = inlined(quintic)
 _quintic_rate = inlined(quintic_rate)
+_quintic_curvature = inlined(quintic_curvature)
 
 
 class Signal(NamedTuple):
@@ -44,7 +45,7 @@ class Control(NamedTuple):
 
     Attributes:
         kind: HELD, PLANNED or SCHEDULED.
-        tension: What is held, shape (u,).
+        tension: What is held, shape (u,); zero for inputs that are planned or scheduled.
         gain: K_P, shape (N,).
         minimum: f0, shape (T,).
         inverse: Pseudo-inverse of H_c^T, shape (T, N).
@@ -57,12 +58,14 @@ class Control(NamedTuple):
         schedule: Inputs over time, u functions.
         force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
         palm: Path of the base: x, y, z, roll, pitch, yaw, or no functions for a base at rest.
-        desired, rate: Memory, theta^d and its rate, shape (N,).
+        damping: K_D, shape (N,).
+        damped: Whether it is not zero.
+        desired, rate, acceleration: Memory, tau^d, then theta^d' and theta^d'', shape (N,).
         planned: Memory, f_hat, shape (T,).
         active: Memory, the tension that sets lambda, by controller.
         level: Memory, lambda, by controller.
-        base: Memory, values of a signal.
-        by_position: Memory, du/dq, shape (u, N).
+        base, slope: Memory, values of a signal.
+        by_position, by_velocity: Memory, du/dq and du/dv, shape (u, N).
         by_time: Memory, du/dt, shape (u,).
     """
 
@@ -80,13 +83,18 @@ class Control(NamedTuple):
     schedule: Signal
     force: Signal
     palm: Signal
+    damping: Vector
+    damped: bool
     desired: Vector
     rate: Vector
+    acceleration: Vector
     planned: Vector
     active: Indices
     level: Vector
     base: Vector
+    slope: Vector
     by_position: Matrix
+    by_velocity: Matrix
     by_time: Vector
 
 
@@ -106,12 +114,16 @@ def planned_control(
     coupling: Array,
     offset: Array,
     loop: NDArray[np.int64] | None = None,
+    damping: Array | None = None,
 ) -> Control:
-    """Return the paper's controller, or several of them side by side."""
+    """Return the paper's controller, with damping K_D (theta^d' - theta') if given, or several of them side by side."""
     loops = np.zeros(len(minimum), dtype=np.int64) if loop is None else np.asarray(loop, dtype=np.int64)
-    return _control(
+    control = _control(
         PLANNED, channels, gain, minimum, inverse, internal, loops, channel, reference, coupling, offset, no_signal()
     )
+    if damping is None:
+        return control
+    return control._replace(damping=np.array(damping, dtype=float), damped=bool(np.any(damping)))
 
 
 def held_control(channels: int, coordinates: int) -> Control:
@@ -173,13 +185,18 @@ def _control(
         schedule=schedule,
         force=no_signal(),
         palm=no_signal(),
+        damping=np.zeros(coordinates),
+        damped=False,
         desired=np.zeros(coordinates),
         rate=np.zeros(coordinates),
+        acceleration=np.zeros(coordinates),
         planned=np.zeros(len(minimum)),
         active=np.zeros(loops, dtype=np.int64),
         level=np.zeros(loops),
         base=np.zeros(functions),
+        slope=np.zeros(functions),
         by_position=np.zeros((channels, coordinates)),
+        by_velocity=np.zeros((channels, coordinates)),
         by_time=np.zeros(channels),
     )
 
@@ -231,14 +248,41 @@ def signal_rates(signal: Any, time: float, out: Any) -> None:
 
 
 @compiled
-def inputs(control: Any, time: float, position: Any, out: Any) -> None:
-    """Fill the inputs: f_hat of (19), (21), (22), or what is held or scheduled."""
+def signal_curvatures(signal: Any, time: float, out: Any) -> None:
+    """Fill the second time derivatives of the functions."""
+    table, knots = signal.harmonics, signal.knots
+    for j in range(table.shape[0]):
+        out[j] = 0.0
+        if table[j, 1] != 0.0:
+            circular = 2.0 * np.pi * table[j, 2]
+            out[j] = -table[j, 1] * circular * circular * sine_cosine(circular * time + table[j, 3])[0]
+    if knots.size > 0 and knots[0] <= time < knots[knots.size - 1]:
+        piece, since = _piece(signal, time)
+        for j in range(table.shape[0]):
+            c = signal.coefficients[:, piece, j]
+            out[j] += _quintic_curvature(since, c[0], c[1], c[2], c[3])
+
+
+@compiled
+def _coupled(control: Any, values: Any, out: Any) -> None:
+    """Fill what a derivative of the base signals makes of the desired positions, by the coupling (20)."""
+    for j in range(out.size):
+        out[j] = 0.0
+        for k in range(control.coupling.shape[1]):
+            out[j] += control.coupling[j, k] * values[k]
+
+
+@compiled
+def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) -> None:
+    """Fill the inputs: f_hat of (19), (21), (22), or what is scheduled; what is held, beside them or alone."""
+    for i in range(out.size):
+        out[i] = control.tension[i]
     if control.kind == HELD:
-        for i in range(out.size):
-            out[i] = control.tension[i]
         return
     if control.kind == SCHEDULED:
         signal_values(control.schedule, time, out)
+        for i in range(out.size):
+            out[i] += control.tension[i]
         return
     signal_values(control.reference, time, control.base)
     desired, planned, base = control.desired, control.planned, control.base
@@ -248,6 +292,11 @@ def inputs(control: Any, time: float, position: Any, out: Any) -> None:
         for k in range(control.coupling.shape[1]):
             wanted += control.coupling[j, k] * base[k]
         desired[j] = _proportional_torque(control.gain[j], wanted, position[j])
+    if control.damped:
+        signal_rates(control.reference, time, control.slope)
+        _coupled(control, control.slope, control.rate)
+        for j in range(count):
+            desired[j] += control.damping[j] * (control.rate[j] - velocity[j])
     for c in range(control.level.size):
         control.level[c] = -np.inf
     for i in range(planned.size):
@@ -268,20 +317,19 @@ def inputs(control: Any, time: float, position: Any, out: Any) -> None:
 
 @compiled
 def input_slopes(control: Any, time: float) -> None:
-    """Fill du/dq and du/dt after `inputs`, for the active minimum of (22)."""
+    """Fill du/dq, du/dv and du/dt after `inputs`, for the active minimum of (22)."""
     by_position, by_time = control.by_position, control.by_time
     if control.kind == HELD:
         return
     if control.kind == SCHEDULED:
         signal_rates(control.schedule, time, by_time)
         return
-    signal_rates(control.reference, time, control.base)
     count = control.gain.size
-    for j in range(count):
-        rate = 0.0
-        for k in range(control.coupling.shape[1]):
-            rate += control.coupling[j, k] * control.base[k]
-        control.rate[j] = rate
+    signal_rates(control.reference, time, control.base)
+    _coupled(control, control.base, control.rate)
+    if control.damped:
+        signal_curvatures(control.reference, time, control.base)
+        _coupled(control, control.base, control.acceleration)
     for i in range(control.planned.size):
         row = control.channel[i]
         if row < 0:
@@ -290,9 +338,10 @@ def input_slopes(control: Any, time: float) -> None:
         by_time[row] = 0.0
         for j in range(count):
             shared = control.inverse[active, j] / control.internal[active]
-            slope = -control.gain[j] * (control.inverse[i, j] - control.internal[i] * shared)
-            by_position[row, j] = slope
-            by_time[row] -= slope * control.rate[j]
+            share = control.inverse[i, j] - control.internal[i] * shared
+            by_position[row, j] = -control.gain[j] * share
+            control.by_velocity[row, j] = -control.damping[j] * share
+            by_time[row] += share * (control.gain[j] * control.rate[j] + control.damping[j] * control.acceleration[j])
 
 
 @compiled

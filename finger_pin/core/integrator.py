@@ -37,10 +37,10 @@ class Held(Protocol):
 class _Recorder:
     """Carries one island forward and keeps its steps."""
 
-    def __init__(self, part: Part, chunk: int) -> None:
-        self.part = part
-        self.chunk = chunk
-        self.start = (part.x.copy(), part.attitude.copy())
+    def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
+        self._stepper, self._index = stepper, index
+        part = self.part
+        self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.kept = [part.room(0)]
         self.room = part.room(chunk)
         self.taken = 0
@@ -58,6 +58,11 @@ class _Recorder:
         return core.DONE
 
     @property
+    def part(self) -> Part:
+        """The island; a stepper that is loaded on the way replaces it."""
+        return self._stepper.parts[self._index]
+
+    @property
     def full(self) -> bool:
         """Whether no more steps can be kept."""
         return self.taken >= self.most
@@ -73,6 +78,7 @@ class _Steps:
     """The steps of one island, from a start; angles of free bodies begin anew at each."""
 
     part: Part
+    begin: float
     start: Array
     attitude: Array
     record: Record
@@ -80,7 +86,7 @@ class _Steps:
     @property
     def times(self) -> Array:
         """Ends of the steps with the start first."""
-        return np.concatenate([[0.0], self.record.times])
+        return np.concatenate([[self.begin], self.record.times])
 
     def interpolate(self, at: Array) -> tuple[Array, Array]:
         """Return states at times, shape (m, size), and the quaternions from which angles count, shape (m, f, 4)."""
@@ -114,11 +120,11 @@ def integrate_compiled(
     together: bool = False,
     stop: Stop | None = None,
 ) -> Trajectory:
-    """Integrate from time zero with the compiled core, every island with steps of its own.
+    """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
 
     Args:
         stepper: Where to start, with which method and tolerances.
-        duration: s.
+        duration: Time of the end, s.
         names: Names of the numbers of the state, for messages.
         held: A controller that holds its tensions in between.
         knots: Times at which an input may jump, in order, s: steps end there.
@@ -131,7 +137,7 @@ def integrate_compiled(
     # Advancing by nothing compiles, which is no part of an integration's cost.
     stepper.advance(stepper.time)
     began = time.perf_counter()
-    recorders = [_Recorder(part, chunk) for part in stepper.parts]
+    recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     alone = len(recorders) == 1
     reason, interrupted = "", False
     knotted = set(() if knots is None else knots[(knots > 0.0) & (knots < duration)].tolist())

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.inputs import PLANNED, Control, Signal
+from finger_pin.core.path_tables import select_paths
 from finger_pin.core.tables import Tables
 
 Indices = NDArray[np.int64]
@@ -46,7 +47,7 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
     if planned:
-        reads = (control.inverse != 0.0) & (control.gain != 0.0)
+        reads = (control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0))
         tensions, read = np.nonzero(reads)
         links.append((loop_at + control.loop[tensions], read))
         loop_of = np.full(channels, -1)
@@ -57,7 +58,8 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
     first, second = (np.concatenate(side) for side in zip(*links, strict=True))
     total = loop_at + (int(control.loop.max(initial=-1)) + 1 if planned else 0)
     labels = _connected(first, second, total)
-    found = []
+    found: list[Island] = []
+    unread = np.setdiff1d(np.arange(channels), tables.channel)
     for label in dict.fromkeys(labels[:width].tolist()):
         rows = np.flatnonzero(labels[row_at:loop_at] == label)
         fed = tables.channel[rows]
@@ -67,7 +69,8 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
                 coordinates=np.flatnonzero(labels[:width] == label),
                 rows=rows,
                 states=states[states >= 0],
-                channels=np.unique(fed[fed >= 0]),
+                # What nobody reads is the first one's.
+                channels=np.union1d(fed[fed >= 0], unread if not found else []).astype(np.int64),
                 planned=np.flatnonzero(labels[loop_at + control.loop] == label)
                 if planned
                 else np.zeros(0, dtype=np.int64),
@@ -85,7 +88,7 @@ def select(tables: Tables, island: Island) -> Tables:
     body = _renumbered(bodies, size)
     row, channel = (
         _renumbered(rows, len(tables.state)),
-        _renumbered(island.channels, int(tables.channel.max(initial=0)) + 1),
+        _renumbered(island.channels, int(max(tables.channel.max(initial=0), island.channels.max(initial=0))) + 1),
     )
     charts = np.isin(tables.charts, bodies)
     counts = [np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups]
@@ -121,6 +124,8 @@ def select(tables: Tables, island: Island) -> Tables:
         arm=tables.arm[arms],
         measure=tables.measure[arms],
         state=state,
+        touch=tables.touch[rows],
+        touching=bool(tables.touch[rows].any()),
         channel=_mapped(channel, tables.channel[rows]),
         input_start=input_start,
         load_start=len(inputs) + load_start,
@@ -132,6 +137,7 @@ def select(tables: Tables, island: Island) -> Tables:
         bend_at=coordinate[tables.bend_at[bends]],
         bend=tables.bend[bends],
         curvature_offset=tables.curvature_offset[rows],
+        paths=select_paths(tables.paths, rows, bodies, lambda old: _mapped(body, old), _entries),
     )
 
 
@@ -152,13 +158,17 @@ def select_control(control: Control, island: Island) -> Control:
         offset=control.offset[coordinates],
         schedule=_chosen(control.schedule, channels),
         force=_chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel()),
+        damping=control.damping[coordinates],
         desired=np.zeros(len(coordinates)),
         rate=np.zeros(len(coordinates)),
+        acceleration=np.zeros(len(coordinates)),
         planned=np.zeros(len(planned)),
         active=np.zeros(len(loops), dtype=np.int64),
         level=np.zeros(len(loops)),
         base=np.zeros(len(control.base)),
+        slope=np.zeros(len(control.slope)),
         by_position=np.zeros((len(channels), len(coordinates))),
+        by_velocity=np.zeros((len(channels), len(coordinates))),
         by_time=np.zeros(len(channels)),
     )
 

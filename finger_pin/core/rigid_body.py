@@ -18,7 +18,7 @@ from finger_pin.core.spatial import add_force_cross, apply_inertia, dot, motion_
 from finger_pin.core.trigonometry import sine_cosine
 
 # Columns of the table of bodies.
-ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, BODY_COLUMNS = 0, 9, 12, 13, 16, 22
+ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
 PRISMATIC = 1
 # Layers of work.spatial, one motion or force vector per body, and of work.square.
 AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPATIAL_LAYERS = range(8)
@@ -135,7 +135,8 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
         apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
         add_force_cross(work.spatial[MOTION, i], work.vectors[0], work.spatial[FORCE, i])
     for i in range(size - 1, -1, -1):
-        torque[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
+        own = acceleration[i] if moving else 0.0
+        torque[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i]) + tables.bodies[i, ARMATURE] * own
         if tables.parents[i] >= 0:
             for k in range(6):
                 work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
@@ -195,6 +196,7 @@ def mass_matrix(tables: Any, work: Any) -> None:
             work.square[MASS_MATRIX, i, j] = value
             work.square[MASS_MATRIX, j, i] = value
             j = tables.parents[j]
+        work.square[MASS_MATRIX, i, i] += tables.bodies[i, ARMATURE]
 
 
 @compiled

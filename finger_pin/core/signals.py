@@ -8,7 +8,7 @@ from finger_pin.core.binding import bound_at, call_at
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.model import MODEL
-from finger_pin.core.rigid_body import MOTION, base_power, move
+from finger_pin.core.rigid_body import ARMATURE, MOTION, base_power, move
 from finger_pin.core.tables import END, FIRST
 
 
@@ -122,6 +122,7 @@ def motion_many(
             moving += 2.0 * v[3] * (v[1] * inertia[3] - v[2] * inertia[2])
             moving += 2.0 * v[4] * (v[2] * inertia[1] - v[0] * inertia[3])
             moving += 2.0 * v[5] * (v[0] * inertia[2] - v[1] * inertia[1])
+            moving += tables.bodies[i, ARMATURE] * velocities[m, i] * velocities[m, i]
             for r in range(3):
                 weight = bases[m, 12 + r] if bases.shape[0] > 0 else tables.gravity[r]
                 lifted -= weight * inertia[1 + r]

@@ -21,7 +21,7 @@ from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables, build_work
 from finger_pin.description.routing import Array
-from finger_pin.laws.law import Law
+from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import Mechanism
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
@@ -74,7 +74,7 @@ class Part:
     def __init__(
         self,
         island: Island,
-        laws: list[Law],
+        laws: Sequence[Law | ContactLaw],
         tables: Tables,
         control: Control,
         x: Array,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_serializer, field_validator
+from pydantic import AfterValidator, Field, field_serializer, field_validator
 
 from finger_pin.description.by_finger import flat, given, nested
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.signals import ForceSignal, InputSignal, of_axes
 from finger_pin.description.validation import (
     Description,
     FullName,
@@ -114,6 +114,9 @@ class ControllerSettings(Description):
     tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."
     )
+    inputs: dict[Name, InputSignal] | None = Field(
+        None, description="By actuator of a tree; one without a signal has zero input."
+    )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
     )
@@ -127,6 +130,9 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+        None, description="What the fingertip is to exert besides, J^T F added to tau^d, by axis x, y, z of the base."
+    )
     spring_compensation: bool = Field(
         False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
     )
@@ -144,16 +150,15 @@ class ControllerSettings(Description):
 
     @property
     def is_paper(self) -> bool:
-        """Whether it is the paper's controller and nothing else, sampled or not."""
+        """Whether it is the paper's controller, perhaps damped, and nothing else, sampled or not."""
         added = (
             self.tendon_friction_feedforward,
             self.joint_friction_compensation,
             self.passive_tension_loop,
             self.distribution,
         )
-        damping = self.damping if isinstance(self.damping, tuple) else (self.damping,)
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
-        return plain and not any(damping) and all(each is None for each in added)
+        return plain and not self.fingertip_force and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
@@ -203,6 +208,7 @@ _CLOSED_LOOP = (
     "damping",
     "gravity_compensation",
     "spring_compensation",
+    "fingertip_force",
     "tendon_friction_feedforward",
     "joint_friction_compensation",
     "passive_tension_loop",
@@ -211,7 +217,16 @@ _CLOSED_LOOP = (
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
+    actuators = tuple(finger.tree.actuators) if finger.tree else ()
+    for name in settings.inputs or {}:
+        if name not in actuators:
+            near = nearest(name, actuators)
+            hint = f"; did you mean {near}?" if near else ""
+            allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
+            raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
+        if finger.tree is not None and (actuators or not finger.tendons):
+            raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
         if settings.tensions is not None:
             raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return

@@ -56,6 +56,11 @@ def list_scenarios() -> dict[str, str]:
     return _shipped("scenarios")
 
 
+def list_motors() -> dict[str, str]:
+    """Return the motors that ship with the package, with a line about each."""
+    return _shipped("motors")
+
+
 def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
     """Load a finger by the name of a shipped one or the path of a TOML file.
 
@@ -99,8 +104,9 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
 
     Args:
         name: Such as ``fig6`` or ``my_scenario.toml``.
-        overrides: Values by dotted key, such as ``{"controller.gain": 2.0}``; they win over the file. Paths among them
-            are relative to the working directory, paths in a file to the file.
+        overrides: Values by dotted key, such as ``{"controller.gain": 2.0}``; they win over the file. A star stands for
+            every name, as in ``finger.actuators.*.spool_radius``. Paths among them are relative to the working
+            directory, paths in a file to the file.
 
     Raises:
         InputError: Naming the entry that is wrong.
@@ -112,6 +118,19 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
         _override(overrides, table, folder)
         _resolve_signals(table, Path())
         return validate(Scenario, table, ())
+
+
+def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Return the scenario that a table describes, as `load_scenario` returns that of a file.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    checked, whole = _from_here(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
+    with _depth_limited("scenario"):
+        _override(checked, whole, Path())
+        _resolve_signals(whole, Path())
+        return validate(Scenario, whole, ())
 
 
 def to_toml(description: Description) -> str:
@@ -219,10 +238,29 @@ def _resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> A
         base = rest.pop("base")
         if not isinstance(base, str):
             raise InputError("finger.base", "must be the name or path of a finger", base)
-        return _merge(_resolve_finger(base, folder, seen), rest)
+        return _with_motors(_merge(_resolve_finger(base, folder, seen), rest), folder)
     if not isinstance(finger, dict):
         raise InputError("finger", "must be the name of a finger, the path of a .toml file, or a table", finger)
+    return _with_motors(finger, folder)
+
+
+def _with_motors(finger: Table, folder: Path) -> Table:
+    """Put the table of every motor of a finger where its name or path may stand; return the finger."""
+    for actuator in _as_table(finger.get("actuators")).values():
+        if isinstance(actuator, dict) and "motor" in actuator:
+            actuator["motor"] = _resolve_motor(actuator["motor"], folder)
     return finger
+
+
+def _resolve_motor(motor: Any, folder: Path) -> Any:
+    """Return the table of a motor given by name, by path, or as a table that may start from a base."""
+    if isinstance(motor, str):
+        table, path = _read("motor", motor, folder)
+        return _resolve_motor(table, path.parent)
+    if isinstance(motor, dict) and "base" in motor:
+        rest = dict(motor)
+        return _merge(_as_table(_resolve_motor(rest.pop("base"), folder)), rest)
+    return motor
 
 
 def _resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
@@ -292,7 +330,8 @@ def _merge(base: Table, top: Table) -> Table:
     merged = dict(base)
     for key, value in top.items():
         both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not _is_other_kind(merged[key], value)
-        merged[key] = _merge(merged[key], value) if both else value
+        # A table that names its base starts from that one.
+        merged[key] = _merge(merged[key], value) if both and "base" not in value else value
     return merged
 
 
@@ -314,8 +353,26 @@ def _override(overrides: Table, table: Table, folder: Path) -> None:
         raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
     else:
         table["finger"] = _resolve_finger(table["finger"], folder)
-    # A kind comes before what belongs to it.
-    _apply(dict(sorted(overrides.items(), key=lambda each: not each[0].endswith(".kind"))), table)
+    spelt_out = {each: value for key, value in overrides.items() for each in _each(key, table)}
+    # A kind comes before what belongs to it, and a motor before its entries.
+    first = (".kind", ".motor")
+    for early in (True, False):
+        _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
+        for finger in [each.get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
+            _with_motors(_as_table(finger), Path())
+
+
+def _each(key: str, table: Table) -> list[str]:
+    """Return the keys that a key stands for, in which a star stands for every name."""
+    head, star, tail = key.partition("*")
+    if not star:
+        return [key]
+    inner = table
+    for part in head.split(".")[:-1]:
+        inner = _as_table(inner.get(part))
+    if not inner:
+        raise InputError(key, "there is nothing that the star could stand for")
+    return [found for name in inner for found in _each(f"{head}{name}{tail}", table)]
 
 
 def _apply(overrides: Mapping[str, Any], table: Table) -> None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from finger_pin.description.actuators import Actuator, check_actuators
+from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -263,12 +265,14 @@ class FingerDescription(Description):
         (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="In the base frame."
     )
     joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
-    tendons: dict[Name, Tendon] = Field(min_length=1, description="By name.")
+    tendons: dict[Name, Tendon] = Field(description="By name; at least one, unless there is a tree.")
     tendon_friction: TendonFriction = TendonFriction()
     joint_friction: JointFriction = JointFriction()
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
+    actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
     _hand: Any = PrivateAttr(None)
+    tree: Tree | None = Field(None, description="Bodies that are no chain of links, and what drives them.")
 
     @field_validator("tendons")
     @classmethod
@@ -278,11 +282,16 @@ class FingerDescription(Description):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         joints, tendons = tuple(self.joints), tuple(self.tendons)
+        if not self.tendons and self.tree is None:
+            raise problem("tendons", "must have at least one entry")
+        if self.tree is not None and tuple(self.tree.joints) != joints:
+            raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
         for name, tendon in self.tendons.items():
             for joint in tendon.crossings:
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        check_actuators(self.actuators, self.actuated_names, self.passive_names)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),

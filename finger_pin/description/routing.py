@@ -71,11 +71,11 @@ class Routing:
             joints=joints,
             tendons=tendons,
             actuated=len(description.actuated_names),
-            coupling=np.array(coupling),
-            strand_coupling=np.array(strands),
-            curvature_matrix=np.array(curvature),
+            coupling=np.array(coupling).reshape(-1, len(joints)),
+            strand_coupling=np.array(strands).reshape(-1, len(joints)),
+            curvature_matrix=np.array(curvature).reshape(-1, len(joints)),
             curvature_offset=np.array([t.curvature_offset for t in description.tendons.values()]),
-            loads=np.array(loads).T,
+            loads=np.array(loads).reshape(-1, len(joints)).T,
             fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
         )
 
@@ -160,7 +160,7 @@ class ForceClosure:
         """Find the internal tensions of a coupling matrix H_c, shape (t, n)."""
         # The radii differ by less than a few orders of magnitude, so a relative rank tolerance is safe.
         _, sizes, directions = np.linalg.svd(coupling.T)
-        null_space = directions[np.count_nonzero(sizes > 1e-10 * sizes[0]) :].T
+        null_space = directions[np.count_nonzero(sizes > 1e-10 * sizes.max(initial=0.0)) :].T
         count = null_space.shape[1]
         tension = np.zeros(len(tendons))
         if count == 1:
@@ -174,7 +174,7 @@ class ForceClosure:
     @property
     def holds(self) -> bool:
         """Whether every internal tension is positive."""
-        return bool(np.all(self.tension > _SLACK))
+        return len(self.tension) > 0 and bool(np.all(self.tension > _SLACK))
 
     def __str__(self) -> str:
         """Say in one line what holds or what is missing."""

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     Field,
     SerializerFunctionWrapHandler,
     field_serializer,
@@ -17,13 +18,15 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.actuators import check_currents, check_sources
 from finger_pin.description.by_finger import flat, flat_numbers, given, nested, of_finger
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import HandDescription
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
-from finger_pin.description.signals import ForceSignal, JointReference
+from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.tautness import Tautness
 from finger_pin.description.validation import (
     IN_RADIANS,
@@ -45,7 +48,6 @@ from finger_pin.exceptions import InputError
 METHODS_IN_NUMPY = ("Radau", "BDF", "LSODA")
 METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
 MOST_SAMPLES = 5_000_000
-AXES = ("x", "y", "z")
 LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
 _Item = TypeVar("_Item")
 
@@ -78,20 +80,14 @@ class EnvironmentSettings(Description):
     fingertip_force: Annotated[tuple[float, float, float], vector(3, -1e6, 1e6)] = quantity(
         (0.0, 0.0, 0.0), unit="N", source="(6)", doc="F, constant, base frame."
     )
-    fingertip_force_signal: dict[Name, ForceSignal] | None = Field(
+    fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
         None, description="What varies of F, added to the constant, by axis x, y, z of the base frame."
     )
     fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, what differs there.")
 
     _sparse = field_serializer("fingers")(given)
 
-    @field_validator("fingertip_force_signal")
-    @classmethod
-    def _axes(cls, value: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | None:
-        for name in value or {}:
-            if name not in AXES:
-                raise problem(name, f"no such axis; the axes are {', '.join(AXES)}")
-        return value
+    objects: dict[Name, Object] | None = Field(None, description="What the finger may touch, by name.")
 
 
 class InitialSettings(Description):
@@ -245,6 +241,11 @@ class Scenario(Description):
             raise problem(error.entry, error.allowed) from None
         if self.controller.kind == "proportional" and not closure.holds:
             self._check_taut(routing, str(closure))
+        check_sources(self.finger.actuators, self.controller.tensions or {})
+        rest = expand(self.controller.minimum_tension, len(routing.tendons))
+        if self.controller.kind == "proportional" and closure.holds:
+            rest = closure.tension * np.max(rest / closure.tension)
+        check_currents(self.finger.actuators, dict(zip(routing.tendons, rest, strict=True)))
         for name in self.reference.joints:
             if routing.joints.index(name) in followers:
                 raise problem(f"reference.joints.{name}", "follows from the passive tendon (20); leave it out")

@@ -51,7 +51,7 @@ def delivered_tension(command: Any, loss: Any) -> Any:
 
 def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
-    surface, ratio, stiffness, _, stribeck, floor, exponent, _ = p
+    surface, ratio, stiffness, stribeck, floor, exponent = p[0], p[1], p[2], p[4], p[5], p[6]
     own, by_speed, by_level = stiction_rate_slopes(stiction, speed, level, stiffness)
     by_level = by_level * (level > floor)
     slope = friction_coefficient_slope(speed, coefficient, ratio * coefficient, stribeck, exponent)
@@ -62,7 +62,7 @@ def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, slidi
 
 
 def _driven(row: Row, p: Any) -> Any:
-    surface, ratio, stiffness, viscous, stribeck, floor, exponent, lag = p
+    surface, ratio, stiffness, viscous, stribeck, floor, exponent, lag, acting = p
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
     normal = np.abs(pressing) + np.abs(row.command)
@@ -70,7 +70,8 @@ def _driven(row: Row, p: Any) -> Any:
     level = friction_level(normal, sliding, floor)
     rate = stiction_rate(row.state, row.speed, level, stiffness)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
-    return delivered_tension(row.command, loss), rate, loss, normal, coefficient, sliding, level, pressing
+    force = delivered_tension(row.command, loss) - acting * row.command
+    return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
 def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
@@ -80,7 +81,7 @@ def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
     taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
     pressed = by_normal * (pressing > 0.0)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
-    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, taut, 0.0)
+    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, taut - p[8], 0.0)
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
@@ -93,8 +94,8 @@ def _driven_account(
 ) -> Any:
     stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
-    slack = (row.command - signals[0]) * row.speed * (force <= 0.0)
-    return stored, row.command * row.speed, coulomb, viscous, micro, slack
+    slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
+    return stored, (1.0 - p[8]) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
 def _passive(row: Row, p: Any) -> Any:
@@ -125,10 +126,11 @@ def _passive_account(
 
 _PARAMETERS = ("surface", "ratio", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "lag")
 
-#: A tendon that its input pulls through a canal.
+#: A tendon that its input pulls through a canal. Where the input acts on the finger by itself, as an elastic tendon
+#: does, ``acting`` is 1 and the row exerts what friction changes of it; else 0.
 DRIVEN_TENDON = Law(
     name="driven tendon (12), (14), (16)",
-    parameters=_PARAMETERS,
+    parameters=(*_PARAMETERS, "acting"),
     value=_driven,
     slopes=_driven_slopes,
     account=_driven_account,

@@ -15,14 +15,17 @@ from finger_pin.description.loading import load_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
+from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.tree import build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -40,6 +43,7 @@ class TendonForces:
         normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
         level: max(F^n M, g_min), N.
         stiction_rate: F^s', N/s, (9a).
+        entering: f^a, what pulls at the canal's entrance, N; of a passive tendon its proximal half.
         strands: f of (12), shape (..., s), N.
         passive_acceleration: p_5'', shape (..., p), m/s2, (13).
     """
@@ -51,6 +55,7 @@ class TendonForces:
     normal: Array
     level: Array
     stiction_rate: Array
+    entering: Array
     strands: Array
     passive_acceleration: Array
 
@@ -73,6 +78,25 @@ class JointForces:
 
 
 @dataclass(frozen=True, eq=False)
+class MotorForces:
+    """What the motors do; shapes (..., m).
+
+    Attributes:
+        current: i, A.
+        voltage: U, V.
+        torque: tau = K_t i, N m.
+        friction: tau_g, N m, (9c).
+        load: N, the torque that the gears carry, N m.
+    """
+
+    current: Array
+    voltage: Array
+    torque: Array
+    friction: Array
+    load: Array
+
+
+@dataclass(frozen=True, eq=False)
 class FingerSignals:
     """Everything that (18) is made of, at one state or at many (leading dimensions are kept).
 
@@ -90,6 +114,7 @@ class FingerSignals:
         acceleration: theta'', shape (..., n), rad/s2, (18).
         rate: Time derivative of the packed state, shape (..., size).
         mechanism: The same of the mechanism, with what every row does.
+        motors: What motors do; None without any.
     """
 
     state: State
@@ -105,6 +130,7 @@ class FingerSignals:
     acceleration: Array
     rate: Array
     mechanism: Evaluation
+    motors: MotorForces | None = None
 
 
 class Finger:
@@ -115,12 +141,14 @@ class Finger:
         rigid_body: M, C, G, J and forward dynamics, on Pinocchio.
         routing: H_c, H_c2, curvature matrix, crossing sets, force closure.
         tendons: The tendon layer.
+        actuators: The motors that pull tendons.
         joint_friction: The friction of the joints.
         stroke_limiter: The stroke limiters.
         springs: The springs of the joints.
         layout: Order and sizes of the packed state.
         mechanism: All of it as coordinates and rows.
-        further: Tables of rows that were added.
+        paths: The tendons of a tree as functions of the posture; None without a tree.
+        further: Tables of rows that were added, those of a tree first.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
     """
 
@@ -137,7 +165,7 @@ class Finger:
                 its fingers together, whose joints and tendons have dotted names.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
-            rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p).
+            rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
 
         Raises:
             InputError: If the joints of the two differ, or one has several coordinates.
@@ -147,7 +175,11 @@ class Finger:
         if isinstance(description, HandDescription):
             description = description.joined()
         self.description = description
-        self.rigid_body = rigid_body or build_rigid_body(description)
+        self.paths: Routes | None = None
+        if description.tree is None:
+            self.rigid_body = rigid_body or build_rigid_body(description)
+        else:
+            self.rigid_body, self.paths = build_tree(description)
         if len(self.rigid_body.joints) != len(description.joints):
             raise InputError("finger.joints", f"the rigid body's joints are {', '.join(self.rigid_body.joints)}")
         for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
@@ -155,28 +187,37 @@ class Finger:
                 raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
         self.tendons = Tendons.from_description(description)
         self.routing = self.tendons.routing
+        self.actuators = Actuators.from_description(description, self.routing)
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
-        self.further = tuple(rows)
+        joints, motors = self.routing.joints, self.actuators.names
+        width = len(joints) + self.routing.passive + len(motors)
+        self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
         self.visuals: pin.GeometryModel | None = None
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
-            self.routing.joints, self.routing.tendons, self.routing.passive, further_states(rows), ringing
+            self.routing.joints,
+            self.routing.tendons,
+            self.routing.passive,
+            further_states(self.further),
+            ringing,
+            self.actuators.names,
         )
-        joints, passive = self.routing.joints, self.routing.passive
-        width = len(joints) + passive
         self.mechanism = Mechanism(
             self.rigid_body,
             [
-                *self.tendons.rows(),
-                self.joint_friction.rows(joints, self.routing.actuated, width),
+                *self.tendons.rows(self.actuators),
+                self.joint_friction.rows(joints, self.actuators.pulled, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
-                *rows,
+                *(self.actuators.rotor_rows(width) if motors else []),
+                *self.further,
             ],
-            self.routing.passive_names,
-            self.tendons.mass,
+            (*self.routing.passive_names, *motors),
+            np.concatenate([self.tendons.mass, self.actuators.inertia]),
+            # Also where a tendon's input goes nowhere: the second one of a spool has none.
+            self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
 
@@ -260,18 +301,22 @@ class Finger:
         """H_c2, shape (s, n), m, (10)."""
         return self.routing.strand_coupling
 
-    def rest_state(self, position: Array, velocity: Array | None = None) -> Array:
-        """Return a packed state with relaxed bristles and the masses of passive tendons in the middle, taut.
+    def rest_state(self, position: Array, velocity: Array | None = None, tension: Array | None = None) -> Array:
+        """Return a packed state with relaxed bristles, the masses of passive tendons in the middle, taut, and spools.
 
         Args:
             position: theta, shape (n,), rad.
-            velocity: theta', shape (n,), rad/s, with which the masses go; at rest by default.
+            velocity: theta', shape (n,), rad/s, with which masses and spools go; at rest by default.
+            tension: Of the elastic tendons on spools, shape (a,), N; by default they are just taut.
         """
         x = np.zeros(self.layout.size)
         state, middle = self.layout.unpack(x), self.tendons.rest_position
+        assert state.motor_position is not None and state.motor_velocity is not None
         state.position[:] = position
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
+        state.motor_position[:] = self.actuators.angle(state.position, tension)
+        state.motor_velocity[:] = self.actuators.rate(state.velocity)
         return x
 
     def evaluate(
@@ -281,7 +326,7 @@ class Finger:
 
         Args:
             x: Packed state, shape (size,) or (m, size).
-            command: f^a, shape (a,) or (m, a), N.
+            command: f^a, shape (a,) or (m, a), N; of a motor in position drive its voltage, V, at its first tendon.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
             base: How the palm of a hand moves, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
@@ -290,8 +335,14 @@ class Finger:
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        joints = len(self.routing.joints)
+        joints, masses = len(self.routing.joints), len(self.routing.joints) + self.routing.passive
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
+        delivered, torque, motors = driven.force, driven.force @ driven.rows.arm + halves.force @ halves.rows.arm, None
+        if self.actuators.names:
+            elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
+            delivered = delivered + elastic.force @ self.actuators.pulled.T
+            torque = torque + elastic.force @ elastic.rows.arm
+            motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
             return np.concatenate([of(driven), of(passive)], axis=-1)
@@ -308,8 +359,9 @@ class Finger:
                 normal=both(lambda tendons: tendons["normal_force"]),
                 level=both(lambda tendons: tendons["level"]),
                 stiction_rate=both(lambda tendons: tendons.rate),
-                strands=np.concatenate([driven.force, halves.force], axis=-1),
-                passive_acceleration=found.acceleration[..., joints:],
+                entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
+                strands=np.concatenate([delivered, halves.force], axis=-1),
+                passive_acceleration=found.acceleration[..., joints:masses],
             ),
             joints=JointForces(
                 reaction=pins["normal_force"],
@@ -320,11 +372,12 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=(driven.force @ driven.rows.arm + halves.force @ halves.rows.arm)[..., :joints],
+            tendon_torque=torque[..., :joints],
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             mechanism=found,
+            motors=motors,
         )
 
     def powers(
@@ -369,3 +422,7 @@ def _by_finger(given: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
         if name not in given:
             raise InputError(f"{entry}.{name}", f"is missing: there must be one for each of {', '.join(fingers)}")
     return [given[name] for name in fingers]
+
+
+#: A hand is a finger whose joints form a tree.
+Hand = Finger

@@ -55,9 +55,19 @@ class JointFriction:
             lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
         )
 
-    def rows(self, names: tuple[str, ...], actuated: int, width: int) -> Rows:
-        """Return the table of the joints' friction; strands beyond the actuated ones are halves of passive tendons."""
-        size = len(names)
+    def rows(self, names: tuple[str, ...], pulled: Array, width: int) -> Rows:
+        """Return the table of the joints' friction.
+
+        Args:
+            names: Of the joints.
+            pulled: One where an actuated tendon is pulled by an elastic one, shape (a, k); what the two exert adds up.
+                Strands beyond the actuated ones are halves of passive tendons.
+            width: Number of coordinates.
+        """
+        size, actuated = len(names), len(pulled)
+        loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
+        if pulled.size:
+            loads["elastic_tendons"] = self.loads[:, :actuated] @ pulled
         return Rows(
             group="joint_friction",
             law=PIN_FRICTION,
@@ -75,7 +85,7 @@ class JointFriction:
                 ]
             ),
             arm=np.eye(size, width),
-            loads={"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]},
+            loads=loads,
             pins=np.arange(size),
             stored="joint_bristles",
             powers=("joint_coulomb", "joint_viscous", "joint_micro_damping"),

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
-from finger_pin.laws.law import Row
+from finger_pin.mechanism.pieces import Paths, Reach, moved, reach
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 
@@ -119,20 +120,24 @@ class Mechanism:
         rows: Sequence[Rows],
         lumps: Sequence[str] = (),
         inertia: Array | None = None,
+        channels: int = 0,
         moved: bool = False,
     ) -> None:
-        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps."""
+        """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
+
+        There are as many inputs as rows have, or more if so many ``channels`` are asked for.
+        """
         self.body = body
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
         self.moved = moved
         self.books = Books.of(self.rows, moved)
-        self.channels = max((int(table.channels.max(initial=-1)) + 1 for table in self.rows), default=0)
+        self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
         for table in self.rows:
-            begin, end = end, end + (0 if table.law.scale is None else len(table.names))
+            begin, end = end, end + table.states
             self.states.append(slice(begin, end))
         self.state_count = end
 
@@ -163,6 +168,7 @@ class Mechanism:
                         bends=_spread(table.bends, places, width),
                         channels=np.where(table.channels >= 0, table.channels + channel, -1),
                         pins=np.where(table.pins >= 0, table.pins + joint, -1),
+                        paths=moved(table.paths, joint),
                         inputs={f"{name}.{group}": weights for group, weights in table.inputs.items()},
                         loads={f"{name}.{group}": weights for group, weights in table.loads.items()},
                     )
@@ -170,7 +176,7 @@ class Mechanism:
             joint, coordinate = joint + part.body.model.njoints - 1, coordinate + size
             lump, channel = lump + len(part.lumps), channel + part.channels
         lumps = [f"{name}.{each}" for name, part in parts.items() for each in part.lumps]
-        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]))
+        return cls(body, rows, lumps, np.concatenate([part.inertia for part in parts.values()]), channel)
 
     @property
     def coordinates(self) -> int:
@@ -231,19 +237,24 @@ class Mechanism:
             forces[...] = given[..., None, :] if tips == 1 else given
         command = np.asarray(command, dtype=float)
         found: dict[str, RowSignals] = {}
+        touching: list[tuple[Paths, Array]] = []
         torque = np.zeros((*lead, self.coordinates))
         for table, part in zip(self.rows, self.states, strict=True):
-            row = Row(
-                length=linear @ table.measure.T + table.offset,
-                speed=v @ table.arm.T,
-                state=z[..., part] if table.law.scale is not None else np.zeros((*lead, len(table.names))),
-                load=self._load(table, found, turning, forces if pressed else None),
-                command=self._input(table, found, command, lead),
-                curvature=np.abs(linear) @ table.bends.T + table.curvature_offset,
+            routed = self._routed(table, turning)
+            arm = table.arm + routed.arm
+            row: Any = table.law.sees(
+                linear @ table.measure.T + table.offset + routed.length,
+                (arm @ v[..., None])[..., 0],
+                z[..., part] if table.states else np.zeros((*lead, table.count)),
+                self._load(table, found, turning, forces, touching),
+                self._input(table, found, command, lead),
+                np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
             )
-            exerted, rate, *signals = table.law.value(row, table.parameters)
-            found[table.group] = RowSignals(table, row, exerted, rate, tuple(signals))
-            torque = torque + exerted @ table.arm
+            exerted, rate, signals = table.law.act(row, table.parameters)
+            found[table.group] = RowSignals(table, row, exerted, rate, signals)
+            if table.law.arms > 1:
+                touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
+            torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
         external = np.zeros_like(torque)
         if pressed:
             external[..., :joints] = self.body.external_torque(turning, forces)
@@ -257,7 +268,7 @@ class Mechanism:
         if base is not None:
             power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
         moving = self.body.position_rate(turning, v[..., :joints])
-        rates = [found[t.group].rate for t in self.rows if t.law.scale is not None]
+        rates = [found[t.group].rate for t in self.rows if t.states]
         return Evaluation(
             books=self.books,
             rows=found,
@@ -280,8 +291,17 @@ class Mechanism:
             return np.array([self._base_power(*each) for each in zip(q, v, a, base, strict=True)])
         return np.array([base[:6] @ self.body.base_dynamics(q, v, a, base)[0]])
 
+    def _routed(self, table: Rows, q: Array) -> Reach:
+        """Return what paths through space add to the rows of a table, shape (..., k) and (..., k, N)."""
+        if not table.routed:
+            return Reach(*np.zeros((4, 1)))
+        if q.ndim == 1:
+            return reach(self.body, q, table.paths, self.coordinates)
+        each = [reach(self.body, one, table.paths, self.coordinates) for one in q]
+        return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
+
     def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
-        total = np.zeros((*lead, len(table.names)))
+        total = np.zeros((*lead, table.count))
         wired = table.channels >= 0
         if wired.any():
             total[..., wired] = command[..., table.channels[wired]]
@@ -289,17 +309,41 @@ class Mechanism:
             total = total + found[group].force @ weights.T
         return total
 
-    def _load(self, table: Rows, found: dict[str, RowSignals], q: Array, forces: Array | None) -> Array:
+    def _load(
+        self,
+        table: Rows,
+        found: dict[str, RowSignals],
+        q: Array,
+        forces: Array,
+        touching: Sequence[tuple[Paths, Array]],
+    ) -> Array:
         """Return N: the magnitude of what earlier rows add up to, or of -e S + F for the pins of joints (17)."""
-        load = np.zeros((*q.shape[:-1], len(table.names)))
+        load = np.zeros((*q.shape[:-1], table.count))
         for group, weights in table.loads.items():
             load = load + found[group].force @ weights.T
-        if forces is None or not (table.pins >= 0).any():
+        if not (table.pins >= 0).any() or not (np.any(forces) or touching):
             return np.abs(load)
         directions = self.body.link_directions(q)[..., table.pins, :]
         beyond = self.body.supports[:, table.pins].T @ forces
+        for paths, pushes in touching:
+            beyond = beyond + self._passing(paths, table.pins) @ pushes
         total: Array = beyond - load[..., None] * directions
-        return np.asarray(np.sqrt(np.sum(total * total, axis=-1)))
+        magnitude = np.sqrt(np.sum(total * total, axis=-1))
+        return np.where(table.pins >= 0, magnitude, np.abs(load))
+
+    def _passing(self, paths: Paths, pins: NDArray[np.int64]) -> Array:
+        """Return how often a force on the first body of every path, and its reaction, pass each pin, shape (k, m)."""
+        supports = [set(each) for each in self.body.model.supports]
+        pieces = [legs[0].piece for legs in paths]
+        pairs = [[(pin + 1 in supports[p.ends[0].joint], pin + 1 in supports[p.joint]) for p in pieces] for pin in pins]
+        return np.array([[float(first) - float(second) for first, second in row] for row in pairs])
+
+
+def _touching(force: Array, directions: Array, arms: int) -> Array:
+    """Return the sum of the forces of every contact as vectors, shape (..., m, 3)."""
+    vectors = force[..., None] * directions
+    total: Array = vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2)
+    return total
 
 
 def _spread(matrix: Array, places: NDArray[np.int64], width: int) -> Array:

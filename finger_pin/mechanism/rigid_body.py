@@ -139,6 +139,8 @@ class RigidBody:
                 at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
                 # Appending bodies, or frames with theirs, would round.
                 model.inertias[at] = own.inertias[index]
+                at, moved = model.joints[at].idx_v, own.joints[index]
+                model.armature[at : at + moved.nv] = own.armature[moved.idx_v : moved.idx_v + moved.nv]
             for tip in body.tips:
                 frame = own.frames[tip]
                 holder = frame.parentJoint and frame.parentJoint + shift
@@ -185,6 +187,17 @@ class RigidBody:
             return np.array([self.link_directions(each) for each in q])
         pin.forwardKinematics(self.model, self._data, q)
         return self._directions()
+
+    def placements(self, q: Array) -> tuple[list[pin.SE3], list[Array]]:
+        """Return placement and Jacobian of every joint, the base first, at q of shape (nq,).
+
+        A Jacobian's columns are velocity of the body's point at the origin, and angular velocity; base frame.
+        """
+        model, data = self.model, self._data
+        pin.computeJointJacobians(model, data, q)
+        still, reference = np.zeros((6, model.nv)), pin.ReferenceFrame.WORLD
+        twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]
+        return [pin.SE3(each) for each in data.oMi], [still, *(np.asarray(each).reshape(6, -1) for each in twists)]
 
     def tip_position(self, q: Array) -> Array:
         """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
@@ -268,7 +281,8 @@ class RigidBody:
             each = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]
             return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
-        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
+        # Pinocchio's kinetic energy is without what turns with the joints' motors.
+        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)

@@ -1,9 +1,9 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta | p | theta' | p' | F^s of the tendons | F^s of the joints |
-    |   n   | p |   n    | p  |         t          |         n         |
+    | theta | p | theta_m | theta' | p' | theta_m' | F^s of the tendons | F^s of the joints | F^s of the gearboxes |
+    |   n   | p |    m    |   n    | p  |    m     |         t          |         n         |          m           |
 
-n joints, t tendons, p of them passive: 19 numbers for the paper's finger.
+n joints, t tendons, p of them passive, m motors: 19 numbers for the paper's finger, which has none.
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ class State:
         passive_velocity: p_5', shape (..., p), m/s.
         tendon_stiction: F^s of the tendons, shape (..., t), N.
         joint_stiction: F^s of the joints, shape (..., n), N m.
-        further: States of rows of one's own, shape (..., f); zero if left out.
+        further: States of rows of one's own, shape (..., f); zero if left out, as what follows.
+        motor_position: theta_m, shape (..., m), rad.
+        motor_velocity: theta_m', shape (..., m), rad/s.
+        gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
     """
 
     position: Array
@@ -38,6 +41,9 @@ class State:
     tendon_stiction: Array
     joint_stiction: Array
     further: Array | None = None
+    motor_position: Array | None = None
+    motor_velocity: Array | None = None
+    gearbox_stiction: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,7 @@ class Layout:
         passive: Number of passive tendons.
         further: Name and scale of every state of further rows, which follow.
         ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
+        motors: Names of the motors.
     """
 
     joints: tuple[str, ...]
@@ -57,12 +64,29 @@ class Layout:
     passive: int
     further: tuple[tuple[str, float], ...] = ()
     ringing: tuple[float, ...] = ()
+    motors: tuple[str, ...] = ()
+
+    @cached_property
+    def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
+        """Names and the scale of every block, in order."""
+        passive = self.tendons[len(self.tendons) - self.passive :]
+        return {
+            "position": (self.joints, 1.0),
+            "passive_position": (passive, 1e-3),
+            "motor_position": (self.motors, 1.0),
+            "velocity": (self.joints, 10.0),
+            "passive_velocity": (passive, 0.1),
+            "motor_velocity": (self.motors, 10.0),
+            "tendon_stiction": (self.tendons, 1.0),
+            "joint_stiction": (self.joints, 1e-2),
+            "gearbox_stiction": (self.motors, 1e-2),
+            "further": (tuple(name for name, _ in self.further), 1.0),
+        }
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Sizes of the blocks, in order."""
-        n, p, t = len(self.joints), self.passive, len(self.tendons)
-        return n, p, n, p, t, n, len(self.further)
+        return tuple(len(names) for names, _ in self._blocks.values())
 
     @cached_property
     def size(self) -> int:
@@ -70,40 +94,27 @@ class Layout:
         return sum(self.sizes)
 
     @cached_property
-    def _parts(self) -> tuple[slice, ...]:
+    def _parts(self) -> dict[str, slice]:
         ends = np.cumsum(self.sizes)
-        return tuple(slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
+        parts = (slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
+        return dict(zip(self._blocks, parts, strict=True))
 
     @property
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
-        passive = self.tendons[len(self.tendons) - self.passive :]
-        groups = (
-            ("joint_position", self.joints),
-            ("passive_position", passive),
-            ("joint_velocity", self.joints),
-            ("passive_velocity", passive),
-            ("tendon_stiction", self.tendons),
-            ("joint_stiction", self.joints),
+        return tuple(
+            name if kind == "further" else f"{'joint_' if kind in ('position', 'velocity') else ''}{kind}[{name}]"
+            for kind, (names, _) in self._blocks.items()
+            for name in names
         )
-        named = tuple(f"{kind}[{name}]" for kind, names in groups for name in names)
-        return named + tuple(name for name, _ in self.further)
 
     def pack(self, state: State) -> Array:
         """Return the packed vector, shape (..., size)."""
-        further = np.zeros((*state.position.shape[:-1], len(self.further))) if state.further is None else state.further
-        return np.concatenate(
-            [
-                state.position,
-                state.passive_position,
-                state.velocity,
-                state.passive_velocity,
-                state.tendon_stiction,
-                state.joint_stiction,
-                further,
-            ],
-            axis=-1,
-        )
+        lead, blocks = state.position.shape[:-1], []
+        for kind, size in zip(self._blocks, self.sizes, strict=True):
+            given = getattr(state, kind)
+            blocks.append(np.zeros((*lead, size)) if given is None else given)
+        return np.concatenate(blocks, axis=-1)
 
     def unpack(self, x: Array) -> State:
         """Return views of a packed vector, shape (..., size).
@@ -113,7 +124,7 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        return State(*[x[..., part] for part in self._parts])
+        return State(**{kind: x[..., part] for kind, part in self._parts.items()})
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).
@@ -123,12 +134,9 @@ class Layout:
         velocity that goes with 1 % of its position: an oscillation too small to matter in the one is not followed
         in the other.
         """
-        scales = np.concatenate(
-            [
-                np.repeat([1.0, 1e-3, 10.0, 0.1, 1.0, 1e-2], self.sizes[:-1]),
-                [scale for _, scale in self.further],
-            ]
-        )
+        scales = np.repeat([scale for _, scale in self._blocks.values()], self.sizes)
+        scales[self._parts["further"]] = [scale for _, scale in self.further]
         if self.ringing:
-            scales[self._parts[3]] = np.maximum(scales[self._parts[3]], 1e-5 * np.array(self.ringing))
+            passive = self._parts["passive_velocity"]
+            scales[passive] = np.maximum(scales[passive], 1e-5 * np.array(self.ringing))
         return scales

@@ -11,6 +11,7 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
+from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.rows import Rows
 
 
@@ -75,18 +76,23 @@ class Tendons:
         proximal, distal = self.stretch(position, np.zeros((*position.shape[:-1], self.routing.passive)))
         return 0.5 * (proximal - distal)
 
-    def rows(self) -> list[Rows]:
-        """Return the tables of halves (12) and of driven and passive tendons (14), (16), for coordinates (theta, p)."""
+    def rows(self, actuators: Actuators | None = None) -> list[Rows]:
+        """Return the tables of the tendons, for coordinates (theta, p, theta_m).
+
+        Halves of passive tendons (12), elastic tendons where there are motors, and driven and passive tendons
+        (14), (16).
+        """
         routing, joints = self.routing, len(self.routing.joints)
         actuated, passive = routing.actuated, routing.passive
-        width = joints + passive
+        motors = 0 if actuators is None else len(actuators.names)
+        width = joints + passive + motors
         # p of the halves: what draws the mass back loosens the proximal half and stretches the distal one.
         halves = np.zeros((2 * passive, width))
         halves[:, :joints] = routing.strand_coupling[actuated:]
         halves[np.arange(2 * passive), joints + np.arange(2 * passive) // 2] = np.tile([1.0, -1.0], passive)
         driven, bends = np.zeros((2, len(routing.tendons), width))
         driven[:, :joints] = routing.coupling
-        driven[actuated:] = np.eye(width)[joints:]
+        driven[actuated:] = np.eye(passive, width, joints)
         bends[:, :joints] = routing.curvature_matrix
         friction = np.array(
             [
@@ -102,6 +108,8 @@ class Tendons:
         )
         losses = ("tendon_coulomb", "tendon_viscous", "tendon_micro_damping")
         names = routing.passive_names
+        pulled = np.zeros((actuated, 0)) if actuators is None else actuators.pulled
+        elastic = pulled.any(axis=1)
         return [
             Rows(
                 group="passive_halves",
@@ -111,13 +119,15 @@ class Tendons:
                 arm=halves,
                 stored="passive_tendon",
             ),
+            *([actuators.tendon_rows(width)] if actuators is not None and motors else []),
             Rows(
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
                 names=routing.tendons[:actuated],
-                parameters=friction[:, :actuated],
+                parameters=np.vstack([friction[:, :actuated], elastic]),
                 arm=driven[:actuated],
-                channels=np.arange(actuated),
+                channels=np.where(elastic, -1, np.arange(actuated)),
+                inputs={"elastic_tendons": pulled} if motors else {},
                 bends=bends[:actuated],
                 curvature_offset=routing.curvature_offset[:actuated],
                 stored="tendon_bristles",

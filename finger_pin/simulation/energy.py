@@ -57,9 +57,12 @@ class Flows:
 
 def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics) -> dict[str, Array]:
     """Return the stored energies at the given signals by name, shape (...,), J."""
-    lumps = 0.5 * np.sum(finger.mechanism.inertia * signals.state.passive_velocity**2, axis=-1)
-    stored, _ = signals.mechanism.account()
-    return {"kinetic": motion.kinetic_energy + lumps, "gravity": motion.potential_energy, **stored}
+    state, (stored, _) = signals.state, signals.mechanism.account()
+    lumps = 0.5 * np.sum(finger.tendons.mass * state.passive_velocity**2, axis=-1)
+    found = {"kinetic": motion.kinetic_energy + lumps, "gravity": motion.potential_energy, **stored}
+    if finger.actuators.names and state.motor_velocity is not None:
+        found["rotors"] = 0.5 * np.sum(finger.actuators.inertia * state.motor_velocity**2, axis=-1)
+    return found
 
 
 def powers(signals: FingerSignals) -> Flows:

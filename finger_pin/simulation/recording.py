@@ -25,6 +25,7 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
+_MOTOR = ("time", "motor")
 _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 _STORED = {
     "kinetic": "kinetic energy",
@@ -34,11 +35,19 @@ _STORED = {
     "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
+    "elastic_tendons": "elastic energy of the tendons on spools",
+    "gearboxes": "elastic energy of the gearboxes' bristles",
+    "rotors": "kinetic energy of the rotors",
 }
 _EXCHANGED = {
     "actuators": "supplied by the actuators",
+    "electrical": "supplied by the motors' electronics",
     "fingertip": "supplied by the fingertip force",
     "palm": "supplied by what moves the palm",
+    "motor_heat": "lost as heat in the motors' windings",
+    "gearbox_coulomb": "lost by gears sliding",
+    "gearbox_viscous": "lost in the gears' viscous friction",
+    "elastic_damping": "lost as tendons on spools stretch",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",
@@ -51,12 +60,14 @@ _EXCHANGED = {
 }
 
 
-def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str) -> xr.Dataset:
-    """Return all signals of a trajectory at the scenario's sample times, as far as the trajectory goes.
+def record(
+    scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str, times: Array | None = None
+) -> xr.Dataset:
+    """Return all signals of a trajectory at times, by default the scenario's, as far as the trajectory goes.
 
     The signals are recomputed from the states by the evaluation that the dynamics use.
     """
-    times = scenario.sample_times()
+    times = scenario.sample_times() if times is None else times
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
     signals = loop.evaluate(times, trajectory.interpolate(times))
     state = signals.finger.state
@@ -80,6 +91,8 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
         dataset = dataset.assign_coords(finger=list(scenario.hand.fingers))
     if routing.passive > 1:
         dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
+    if loop.finger.actuators.names:
+        dataset = dataset.assign_coords(motor=("motor", list(loop.finger.actuators.names), {"long_name": "motor"}))
     return dataset
 
 
@@ -156,6 +169,21 @@ def _signals(
     if signals.control.shortfall is not None:
         text = "desired torque that tension limits keep from being planned"
         table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)
+    motors = finger.motors
+    if motors is not None and state.motor_position is not None:
+        assert state.motor_velocity is not None and state.gearbox_stiction is not None
+        text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
+        table |= {
+            "motor_position": _entry(_MOTOR, state.motor_position, "rad", "angle of the spool"),
+            "motor_velocity": _entry(_MOTOR, state.motor_velocity, "rad/s", "velocity of the spool"),
+            "motor_current": _entry(_MOTOR, motors.current, "A", "current"),
+            "motor_voltage": _entry(_MOTOR, motors.voltage, "V", "voltage"),
+            "motor_torque": _entry(_MOTOR, motors.torque, "N m", "torque of the motor, at the spool"),
+            "gearbox_friction": _entry(_MOTOR, motors.friction, "N m", "friction torque of the gearbox", "9c"),
+            "gearbox_stiction": _entry(_MOTOR, state.gearbox_stiction, "N m", "its stiction torque", "9a"),
+            "gearbox_load": _entry(_MOTOR, motors.load, "N m", "torque that the gears carry"),
+            "spool_tension": _entry(_TENDON, tendons.entering, "N", text),
+        }
     if passive:
         shared = {
             "passive_tension_proximal": (halves[..., 0::2], "N", "tension of the proximal half", "12"),
@@ -177,6 +205,8 @@ def _further(tables: tuple[Rows, ...], found: Evaluation) -> dict[str, tuple[Any
         own, dims = found.rows[table.group], ("time", table.group)
         values = {"force": own.force, "length": own.row.length, "speed": own.row.speed}
         values |= dict(zip(table.law.signals, own.signals, strict=True))
+        if np.any(table.channels >= 0):
+            values["input"] = own.row.command
         if table.law.scale is not None:
             values["state"] = own.row.state
         for name, value in values.items():

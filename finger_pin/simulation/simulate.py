@@ -18,6 +18,7 @@ from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
 from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.own import OwnController
+from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.control.sampling import SampledController
@@ -32,7 +33,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import AccuracyWarning, InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, open_account, ringing
+from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, floor_advice, open_account, ringing
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -124,13 +125,25 @@ def simulate(
     sampling = _sampling(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
+    positioned = bool(np.any(loop.finger.actuators.holds))
+    if positioned and method not in TABLEAUS:
+        raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
     if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
+        if positioned:
+            raise InputError(
+                "controller.sampling.period", "is missing: beside position drives this controller is sampled"
+            )
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
         loop = loop.compiled()
     answers = loop.controller
-    if sampling is not None:
-        loop = replace(loop, controller=SampledController(loop, sampling), parts=())
+    sampled = None if sampling is None else SampledController(loop, sampling)
+    if positioned:
+        duration = scenario.simulation.duration
+        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, sampled)
+        loop = replace(loop, drives=drives, parts=())
+    if sampled is not None:
+        loop = replace(loop, controller=sampled, parts=())
     elif own:
         # A wrong answer of a user's own controller is refused before anything is computed.
         loop.evaluate(0.0, loop.initial_state())
@@ -180,6 +193,10 @@ def simulate(
         advice = _ADVICE_TIGHT if tight else _ADVICE
         if "physical range" in trajectory.failure:
             advice = _ADVICE_RUNAWAY
+        else:
+            with np.errstate(all="ignore"):
+                last = loop.evaluate(reached, trajectory.interpolate(np.array([reached]))[0])
+                advice = floor_advice(last.finger) or advice
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:
@@ -231,7 +248,7 @@ def _integrate(
             Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force),
             settings.duration,
             loop.finger.layout.names,
-            held=controller if isinstance(controller, SampledController) else None,
+            held=loop.drives or (controller if isinstance(controller, SampledController) else None),
             knots=loop.knots(),
             watch=watch,
             chunk=chunk,

@@ -19,6 +19,9 @@ _PARTS = {
     "passive_velocity": "passive_velocity",
     "tendon_stiction": "tendon_stiction",
     "joint_stiction": "joint_stiction",
+    "motor_position": "motor_position",
+    "motor_velocity": "motor_velocity",
+    "gearbox_stiction": "gearbox_stiction",
 }
 
 
@@ -67,10 +70,11 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
         if dimension not in initial.coords or tuple(map(str, initial[dimension].values)) != names:
             raise InputError("initial", f"is a result of another finger: its {dimension}s must be {', '.join(names)}")
     last, parts = initial.isel(time=-1), {}
+    sizes = vars(finger.layout.unpack(np.zeros(finger.layout.size)))
     for part, name in _PARTS.items():
         if name in last:
             parts[part] = np.atleast_1d(last[name].values)
-        elif routing.passive or not name.startswith("passive"):
+        elif sizes[part].size:
             raise InputError("initial", f"has no {name}; give what simulate returned")
         else:
             parts[part] = np.zeros(0)

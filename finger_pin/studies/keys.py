@@ -1,7 +1,7 @@
 """Keys of a scenario: what they hold and mean, and scenarios with other numbers or names there.
 
 A key is dotted as in `load_scenario`, such as ``finger.joints.distal.link.length``. One number of a list has its index
-in brackets: ``environment.fingertip_force[2]``.
+in brackets: ``environment.fingertip_force[2]``. A star stands for every name: ``finger.actuators.*.motor``.
 """
 
 from __future__ import annotations
@@ -179,11 +179,12 @@ def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:
-    """Return what lies at a key, or None."""
+    """Return what lies at a key, or None; where a star stands for all names, at the first of them."""
     name, index = split(key)
     held: Any = scenario.model_dump(mode="python")
     for part in name.split("."):
-        held = held.get(part) if isinstance(held, dict) else None
+        below = held if isinstance(held, dict) else {}
+        held = next(iter(below.values()), None) if part == "*" else below.get(part)
     if index is None:
         return held
     return held[index] if isinstance(held, list | tuple) and index < len(held) else None

@@ -102,7 +102,7 @@ def tracking_peak(run: Run) -> float:
 
 
 def tension_peak(run: Run) -> float:
-    """Return the largest tension at either end of any tendon, N: f^a, f, f5_3 or f5_4."""
+    """Return the largest tension at either end of any tendon, N: f^a or f^m, f, f5_3 or f5_4."""
     return float(max(np.max(ends) for ends in _ends(run.result)))
 
 
@@ -112,8 +112,9 @@ def tension_mean(run: Run) -> float:
 
 
 def losses(run: Run) -> float:
-    """Return what friction, limiters and springs took, J."""
-    rest = _final(run.result, "limiter") + _final(run.result, "joint_springs")
+    """Return what friction, limiters, springs, gears and tendons that stretch took, J."""
+    further = ("limiter", "joint_springs", "gearbox_coulomb", "gearbox_viscous", "elastic_damping")
+    rest = sum(_final(run.result, name) for name in further if f"energy_exchanged_{name}" in run.result)
     return losses_tendons(run) + losses_joints(run) + rest
 
 
@@ -128,12 +129,25 @@ def losses_joints(run: Run) -> float:
 
 
 def slack_time(run: Run) -> float:
-    """Return how long at least one tendon, or one half of a passive one, delivers no tension, s."""
+    """Return how long at least one tendon, or one half of a passive one, has no tension at one of its ends, s."""
     delivered = [np.min(_rows(run.result, "tendon_tension", "tendon"), axis=1)]
+    if "spool_tension" in run.result:
+        delivered.append(_rows(run.result, "spool_tension", "tendon").min(axis=1))
     if "passive_tension_proximal" in run.result:
         delivered.append(_proximal(run.result).min(axis=1))
     slack = (np.min(delivered, axis=0) <= 0.0).astype(float)
     return float(np.trapezoid(slack, run.result["time"].values))
+
+
+def heat(run: Run) -> float:
+    """Return the heat in the windings of the motors, J; 0 for a finger without motors."""
+    return _final(run.result, "motor_heat") if "motor_current" in run.result else 0.0
+
+
+def current_peak(run: Run) -> float:
+    """Return the largest current of any motor, A; 0 for a finger without motors."""
+    found = run.result
+    return float(np.max(np.abs(found["motor_current"].values))) if "motor_current" in found else 0.0
 
 
 def locking_margin(run: Run) -> float:
@@ -169,7 +183,10 @@ def _proximal(result: xr.Dataset) -> Array:
 
 def _ends(result: xr.Dataset) -> list[Array]:
     """Return the tensions at both ends of all tendons; what is planned for passive ones is none."""
-    delivered, command = (_rows(result, name, "tendon") for name in ("tendon_tension", "tendon_command"))
+    delivered = _rows(result, "tendon_tension", "tendon")
+    if "spool_tension" in result:
+        return [delivered, _rows(result, "spool_tension", "tendon")]
+    command = _rows(result, "tendon_command", "tendon")
     if "passive_tension_proximal" not in result:
         return [delivered, command]
     proximal = _proximal(result)
@@ -197,6 +214,8 @@ METRICS = {
         Metric("losses_tendons", "J", "energy lost to the friction of the tendons", losses_tendons),
         Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
         Metric("slack_time", "s", "time with a slack tendon", slack_time),
+        Metric("heat", "J", "heat in the windings of the motors", heat),
+        Metric("current_peak", "A", "largest current of any motor", current_peak),
         Metric("self_locking_margin", "1", "critical over actual joint friction", locking_margin),
         Metric(
             "fingertip_force",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+import tomllib
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,10 +19,11 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
+from finger_pin.views.trees import is_tree
 
 _SETTLING = 1.0
 _LONG = 2.0
-_SUPPLIES = ("actuators", "fingertip", "palm")
+_SUPPLIES = ("actuators", "electrical", "fingertip", "palm")
 
 
 def summarize(result: xr.Dataset) -> str:
@@ -31,7 +33,9 @@ def summarize(result: xr.Dataset) -> str:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
     head = [*_head(result), *_own(result), *_warnings(result)]
-    blocks = [head, _tracking(result), _tension(result), _energy(result), *_convergence(result), _cost(result)]
+    motion = [_joints(result), *_actuators(result)] if is_tree(result) else [_tracking(result)]
+    pulled = [_tension(result)] if result.sizes["tendon"] else []
+    blocks = [head, *motion, *pulled, *_motors(result), _energy(result), *_convergence(result), _cost(result)]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
@@ -119,6 +123,20 @@ def _tracking(result: xr.Dataset) -> list[str]:
     return [f"Tracking error, deg ({span})", *_table(("", "rms", "max"), rows)]
 
 
+def _joints(result: xr.Dataset) -> list[str]:
+    position = result["joint_position"]
+    rows = [_range(str(name), np.asarray(position.sel(joint=name))) for name in result["joint"].values]
+    return ["Positions of the joints, rad or m", *_table(("", "least", "greatest"), rows)]
+
+
+def _actuators(result: xr.Dataset) -> list[list[str]]:
+    if "actuator_force" not in result:
+        return []
+    force = result["actuator_force"]
+    rows = [_range(str(name), np.asarray(force.sel(actuator=name))) for name in result["actuator"].values]
+    return [["Forces of the actuators, N or N m", *_table(("", "least", "greatest"), rows)]]
+
+
 def _tension(result: xr.Dataset) -> list[str]:
     tension = result["tendon_tension"]
     rows = [_range(str(name), np.asarray(tension.sel(tendon=name))) for name in result["tendon"].values]
@@ -135,6 +153,41 @@ def _tension(result: xr.Dataset) -> list[str]:
     return ["Tension, N", *_table(("", "least", "greatest"), rows)]
 
 
+def _motors(result: xr.Dataset) -> list[list[str]]:
+    """Return a block about motors if there are any: what they draw, and how long their tendons hang slack."""
+    if "motor_current" not in result:
+        return []
+    current = np.asarray(result["motor_current"].transpose("time", "motor"))
+    power = current * np.asarray(result["motor_voltage"].transpose("time", "motor"))
+    rows = [
+        (
+            str(name),
+            f"{np.max(np.abs(i)):.3f}",
+            f"{np.sqrt(np.mean(i**2)):.3f}",
+            f"{np.max(p):.3f}",
+            f"{np.mean(p):.3f}",
+        )
+        for name, i, p in zip(result["motor"].values, current.T, power.T, strict=True)
+    ]
+    slack = slack_time(result)
+    listed = ", ".join(f"{name} {time:.3g} s" for name, time in slack.items() if time > 0.0) or "none"
+    head = ("", "peak A", "rms A", "peak W", "mean W")
+    return [["Motors, at their terminals", *_table(head, rows), f"  slack at the spools: {listed}"]]
+
+
+def slack_time(result: xr.Dataset) -> dict[str, float]:
+    """Return for how long every tendon on a spool has hung slack, s; by tendon, as the samples have it."""
+    tension = result["spool_tension"]
+    time = np.asarray(result["time"])
+    pulled = tomllib.loads(result.attrs["scenario"])["finger"]["actuators"].values()
+    steps = np.gradient(time) if len(time) > 1 else np.zeros(len(time))
+    return {
+        name: float(np.sum(steps * (np.asarray(tension.sel(tendon=name)) <= 0.0)))
+        for actuator in pulled
+        for name in actuator["tendons"]
+    }
+
+
 def _energy(result: xr.Dataset) -> list[str]:
     exchanged = {
         name.removeprefix("energy_exchanged_"): result[name]
@@ -146,10 +199,8 @@ def _energy(result: xr.Dataset) -> list[str]:
         for name in map(str, result)
         if name.startswith("energy_") and name.removeprefix("energy_exchanged_") == name and name != "energy_residual"
     )
-    supplied = [name for name in _SUPPLIES if name in exchanged]
-    supplies = [_final(exchanged[name]) for name in supplied]
-    came_in = sum(max(value, 0.0) for value in (*supplies, -stored))
-    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in supplied]
+    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in _SUPPLIES if name in exchanged]
+    came_in = sum(max(value, 0.0) for value in (*(value for _, value in entries), -stored))
     entries += [(_label(values), _final(values)) for name, values in exchanged.items() if name not in _SUPPLIES]
     entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
     rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]

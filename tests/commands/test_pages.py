@@ -59,7 +59,7 @@ def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     (folder / "urdf").symlink_to(ROOT / "urdf")
     shipped = folder / "shipped"
-    for kind in ("fingers", "hands", "scenarios"):
+    for kind in ("fingers", "hands", "scenarios", "motors"):
         shutil.copytree(Path(loading.__file__).parent / kind, shipped / kind)
     for path in (shipped / "scenarios").iterdir():
         path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")
@@ -68,7 +68,7 @@ def shown(tmp_path_factory):
         patch.setattr(loading, "resources", SimpleNamespace(files=lambda package: shipped))
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.serving.Viewing.wait", lambda viewing: viewing.close())
-        patch.setattr("finger_pin.views.plots.save_figure", not_painted)
+        patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)
         # The comparison of controllers leaves out the start.
         patch.setattr("finger_pin.studies.comparison.SETTLED", 0.0)
         meshcat = importlib.import_module("meshcat")

@@ -69,9 +69,9 @@ def test_what_is_not_asked_for_is_not_in_the_controller_nor_in_the_written_scena
 
 @pytest.mark.parametrize(
     "key",
-    ["damping", "gravity_compensation", "tendon_friction_feedforward", "joint_friction_compensation", "distribution"],
+    ["gravity_compensation", "tendon_friction_feedforward", "joint_friction_compensation", "distribution"],
 )
 def test_every_part_alone_makes_another_controller_than_the_paper_s(key):
-    value = {"damping": [0.0, 0.0, 0.1, 0.0], "gravity_compensation": True, "distribution": {"maximum_tension": 9.0}}
+    value = {"gravity_compensation": True, "distribution": {"maximum_tension": 9.0}}
     scenario = fp.load_scenario("fig6", {f"controller.{key}": value.get(key, {})})
     assert isinstance(fp.control.build_controller(scenario), fp.control.CompensatedController)

@@ -7,10 +7,12 @@ import pytest
 from core_cases import (
     FORCE,
     Case,
+    Unpowered,
     carried,
     lugre,
     none_passive,
     on_model,
+    servos,
     tree_model,
     two_passive,
     without_abduction_link,
@@ -44,6 +46,7 @@ def scenarios():
         "two_passive": two_passive(),
         "none_passive": none_passive(),
         "lugre": lugre(),
+        "servos": servos(),
     }
 
 
@@ -52,6 +55,7 @@ def cases(scenarios):
     """All loops by name, each with and without a fingertip force."""
     loops = {name: ClosedLoop.from_scenario(scenario) for name, scenario in scenarios.items()}
     loops["carried"] = ClosedLoop.from_scenario(carried())
+    loops["servos"] = replace(loops["servos"], drives=Unpowered())
     loops["meeting_axes"] = without_abduction_link(loops["fig6"])
     pushed = {f"{name}_pushed": replace(loop, fingertip_force=FORCE) for name, loop in loops.items()}
     return {name: Case.of(loop) for name, loop in (loops | pushed).items()}

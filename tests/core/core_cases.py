@@ -21,13 +21,13 @@ BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
     name + push
     for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "carried")
+    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos", "carried")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
 
 def tree_model():
-    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes."""
+    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes, with rotors."""
     pin.seed(5)
     turned = np.array([0.48, -0.6, 0.64])
     joints = [
@@ -44,6 +44,7 @@ def tree_model():
         index = model.addJoint(parent, kind, pin.SE3.Random(), name)
         model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Random())
     model.addFrame(pin.Frame("tip", 5, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    model.armature[:] = np.linspace(0.1, 0.7, model.nv)
     return model
 
 
@@ -114,6 +115,30 @@ def carried():
         for index, (name, rate) in enumerate(zip(names, rates, strict=True))
     }
     return fp.load_scenario("hand", {"hand.palm.path": path}).parts()["thumb"]
+
+
+def servos():
+    """`fig6` with damping, two tendons on one spool in position drive, one in tension drive, and one ideal source."""
+    # Soft tendons: differences of the friction of stiff ones would have to be finer than rounding allows.
+    both = {"tendons": ["T4", "T1"], "spool_radius": [0.006, 0.004], "drive": "position", "pretension": [2.0, 3.0]}
+    one = {"tendons": ["T3"], "spool_radius": 0.005, "friction_compensation": 0.7}
+    actuators = {
+        "both": {"motor": "STS3215", "tendon_rigidity": 500.0, **both},
+        "one": {"motor": "XL330-M288", "tendon_rigidity": 500.0, **one},
+    }
+    return fp.load_scenario("fig6", {"controller.damping": [0.02, 0.01, 0.0, 0.03], "finger.actuators": actuators})
+
+
+class Unpowered:
+    """Position drives that are switched off."""
+
+    channels = slice(3, 4)
+
+    def voltages(self, time):
+        return np.zeros((*np.shape(time), 1))
+
+    def planned(self, time, reference, control):
+        return control
 
 
 def without_abduction_link(loop):
@@ -196,6 +221,9 @@ class Case:
             passive_velocity=spread(self.layout.passive, -4.0, -1.0),
             tendon_stiction=spread(tendons, -2.0, 0.8),
             joint_stiction=spread(len(lower), -5.0, -2.0),
+            motor_position=finger.actuators.angle(q) + spread(len(self.layout.motors), -3.0, -1.0),
+            motor_velocity=spread(len(self.layout.motors), -2.0, 1.0),
+            gearbox_stiction=spread(len(self.layout.motors), -4.0, -2.0),
         )
         return self.layout.pack(state)
 

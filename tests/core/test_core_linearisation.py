@@ -13,7 +13,7 @@ from finger_pin.core.inputs import HELD
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 #: By kind of state: small against what curves the right-hand side, large against rounding.
-STEPS = (1e-4, 1e-8, 1e-3, 1e-5, 1e-4, 1e-6)
+STEPS = (1e-4, 1e-8, 1e-5, 1e-3, 1e-5, 1e-3, 1e-4, 1e-6, 1e-5)
 TIME_STEP = 1e-3
 STATES = 40
 
@@ -59,9 +59,19 @@ def pieces(case, times, x):
         found.tendons.level > finger.tendons.floor,
         found.joints.level > finger.joint_friction.floor,
     ]
+    if found.motors is not None:
+        rows += [
+            np.sign(state.motor_velocity),
+            found.tendons.entering > 0.0,
+            np.sign(found.mechanism.rows["elastic_tendons"]["pull"]),
+            np.sign(
+                found.motors.torque - found.tendons.entering[..., finger.actuators.tendons] @ finger.actuators.spools
+            ),
+            np.abs(found.motors.current) < finger.actuators.motor[3],
+        ]
     actuated = finger.routing.actuated
     steady = state.tendon_stiction + finger.tendons.viscous * found.tendons.velocity
-    rows.append(found.command > steady[..., :actuated])
+    rows.append(found.tendons.entering[..., :actuated] > steady[..., :actuated])
     if case.control.kind != HELD:
         # The tendon at its least tension, (22).
         slack = (signals.control.tension - loop.controller.minimum) / loop.controller.internal

@@ -10,6 +10,7 @@ LAYOUTS = {
     "paper": Layout(("a", "b", "c", "d"), ("T1", "T2", "T3", "T4", "T5"), 1),
     "no passive tendon": Layout(("a", "b"), ("T1", "T2", "T3"), 0),
     "three passive tendons": Layout(("a",), ("T1", "T2", "P1", "P2", "P3"), 3),
+    "two motors": Layout(("a", "b"), ("T1", "T2", "P1"), 1, motors=("M1", "M2")),
 }
 
 
@@ -30,13 +31,13 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     x = np.random.default_rng(1).normal(size=(*lead, layout.size))
     state = layout.unpack(x)
     np.testing.assert_array_equal(layout.pack(state), x)
-    n, t, p = len(layout.joints), len(layout.tendons), layout.passive
-    for name, size in zip(State.__annotations__, (n, p, n, p, t, n, 0), strict=True):
+    n, t, p, m = len(layout.joints), len(layout.tendons), layout.passive, len(layout.motors)
+    for name, size in zip(State.__annotations__, (n, p, n, p, t, n, 0, m, m, m), strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 
 
-def test_sizes_add_up_to_three_per_joint_one_per_tendon_and_two_per_passive_tendon(layout):
-    assert layout.size == 3 * len(layout.joints) + len(layout.tendons) + 2 * layout.passive
+def test_sizes_add_up_to_three_per_joint_and_motor_one_per_tendon_and_two_per_passive_tendon(layout):
+    assert layout.size == 3 * (len(layout.joints) + len(layout.motors)) + len(layout.tendons) + 2 * layout.passive
     assert sum(layout.sizes) == layout.size
 
 
@@ -51,6 +52,9 @@ def test_every_number_has_its_own_name_at_its_place(layout):
         ("passive_velocity", [f"passive_velocity[{name}]" for name in passive]),
         ("tendon_stiction", [f"tendon_stiction[{name}]" for name in layout.tendons]),
         ("joint_stiction", [f"joint_stiction[{name}]" for name in layout.joints]),
+        ("motor_position", [f"motor_position[{name}]" for name in layout.motors]),
+        ("motor_velocity", [f"motor_velocity[{name}]" for name in layout.motors]),
+        ("gearbox_stiction", [f"gearbox_stiction[{name}]" for name in layout.motors]),
     ):
         assert [layout.names[index] for index in getattr(numbered, field)] == items
 

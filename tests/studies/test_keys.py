@@ -120,3 +120,15 @@ def test_what_a_key_holds_has_unit_and_name():
     assert describe("reference.joints.medial.frequency") == {"units": "Hz", "long_name": "Of the sinusoid"}
     assert describe("environment.fingertip_force[1]")["units"] == "N"
     assert np.char.startswith(describe("controller.gain")["long_name"], "K_P")
+
+
+def test_a_star_stands_for_every_name_and_holds_what_the_first_one_holds():
+    servo = Starting.load("servo")
+    motor, radius = "finger.actuators.*.motor", "finger.actuators.*.spool_radius"
+    servo.check(motor, ["XC330-M288", "STS3215"])
+    servo.check(radius, [0.004, 0.006])
+    assert servo.number(radius) == 0.005
+    changed = servo.at({motor: "STS3215", radius: 0.006}).finger.actuators.values()
+    assert [(each.motor.voltage, each.spool_radius) for each in changed] == [(7.4, 0.006)] * 4
+    with pytest.raises(fp.InputError, match=r"finger\.actuators\.\*\.spool_radius"):
+        Starting.load("fig6").check(radius, [0.004])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
 from finger_pin.views.plots.lines import shade, trace
 from finger_pin.views.plots.panels import labelled, logarithmic, stack, title
 from finger_pin.views.plots.style import (
@@ -25,6 +26,9 @@ from finger_pin.views.plots.style import (
     styled,
 )
 
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
+
 _STORED = {
     "kinetic": "kinetic",
     "gravity": "gravity",
@@ -33,8 +37,11 @@ _STORED = {
     "joint_springs": "joints' springs",
     "tendon_bristles": "tendon bristles",
     "joint_bristles": "joint bristles",
+    "rotors": "rotors",
+    "elastic_tendons": "tendons on spools",
+    "gearboxes": "gear bristles",
 }
-_SUPPLIED = ("actuators", "fingertip", "palm")
+_SUPPLIED = ("actuators", "electrical", "fingertip", "palm")
 _LOST = {
     "tendon_coulomb": ("tendons sliding", VERMILLION),
     "tendon_viscous": ("tendons viscous", ORANGE),
@@ -45,6 +52,10 @@ _LOST = {
     "limiter": ("stroke limiters", GREEN),
     "joint_springs": ("joints' springs", "saddlebrown"),
     "slack": ("tensions cut at zero", PURPLE),
+    "motor_heat": ("heat in windings", "firebrick"),
+    "gearbox_coulomb": ("gears sliding", "slategrey"),
+    "gearbox_viscous": ("gears viscous", "lightsteelblue"),
+    "elastic_damping": ("tendons stretching", "olive"),
 }
 _MILLI = 1e3
 
@@ -61,10 +72,10 @@ def plot_energy(result: xr.Dataset) -> Figure:
         result: Dataset of `simulate`, of any finger.
     """
     time = result["time"].values
-    stored = {name: result[f"energy_{name}"].values for name in _STORED}
+    stored = {name: result[f"energy_{name}"].values for name in _STORED if f"energy_{name}" in result}
     shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
-    given = [result.get(f"energy_exchanged_{name}") for name in _SUPPLIED]
-    supplied = np.asarray(sum(each.values for each in given if each is not None))
+    came_in = [f"energy_exchanged_{name}" for name in _SUPPLIED]
+    supplied = np.asarray(sum(result[name].values for name in came_in if name in result))
     figure = new_figure(11.0, 6.6)
     strips = stack(figure, 0.0, 5.0, [labelled(_STORED[name], "mJ") for name in shown], bottom=0.5)
     title(strips[0], "(a) stored energy")
@@ -79,12 +90,13 @@ def plot_energy(result: xr.Dataset) -> Figure:
 
 def _balance(axes: Axes, result: xr.Dataset, supplied: Array, stored: Array) -> None:
     time = result["time"].values
-    losses = {name: _MILLI * result[f"energy_exchanged_{name}"].values for name in _LOST}
     level = np.zeros(len(time))
     for name, (label, colour) in _LOST.items():
-        if np.any(losses[name]):
-            shade(axes, time, level, level + losses[name], color=colour, alpha=0.8, label=label)
-            level = level + losses[name]
+        lost = f"energy_exchanged_{name}"
+        if lost in result and np.any(result[lost].values):
+            above = level + _MILLI * result[lost].values
+            shade(axes, time, level, above, color=colour, alpha=0.8, label=label)
+            level = above
     change = _MILLI * (stored - stored[0])
     shade(axes, time, level, level + change, color=GREY, alpha=0.35, label="change of stored energy")
     trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=1.6)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
-from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
 from finger_pin.views.plots.style import new_figure
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
 
 #: A column of such a figure: its title, variable, factor and unit.
 Column = tuple[str, str, float, str]
@@ -35,6 +37,8 @@ def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
     """
     present = fingers_of(result)
     if finger not in present:
+        from finger_pin.description.validation import nearest
+
         near = nearest(finger, present)
         hint = f"; did you mean {near}?" if near else ""
         listed = f"the fingers are {', '.join(present)}" if present else "it is the result of one finger"

@@ -1,0 +1,67 @@
+"""What motors and gears do to tensions in slow motion: how much of a command arrives, and how much they can pull.
+
+A gearbox at the edge of sliding carries N = |x r f - tau| and takes c + m N of the motor's torque tau, with c = c0 + c1
+and m = m0 + m1. It pulls while tau - r f >= c + m N, and lets go from r f - tau >= c + m N on. With the two signs that
+the content of N may have, each is two lines, of which the one with less tension counts while pulling, and the other one
+while letting go. For large tensions, where c does not count, r f is a share of tau.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import expand
+from finger_pin.mechanism.finger import Finger
+
+
+def tension_limits(finger: Finger, *, holding: bool = False) -> tuple[float, ...]:
+    """Return the greatest tension at every actuated tendon's spool, N, in slow motion or at rest.
+
+    The current is at most I_max, and V / R. Of two tendons on one spool each has it while the other one is slack.
+
+    Args:
+        finger: With actuators; a tendon without one has no limit: infinity.
+        holding: Whether gears may help, as against a load that pulls; by default they have to be overcome.
+    """
+    limits = np.full(finger.routing.actuated, np.inf)
+    for actuator in finger.description.actuators.values():
+        motor, gears = actuator.motor, actuator.motor.friction
+        constant, resistance, dry = motor.constants
+        torque = constant * min(motor.maximum_current, motor.voltage / resistance)
+        dry, weight = dry + gears.stribeck, gears.external_weight
+        by_load = gears.by_load + gears.stribeck_by_load
+        sign = 1.0 if holding else -1.0
+        # tau - r f >= c + m (x r f - tau) and c + m (tau - x r f), or with the signs of helping.
+        steep, flat = 1.0 - by_load * weight, 1.0 + by_load * weight
+        ends = [(torque * (1.0 + by_load) + sign * dry) / flat]
+        if steep > 0.0:
+            ends.append((torque * (1.0 - by_load) + sign * dry) / steep)
+        elif holding:
+            ends.append(np.inf)
+        most = max(0.0, max(ends) if holding else min(ends))
+        for tendon, radius in zip(actuator.tendons, expand(actuator.spool_radius, len(actuator.tendons)), strict=True):
+            limits[finger.routing.tendons.index(tendon)] = most / radius
+    return tuple(limits.tolist())
+
+
+def gear_shares(description: FingerDescription) -> Array:
+    """Return what share of a large command is at the spool while a tendon is drawn in, and while it is let out.
+
+    Shape (2, a); 1 for an ideal source, and in position drive, where gears change no tension. Where no load turns the
+    gears, m x >= 1, a tendon that is let out keeps whatever it has: infinity.
+    """
+    names = description.actuated_names
+    shares = np.ones((2, len(names)))
+    for actuator in description.actuators.values():
+        if actuator.drive == "position":
+            continue
+        gears = actuator.motor.friction
+        by_load, weight = gears.by_load + gears.stribeck_by_load, gears.external_weight
+        near = (1.0 + by_load) / (1.0 + by_load * weight)
+        steep = 1.0 - by_load * weight
+        far = (1.0 - by_load) / steep if steep > 0.0 else np.inf
+        index = names.index(actuator.tendons[0])
+        shares[:, index] = min(near, far), max(near, far)
+    return shares

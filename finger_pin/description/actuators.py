@@ -1,0 +1,246 @@
+"""Actuators as data: motors with their gearboxes, spools, elastic tendons, drives. Seen at the gearbox's output."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from finger_pin.description.validation import (
+    Description,
+    Name,
+    Numbers,
+    choice,
+    expand,
+    problem,
+    quantity,
+    real,
+    reals,
+    vector,
+)
+
+
+class DataSheet(Description):
+    """What a maker's sheet says; K_t, R and c0 follow, and both its ends come out exactly."""
+
+    stall_torque: Annotated[float, real(0.0, 1e4, above=True, hint=" N m (is it in kg cm?)")] = quantity(
+        ..., unit="N m", source="maker's sheet", doc="T_s, at the voltage."
+    )
+    stall_current: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
+        ..., unit="A", source="maker's sheet", doc="I_s, at the voltage."
+    )
+    no_load_speed: Annotated[float, real(0.0, 1e5, above=True, hint=" rad/s (is it in rpm?)")] = quantity(
+        ..., unit="rad/s", source="maker's sheet", doc="w_0, at the voltage."
+    )
+
+
+class GearFriction(Description):
+    """Law (9) of a gearbox, its level [c0 + m0 N] + [c1 + m1 N] exp(-(|v| / w)^p), N the torque that gears carry."""
+
+    coulomb: Annotated[float, real(0.0, 1e4)] | None = quantity(
+        None, unit="N m", source="data sheet", doc="c0, level without load; a data sheet says it if it is left out."
+    )
+    by_load: Annotated[float, real(0.0, 100.0)] = quantity(0.0, unit="1", source="fit", doc="m0, level over N.")
+    stribeck: Annotated[float, real(0.0, 1e4)] = quantity(
+        0.0, unit="N m", source="fit", doc="c1, what is added at rest without load."
+    )
+    stribeck_by_load: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="1", source="fit", doc="m1, what is added at rest over N."
+    )
+    stribeck_velocity: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
+        1.0, unit="rad/s", source="fit", doc="w, Stribeck velocity."
+    )
+    stribeck_exponent: Annotated[float, real(0.0, 10.0, above=True)] = quantity(
+        1.0, unit="1", source="fit", doc="p, exponent of |v| / w."
+    )
+    viscous: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="N m s/rad", source="fit", doc="b.")
+    stiffness: Annotated[float, real(0.0, 1e9, above=True)] = quantity(
+        50.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness: how far gears give before they slip."
+    )
+    external_weight: Annotated[float, real(0.0, 1e3)] = quantity(
+        1.0,
+        unit="1",
+        source="fit",
+        doc="How much more the tendons' torque counts in N than the motor's: N = |x r f - tau|; above 1 / m0 no tendon "
+        "turns the gears.",
+    )
+
+
+class Encoder(Description):
+    """What a position drive knows of its spool."""
+
+    range: Annotated[tuple[float, float], vector(2, -1e6, 1e6)] = quantity(
+        ..., unit="rad", source="maker's sheet", doc="Least and largest angle that it can be told to go to."
+    )
+    resolution: Annotated[float, real(0.0, 1.0)] = quantity(
+        0.0, unit="rad", source="maker's sheet", doc="Step of the measured angle; 0 for none."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.range[0] >= self.range[1]:
+            raise problem("range", "the lower limit must be below the upper one", list(self.range))
+        return self
+
+
+class Motor(Description):
+    """A motor with its gearbox, either by its constants or by its data sheet."""
+
+    file_keys = ("base",)
+
+    title: str = Field("", strict=True, max_length=200, description="One line for listings.")
+    voltage: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
+        ..., unit="V", source="maker's sheet", doc="V, of the supply: |U| <= V."
+    )
+    torque_constant: Annotated[float, real(0.0, 1e4, above=True)] | None = quantity(
+        None, unit="N m/A", source="fit", doc="K_t."
+    )
+    resistance: Annotated[float, real(0.0, 1e6, above=True)] | None = quantity(None, unit="ohm", source="fit", doc="R.")
+    data_sheet: DataSheet | None = Field(None, description="In place of torque_constant and resistance.")
+    maximum_current: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
+        ..., unit="A", source="maker's sheet", doc="I_max."
+    )
+    inertia: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        ..., unit="kg m2", source="fit", doc="J, of the rotor times the square of the gear ratio, and of the gears."
+    )
+    friction: GearFriction = Field(GearFriction(), description="Of the gearbox.")
+    encoder: Encoder | None = Field(None, description="For a position drive.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        sheet = self.data_sheet
+        for name in ("torque_constant", "resistance"):
+            if sheet is None and getattr(self, name) is None:
+                raise problem(name, "is missing: give it, or a data_sheet")
+            if sheet is not None and getattr(self, name) is not None:
+                raise problem(name, "follows from data_sheet; leave one of the two out", getattr(self, name))
+        if sheet is None and self.friction.coulomb is None:
+            raise problem("friction.coulomb", "is missing: give it, or a data_sheet")
+        if sheet is not None and self.constants[2] < 0.0:
+            most = self.constants[0] * sheet.stall_current
+            allowed = f"must be at most {most:.4g} N m, what this current and this speed at no load allow"
+            raise problem("data_sheet.stall_torque", allowed, sheet.stall_torque)
+        return self
+
+    @property
+    def constants(self) -> tuple[float, float, float]:
+        """K_t, N m/A, R, ohm, and c0, N m; of a data sheet R = V / I_s, K_t = sqrt(T_s R / w_0), c0 = K_t I_s - T_s."""
+        sheet, friction = self.data_sheet, self.friction.coulomb
+        if sheet is None:
+            assert self.torque_constant is not None and self.resistance is not None and friction is not None
+            return self.torque_constant, self.resistance, friction
+        resistance = self.voltage / sheet.stall_current
+        constant = math.sqrt(sheet.stall_torque * resistance / sheet.no_load_speed)
+        dry = constant * sheet.stall_current - sheet.stall_torque
+        return constant, resistance, dry if friction is None else friction
+
+
+class PositionLoop(Description):
+    """The loop of a position drive, U = V clip(k_p e + k_d e' + k_i int e, -1, 1), on the angle of the spool."""
+
+    period: Annotated[float, real(1e-6, 1.0)] = quantity(
+        1e-3, unit="s", source="common in such servos", doc="From sample to sample."
+    )
+    proportional: Annotated[float, real(0.0, 1e6)] = quantity(
+        2.3, unit="1/rad", source="XL330 as it ships: gain 400 of 128, 4096 steps a turn, 885 for all", doc="k_p."
+    )
+    derivative: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="s/rad", source="as it ships", doc="k_d.")
+    integral: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="1/(rad s)", source="as it ships", doc="k_i.")
+
+
+class Actuator(Description):
+    """A motor that pulls one tendon, or two in opposition, through a spool; tendons stretch on their way."""
+
+    motor: Motor = Field(description="The name of one that ships, the path of a .toml file, or a table.")
+    tendons: tuple[Name, ...] = Field(
+        min_length=1, max_length=2, description="One tendon, or two of which one is wound in as the other goes out."
+    )
+    spool_radius: Annotated[Numbers, reals(0.0, 1.0, above=True, hint=" m (is it in millimetres?)")] = quantity(
+        ..., unit="m", source="design", doc="r, one number or one per tendon."
+    )
+    drive: Annotated[Literal["tension", "position"], choice("tension", "position")] = quantity(
+        "tension", unit="1", source="design", doc="Commanded tensions as torque, or planned tendon lengths as angle."
+    )
+    tendon_rigidity: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
+        6000.0,
+        unit="N",
+        source="a polyethylene braid that breaks at 200 N and 3.5 %",
+        doc="E A; the tendon has K = E A / L_0.",
+    )
+    tendon_length: Annotated[Numbers, reals(0.0, 100.0, above=True)] = quantity(
+        0.3, unit="m", source="design", doc="L_0, from the spool to the finger."
+    )
+    tendon_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        10.0, unit="N s/m", source="estimate: a tenth of K at 200 rad/s", doc="D, of the tendon as a whole."
+    )
+    pretension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
+        0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of two tendons all there is."
+    )
+    friction_compensation: Annotated[float, real(0.0, 2.0)] = quantity(
+        0.0, unit="1", source="chosen", doc="Tension drive: part of the sliding gear friction that current overcomes."
+    )
+    reversal_speed: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        0.5, unit="rad/s", source="chosen", doc="Tension drive: speed below which that is smoothed."
+    )
+    position_loop: PositionLoop = Field(PositionLoop(), description="Position drive: its loop.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for name in ("spool_radius", "tendon_rigidity", "tendon_length", "tendon_damping", "pretension"):
+            value = getattr(self, name)
+            if isinstance(value, tuple) and len(value) != len(self.tendons):
+                raise problem(name, f"must be one number or one per tendon: {', '.join(self.tendons)}", list(value))
+        if len(set(self.tendons)) != len(self.tendons):
+            raise problem("tendons", "must be two different tendons", list(self.tendons))
+        if self.drive == "position" and self.motor.encoder is None:
+            raise problem("motor.encoder.range", "is missing: a position drive needs the range of angles it can go to")
+        if self.drive == "tension" and len(self.tendons) == 2:
+            allowed = 'one torque cannot set two tensions: a spool that winds two tendons has drive = "position"'
+            raise problem("drive", allowed, self.drive)
+        return self
+
+
+def check_actuators(actuators: dict[str, Actuator], actuated: tuple[str, ...], passive: tuple[str, ...]) -> None:
+    """Raise the error of an actuator whose tendons are not there, passive, or pulled by another one too."""
+    owner: dict[str, str] = {}
+    for name, actuator in actuators.items():
+        entry = f"actuators.{name}.tendons"
+        for tendon in actuator.tendons:
+            if tendon in passive:
+                raise problem(entry, f"{tendon} is passive, without an actuator; actuated are {', '.join(actuated)}")
+            if tendon not in actuated:
+                raise problem(entry, f"no such tendon; actuated are {', '.join(actuated)}", tendon)
+            if tendon in owner:
+                raise problem(entry, f"{tendon} has two sources: {owner[tendon]} pulls it already; leave one out")
+            owner[tendon] = name
+
+
+def check_sources(actuators: dict[str, Actuator], tensions: Iterable[str]) -> None:
+    """Raise the error of a tendon that is given tensions while a motor holds its spool."""
+    for tendon in tensions:
+        for name, actuator in actuators.items():
+            if tendon in actuator.tendons and actuator.drive == "position":
+                allowed = f"has two sources: finger.actuators.{name} holds the angle of its spool; leave one out"
+                raise problem(f"controller.tensions.{tendon}", allowed)
+
+
+def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) -> None:
+    """Raise the error of a motor that cannot exert what keeps its tendons taut at rest, N by tendon."""
+    for name, actuator in actuators.items():
+        motor, count = actuator.motor, len(actuator.tendons)
+        radii = expand(actuator.spool_radius, count) * np.array([1.0, -1.0])[:count]
+        # Two tendons on a spool have the tension that they are built with.
+        taut = [tension[actuator.tendons[0]]] if count == 1 else expand(actuator.pretension, count)
+        constant, resistance, _ = motor.constants
+        needed = abs(float(radii @ taut)) / constant
+        if needed > min(motor.maximum_current, motor.voltage / resistance):
+            what = ", ".join(f"{each:.3g} N of {tendon}" for each, tendon in zip(taut, actuator.tendons, strict=True))
+            if needed > motor.maximum_current:
+                entry, limit, unit = "maximum_current", motor.maximum_current, "A"
+            else:
+                entry, limit, needed, unit = "voltage", motor.voltage, needed * resistance, "V"
+            allowed = f"pretension alone needs {needed:.3g} {unit}: {what} at rest"
+            raise problem(f"finger.actuators.{name}.motor.{entry}", allowed, limit)

@@ -1,0 +1,85 @@
+"""Friction of a gearbox: law (9) with a level that grows with the torque that the gears carry.
+
+    level = [c0 + m0 N] + [c1 + m1 N] exp(-(|v| / w)^p)
+
+The load-dependent Stribeck model of servo identification (Duclusaud and Passault, "Extended friction models for the
+physics simulation of servo actuators", 2024, models M1 to M4). Below p = 1 the exponential has an infinite slope at
+rest. Here (|v| / w)^p is ((v / w)^2 + eps^2)^(p / 2) - eps^p with eps = 1e-4: smooth, zero at rest, and the level is
+off by at most eps^p of its Stribeck part, 1e-3 of it for p = 0.76.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.laws.bristle import (
+    bristle_account,
+    friction_force,
+    friction_level,
+    stiction_rate,
+    stiction_rate_slopes,
+)
+from finger_pin.laws.law import Law, Row
+
+_EPSILON = 1e-4
+# Least level, N m: it keeps (9a) finite for a gearbox without dry friction.
+_FLOOR = 1e-9
+
+
+def stribeck_share(speed: Any, stribeck: Any, exponent: Any) -> Any:
+    """Return exp(-(|v| / w)^p), smooth at rest, where it is 1."""
+    square = (speed / stribeck) ** 2 + _EPSILON**2
+    return np.exp(_EPSILON**exponent - square ** (0.5 * exponent))
+
+
+def stribeck_share_slope(speed: Any, stribeck: Any, exponent: Any, share: Any) -> Any:
+    """Return the derivative of `stribeck_share` by v."""
+    square = (speed / stribeck) ** 2 + _EPSILON**2
+    return -share * exponent * square ** (0.5 * exponent - 1.0) * speed / (stribeck * stribeck)
+
+
+def _value(row: Row, p: Any) -> Any:
+    base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness = p
+    share = stribeck_share(row.speed, velocity, exponent)
+    level = friction_level(1.0, base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share, _FLOOR)
+    loss = friction_force(row.state, row.speed, viscous)
+    return -loss, stiction_rate(row.state, row.speed, level, stiffness), loss, share, level
+
+
+def _slopes(row: Row, p: Any, signals: Any) -> Any:
+    _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness = p
+    _, share, level = signals
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness)
+    by_level = by_level * (level > _FLOOR)
+    steep = (stribeck + stribeck_by_load * row.load) * stribeck_share_slope(row.speed, velocity, exponent, share)
+    pressed = by_level * (by_load + stribeck_by_load * share)
+    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, 0.0, 0.0)
+
+
+def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    stored, dry, viscous, _ = bristle_account(row.speed, row.state, rate, signals[2], p[7], p[6], 0.0)
+    return stored, dry, viscous
+
+
+#: The friction of a gearbox on its output.
+GEARBOX = Law(
+    name="gearbox (9)",
+    parameters=(
+        "base",
+        "by_load",
+        "stribeck",
+        "stribeck_by_load",
+        "stribeck_velocity",
+        "exponent",
+        "viscous",
+        "stiffness",
+    ),
+    value=_value,
+    slopes=_slopes,
+    account=_account,
+    signals=("friction", "stribeck_share", "level"),
+    losses=("coulomb", "viscous"),
+    scale=1e-2,
+)

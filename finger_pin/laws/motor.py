@@ -1,0 +1,82 @@
+"""A direct-current motor, seen at the output of its gearbox: tau = K_t i, limited in voltage and in current.
+
+    i = clip((U - K_t w) / R, -I_max, I_max),   |U| <= V
+
+It is driven by a voltage, its command; or by a current, K_t i being command times gain plus what is to overcome
+friction: then the electronics apply U = R i + K_t w as far as they can. Where the current is limited they apply less
+than was asked for, so that U i = R i^2 + tau w always.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.laws.law import Law, Row
+
+
+def friction_torque(speed: Any, dry: Any, viscous: Any, reversal: Any) -> Any:
+    """Return the torque that is expected to overcome friction, N m; smooth over a reversal."""
+    return dry * np.tanh(speed / reversal) + viscous * speed
+
+
+def asked_voltage(speed: Any, command: Any, p: Any) -> Any:
+    """Return the voltage that the drive asks for before any limit, V; see `MOTOR` for ``p``."""
+    constant, resistance, _, _, by_current, gain, dry, viscous, reversal = p
+    torque = gain * command + friction_torque(speed, dry, viscous, reversal)
+    return by_current * (resistance * torque / constant + constant * speed) + (1.0 - by_current) * command
+
+
+def free_current(speed: Any, asked: Any, p: Any) -> Any:
+    """Return the current without its limit, A, for an asked voltage, V."""
+    constant, resistance, supply = p[0], p[1], p[2]
+    return (np.minimum(np.maximum(asked, -supply), supply) - constant * speed) / resistance
+
+
+def _value(row: Row, p: Any) -> Any:
+    constant, resistance, limit = p[0], p[1], p[3]
+    free = free_current(row.speed, asked_voltage(row.speed, row.command, p), p)
+    current = np.minimum(np.maximum(free, -limit), limit)
+    voltage = resistance * current + constant * row.speed
+    return constant * current, 0.0 * row.length, current, voltage
+
+
+def _slopes(row: Row, p: Any, signals: Any) -> Any:
+    constant, resistance, supply, limit, by_current, gain, dry, viscous, reversal = p
+    asked = asked_voltage(row.speed, row.command, p)
+    within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit)
+    followed = within * (np.abs(asked) < supply)
+    eased = np.tanh(row.speed / reversal)
+    steeper = dry * (1.0 - eased * eased) / reversal + viscous
+    by_speed = followed * by_current * (resistance * steeper / constant + constant) - within * constant
+    by_command = followed * (by_current * resistance * gain / constant + 1.0 - by_current)
+    return (0.0, by_speed, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    current, voltage = signals
+    return 0.0 * row.length, voltage * current, p[1] * current * current
+
+
+#: The torque of a motor on its rotor: ``by_current`` is 1 or 0, ``gain`` torque per command, the rest of (9)'s kind.
+MOTOR = Law(
+    name="motor",
+    parameters=(
+        "torque_constant",
+        "resistance",
+        "voltage",
+        "current_limit",
+        "by_current",
+        "gain",
+        "dry",
+        "viscous",
+        "reversal_speed",
+    ),
+    value=_value,
+    slopes=_slopes,
+    account=_account,
+    signals=("current", "voltage"),
+    supplies=("electrical",),
+    losses=("heat",),
+)

@@ -1,0 +1,180 @@
+"""Servos that pull: rotors with motor and gearbox, spools, and the elastic tendons between spool and canal.
+
+    tendon     e = r theta_m - l(q) + e0,   f^m = max(0, K e + D e')
+    rotor      J theta_m'' = tau - tau_g - sum of r f^m
+    gearbox    tau_g by (9), loaded by N = |x sum of r f^m - tau|
+
+An elastic tendon is a row that acts on rotor and finger alike; what its canal takes away is the row of the driven
+tendon. Of a spool that winds two tendons the second has a negative radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array, Routing
+from finger_pin.description.validation import expand
+from finger_pin.laws.elastic_tendon import ELASTIC_TENDON
+from finger_pin.laws.gearbox import GEARBOX
+from finger_pin.laws.motor import MOTOR
+from finger_pin.mechanism.rows import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Actuators:
+    """m motors that pull k of a finger's tendons; the others have ideal sources.
+
+    Attributes:
+        routing: Of the finger.
+        names: Of the motors.
+        tendons: Indices of the tendons that are pulled, shape (k,).
+        spools: Shape (k, m), m: radius of the spool that pulls each; negative where it pulls as it turns back.
+        stiffness: K = E A / L_0, shape (k,), N/m.
+        damping: D, shape (k,), N s/m.
+        slack: e0, shape (k,), m.
+        inertia: J, shape (m,), kg m2.
+        holds: Whether each motor is in position drive, shape (m,).
+        motor: Numbers of the law of motors, shape (parameters, m).
+        gearbox: Numbers of the law of gearboxes, shape (parameters, m).
+        external_weight: x, shape (m,).
+    """
+
+    routing: Routing
+    names: tuple[str, ...]
+    tendons: NDArray[np.int64]
+    spools: Array
+    stiffness: Array
+    damping: Array
+    slack: Array
+    inertia: Array
+    holds: NDArray[np.bool_]
+    motor: Array
+    gearbox: Array
+    external_weight: Array
+
+    @classmethod
+    def from_description(cls, description: FingerDescription, routing: Routing) -> Actuators:
+        """Read motors and what they pull."""
+        actuators, names = description.actuators.values(), list(description.actuators)
+        strands = [(name, tendon) for name, each in description.actuators.items() for tendon in each.tendons]
+
+        def of_tendons(field: str) -> Array:
+            given = [expand(getattr(each, field), len(each.tendons)) for each in actuators]
+            return np.concatenate([np.zeros(0), *given])
+
+        stiffness = of_tendons("tendon_rigidity") / of_tendons("tendon_length")
+        spools = np.zeros((len(strands), len(names)))
+        for row, ((name, tendon), radius) in enumerate(zip(strands, of_tendons("spool_radius"), strict=True)):
+            opposed = description.actuators[name].tendons.index(tendon)
+            spools[row, names.index(name)] = -radius if opposed else radius
+        motors, gearboxes = [], []
+        for actuator, radius in zip(actuators, np.max(spools, axis=0, initial=0.0), strict=True):
+            motor, gears = actuator.motor, actuator.motor.friction
+            constant, resistance, dry = motor.constants
+            by_current = float(actuator.drive == "tension")
+            share = by_current * actuator.friction_compensation
+            # Of gears that slide slowly under a steady load, N is what they take themselves.
+            sliding = dry / max(1.0 - gears.by_load, 1e-3)
+            electrical = (constant, resistance, motor.voltage, motor.maximum_current)
+            overcome = (share * sliding, share * gears.viscous, actuator.reversal_speed)
+            motors.append((*electrical, by_current, radius, *overcome))
+            level = (dry, gears.by_load, gears.stribeck, gears.stribeck_by_load)
+            shape = (gears.stribeck_velocity, gears.stribeck_exponent, gears.viscous, gears.stiffness)
+            gearboxes.append((*level, *shape))
+        return cls(
+            routing=routing,
+            names=tuple(names),
+            tendons=np.array([routing.tendons.index(tendon) for _, tendon in strands], dtype=np.int64),
+            spools=spools,
+            stiffness=stiffness,
+            damping=of_tendons("tendon_damping"),
+            slack=of_tendons("pretension") / stiffness,
+            inertia=np.array([each.motor.inertia for each in actuators]),
+            holds=np.array([each.drive == "position" for each in actuators], dtype=bool),
+            motor=np.array(motors).reshape(-1, len(MOTOR.parameters)).T,
+            gearbox=np.array(gearboxes).reshape(-1, len(GEARBOX.parameters)).T,
+            external_weight=np.array([each.motor.friction.external_weight for each in actuators]),
+        )
+
+    @property
+    def pulled(self) -> Array:
+        """One where an actuated tendon is pulled by an elastic one, shape (a, k)."""
+        return np.eye(self.routing.actuated)[:, self.tendons]
+
+    @property
+    def channels(self) -> NDArray[np.int64]:
+        """The input of every motor, that of its first tendon: a tension, or a voltage in position drive; shape (m,)."""
+        return self.tendons[np.argmax(self.spools != 0.0, axis=0)] if self.names else np.zeros(0, dtype=np.int64)
+
+    @property
+    def voltages(self) -> NDArray[np.int64]:
+        """The inputs that are voltages of motors in position drive."""
+        return self.channels[self.holds]
+
+    @property
+    def positioned(self) -> NDArray[np.int64]:
+        """Tendons that motors in position drive pull."""
+        return self.tendons[np.any(self.spools[:, self.holds] != 0.0, axis=1)]
+
+    def angle(self, position: Array, tension: Array | None = None) -> Array:
+        """Return theta_m, shape (..., m), rad, at which tendons have some tension, or come nearest where two share one.
+
+        Args:
+            position: theta, shape (..., n), rad.
+            tension: f^m, shape (..., a), N; by default tendons are just taut.
+        """
+        wanted = position @ self.routing.actuated_coupling.T[:, self.tendons] - self.slack
+        if tension is not None:
+            wanted = wanted + tension[..., self.tendons] / self.stiffness
+        weights = self.stiffness[:, None] * self.spools
+        angle: Array = wanted @ weights / np.sum(weights * self.spools, axis=0)
+        return angle
+
+    def rate(self, velocity: Array) -> Array:
+        """Return theta_m', shape (..., m), rad/s, that goes with theta', shape (..., n), at constant tensions."""
+        return self.angle(velocity) - self.angle(np.zeros_like(velocity))
+
+    def tendon_rows(self, width: int) -> Rows:
+        """Return the table of elastic tendons, for coordinates (theta, p, theta_m)."""
+        arm = np.zeros((len(self.tendons), width))
+        arm[:, : len(self.routing.joints)] = self.routing.coupling[self.tendons]
+        arm[:, width - len(self.names) :] = -self.spools
+        return Rows(
+            group="elastic_tendons",
+            law=ELASTIC_TENDON,
+            names=tuple(self.routing.tendons[index] for index in self.tendons),
+            parameters=np.array([self.stiffness, self.damping]),
+            arm=arm,
+            offset=-self.slack,
+            powers=("elastic_damping",),
+        )
+
+    def rotor_rows(self, width: int) -> list[Rows]:
+        """Return the tables of motors and gearboxes."""
+        count = len(self.names)
+        turns = np.eye(count, width, width - count)
+        return [
+            Rows(
+                "motors",
+                MOTOR,
+                self.names,
+                self.motor,
+                turns,
+                channels=self.channels,
+                powers=("electrical", "motor_heat"),
+            ),
+            Rows(
+                "gearboxes",
+                GEARBOX,
+                self.names,
+                self.gearbox,
+                turns,
+                loads={"motors": np.eye(count), "elastic_tendons": -self.external_weight[:, None] * self.spools.T},
+                stored="gearboxes",
+                powers=("gearbox_coulomb", "gearbox_viscous"),
+            ),
+        ]

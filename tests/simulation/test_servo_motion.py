@@ -1,0 +1,182 @@
+"""Whole motions of servos against what is not ours: equations by hand in scipy, MuJoCo, conservation of energy."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import finger_pin as fp
+from finger_pin.core.inputs import held_control
+from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.mechanism.mechanism import Mechanism
+
+sys.path.append(str(Path(__file__).parents[1] / "mechanism"))
+from servo_cases import INERTIA, LINK, RADIUS, SMOOTH, SPOOL, finger
+
+K, D, G = 6000.0 / 0.3, 10.0, 9.81
+
+
+def scenario(made, duration, **sections):
+    """A scenario of a finger with one joint, in open loop, at a tight tolerance."""
+    table = {
+        "name": "one",
+        "finger": made.description.model_dump(exclude_none=True),
+        "controller": {"kind": "tensions", "minimum_tension": 0.7},
+        "simulation": {"duration": duration, "rtol": 1e-9, "atol_scale": 1e-9},
+    }
+    return fp.Scenario.model_validate(table | sections)
+
+
+def test_the_fitted_xl330_moves_a_pendulum_through_a_spool_as_scipy_has_it():
+    """Rotor, gears with load and Stribeck level, elastic tendon and canal (16), written out; 1e-6 rad over a second."""
+    xl330_inertia = 1.895e-3
+    swing = {"offset": 5.8, "amplitude": 5.5, "frequency": 1.0}
+    made = finger("XL330-M288", link={**LINK, "mass": 0.15}, gravity=G, canal=0.11)
+    weight, link_inertia = 0.15 * G * 0.03, 1e-5 + 0.15 * 0.03**2
+    tensions = {"kind": "tensions", "tensions": {"flexor": swing}}
+    result = fp.simulate(scenario(made, 1.0, controller=tensions))
+
+    drag = np.tanh(0.11 * 1.0 / 2.0)
+    canal, gears = {"s0": 5e4, "rho": 1.5, "w": 0.01}, {"s0": 50.0, "w": 2.558, "p": 0.76}
+
+    def rates(t, x):
+        q, v, theta, w, z, y = x
+        wanted = 5.8 + 5.5 * np.sin(2.0 * np.pi * t)
+        pull = max(0.0, K * (SPOOL * theta - RADIUS * q) + D * (SPOOL * w - RADIUS * v))
+        delivered = max(0.0, pull - z)
+        slide = RADIUS * v
+        level = (delivered + pull) * drag * (1.0 + (canal["rho"] - 1.0) * np.exp(-abs(slide) / canal["w"]))
+        torque, load = SPOOL * wanted, abs(SPOOL * wanted - SPOOL * pull)
+        # |w|^p smoothed at rest, as the law says.
+        power = ((w / gears["w"]) ** 2 + 1e-8) ** (gears["p"] / 2.0) - 1e-4 ** gears["p"]
+        friction = 8.76e-3 + 0.0680 * load + 0.0738 * load * np.exp(-power)
+        return [
+            v,
+            (RADIUS * delivered - weight * np.cos(q)) / link_inertia,
+            w,
+            (torque - y - 4.62e-3 * w - SPOOL * pull) / xl330_inertia,
+            canal["s0"] * (slide - z * abs(slide) / max(level, 1e-9)),
+            gears["s0"] * (w - y * abs(w) / friction),
+        ]
+
+    start = [0.0, 0.0, 5.8 / K / SPOOL, 0.0, 0.0, 0.0]
+    times = result["time"].values[::50]
+    exact = solve_ivp(rates, (0.0, 1.0), start, method="LSODA", t_eval=times, rtol=1e-9, atol=1e-12)
+    assert exact.success and np.ptp(exact.y[0]) > 0.1
+    np.testing.assert_allclose(result["joint_position"].values[::50, 0], exact.y[0], atol=1e-6)
+    np.testing.assert_allclose(result["motor_position"].values[::50, 0], exact.y[2], atol=1e-6)
+
+
+def test_mujoco_agrees_on_a_position_drive_without_friction_to_first_order_in_its_step():
+    mujoco = pytest.importorskip("mujoco")
+    period, gain, duration = 2e-3, 5.0, 0.3
+    loop = {"period": period, "proportional": gain, "derivative": 0.02, "integral": 10.0}
+    made = finger(SMOOTH, gravity=G, drive="position", position_loop=loop)
+    reference = {"joints": {"knuckle": {"offset": 0.2, "amplitude": 0.2, "frequency": 2.0}}}
+    result = fp.simulate(scenario(made, duration, reference=reference))
+    text = f"""<mujoco><compiler angle="radian"/><option gravity="0 {-G} 0" integrator="Euler"/>
+      <worldbody>
+        <body><joint name="knuckle" axis="0 0 1"/>
+          <inertial pos="0.03 0 0" mass="0.02" diaginertia="1e-5 1e-5 1e-5"/></body>
+        <body pos="0 1 0"><joint name="rotor" axis="0 0 1" ref="50" armature="{INERTIA - 1e-9}"/>
+          <inertial pos="0 0 0" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/></body>
+      </worldbody>
+      <tendon><fixed name="flexor" stiffness="{K}" damping="{D}" springlength="{50.0 * SPOOL}">
+        <joint joint="rotor" coef="{SPOOL}"/><joint joint="knuckle" coef="{-RADIUS}"/></fixed></tendon>
+      <actuator><general joint="rotor" gaintype="fixed" biastype="affine" gainprm="{0.4 / 3.0}"
+        biasprm="0 0 {-(0.4**2) / 3.0}"/></actuator></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    errors = []
+    for steps in (40, 80, 160):
+        model.opt.timestep = period / steps
+        data = mujoco.MjData(model)
+        data.qpos[:] = 0.2, 50.0 + (RADIUS * 0.2 + 0.7 / K) / SPOOL
+        summed, last = 0.0, None
+        for sample in range(round(duration / period)):
+            wanted = 0.2 + 0.2 * np.sin(4.0 * np.pi * sample * period)
+            error = (RADIUS * wanted + 0.7 / K) / SPOOL - (data.qpos[1] - 50.0)
+            summed += error * period
+            rate = 0.0 if last is None else (error - last) / period
+            last = error
+            data.ctrl[0] = 5.0 * np.clip(gain * error + 0.02 * rate + 10.0 * summed, -1.0, 1.0)
+            mujoco.mj_step(model, data, steps)
+        found = np.array([data.qpos[0], data.qpos[1] - 50.0])
+        ours = [float(result[name][-1, 0]) for name in ("joint_position", "motor_position")]
+        errors.append(np.abs(found - ours))
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    assert np.all(errors[-1] < 1e-4) and np.all((ratios > 1.8) & (ratios < 2.2)), (errors, ratios)
+
+
+@pytest.mark.parametrize("name", ["servo", "servo_position"])
+def test_electrical_and_mechanical_energy_close_to_a_millionth_of_what_was_supplied(name):
+    result = fp.simulate(fp.load_scenario(name, {"simulation.duration": 0.4}))
+    supplied = float(np.abs(result["energy_exchanged_electrical"]).max())
+    assert supplied > 1e-3
+    assert float(np.abs(result["energy_residual"]).max()) < 1e-6 * supplied
+    # The motor's own: U i = R i^2 + tau theta_m'.
+    terminals = (result.motor_voltage * result.motor_current).sum("motor")
+    mechanical = (result.motor_torque * result.motor_velocity).sum("motor")
+    np.testing.assert_allclose(terminals, result.power_motor_heat + mechanical, atol=1e-12)
+    np.testing.assert_allclose(terminals, result.power_electrical, atol=1e-12)
+
+
+def test_what_a_position_drive_holds_is_in_the_result():
+    """The voltage of the k-th sample is V clip(k_p e), with the angle measured in steps, until the next one."""
+    result = fp.simulate(
+        fp.load_scenario("servo_position", {"simulation.duration": 0.02, "simulation.sample_rate": 2e3})
+    )
+    step, gain = 2.0 * np.pi / 4096, 9.2
+    finger, wanted = fp.Finger(fp.load_scenario("servo_position").finger), result.joint_reference.values
+    goal = finger.actuators.angle(wanted, result.tendon_command.values[:, :4])
+    measured = np.round(result.motor_position.values / step) * step
+    held = 5.0 * np.clip(gain * (goal - measured), -1.0, 1.0)
+    # Two samples of the result to one of the drive.
+    np.testing.assert_allclose(result.motor_voltage.values[:-1:2], held[:-1:2], atol=1e-9)
+    np.testing.assert_allclose(result.motor_voltage.values[1::2], held[:-1:2], atol=1e-9)
+    assert np.ptp(held) > 0.0
+
+
+def test_a_result_of_servos_is_continued_where_it_ended():
+    whole = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.06}))
+    first = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.03}))
+    rest = {"simulation.duration": 0.03, "simulation.start_time": 0.03}
+    second = fp.simulate(fp.load_scenario("servo", rest), initial=first)
+    for name in ("joint_position", "motor_position", "gearbox_stiction"):
+        np.testing.assert_allclose(second[name][-1], whole[name][-1], atol=1e-5)
+
+
+def test_a_spool_of_two_tendons_works_beside_sampled_tensions_and_closes_the_account():
+    both = {"motor": "STS3215", "tendons": ["T1", "T4"], "spool_radius": [0.006, 0.005], "drive": "position"}
+    actuators = {"M": {**both, "pretension": [3.0, 3.0]}}
+    overrides = {"finger.actuators": actuators, "simulation.duration": 0.1, "controller.sampling.period": 1.5e-3}
+    result = fp.simulate(fp.load_scenario("fig6", overrides))
+    assert np.all(np.ptp(result.spool_tension.values, axis=0) > 0.0) and float(result.spool_tension.min()) > 0.0
+    assert np.ptp(result.motor_voltage.values) > 0.0
+    # T2 has an ideal source, whose sampled tension goes right into the canal.
+    np.testing.assert_array_equal(result.spool_tension.sel(tendon="T2"), result.tendon_command.sel(tendon="T2"))
+    exchanged = sum(float(abs(result[name]).max()) for name in result if str(name).startswith("energy_exchanged"))
+    assert float(abs(result.energy_residual).max()) < 1e-6 * exchanged
+
+
+def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():
+    """The second tendon of a spool has an input that goes nowhere, the last one of all among them."""
+    made = [finger(SMOOTH, opposed=True, drive="position", pretension=3.0, tendon_damping=each) for each in (5.0, 20.0)]
+    whole = Mechanism.join({"left": made[0].mechanism, "right": made[1].mechanism})
+
+    def stepper(mechanism, starts):
+        q, v, z = zip(*(part.split(start) for part, start in starts), strict=True)
+        # Joints of all, then lumps of all, in positions and velocities; then all states.
+        moving = [each[part] for kind in (q, v) for part in (slice(1), slice(1, None)) for each in kind]
+        x, control = np.concatenate([*moving, *z]), held_control(mechanism.channels, mechanism.coordinates)
+        return Stepper(mechanism, control, x, TABLEAUS["Rodas5P"](), 1e-9, 1e-9 * np.ones(len(x)))
+
+    starts = [(each.mechanism, each.rest_state(np.zeros(1))) for each in made]
+    together, alone = stepper(whole, starts), [stepper(part, [(part, start)]) for part, start in starts]
+    together.hold(np.array([1.0, 0.0, -2.0, 0.0]))
+    assert len(together.parts) == 2 and not together.advance(0.05)
+    for index, (each, voltage) in enumerate(zip(alone, (1.0, -2.0), strict=True)):
+        each.hold(np.array([voltage, 0.0]))
+        assert not each.advance(0.05)
+        np.testing.assert_array_equal(together.x[[index, 2 + index]], each.x[:2])
