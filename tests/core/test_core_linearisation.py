@@ -40,7 +40,7 @@ class Held:
 
     def command(self, time, reference, position, velocity):
         tension = np.broadcast_to(self.tension, (*position.shape[:-1], len(self.tension)))
-        return type("Kept", (), {"tension": tension, "torque": np.zeros_like(position)})
+        return type("Kept", (), {"tension": tension, "torque": np.zeros_like(position), "inputs": None})
 
 
 def pieces(case, times, x):
