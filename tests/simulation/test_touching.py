@@ -6,6 +6,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.views.summary import summarize
 
 #: A ball that falls on the fingertip, off it, and on the floor.
 BALL = """
@@ -62,6 +63,15 @@ def test_the_contact_force_is_normal_and_friction_together_and_lies_on_the_plate
     assert contact.contact_normal.values[closed] == pytest.approx(np.tile([0.0, 0.0, -1.0], (closed.sum(), 1)))
     middle = 0.05 - 0.5 * contact.contact_gap.values[closed]
     assert contact.contact_point.values[closed, 2] == pytest.approx(middle, abs=1e-12)
+
+
+def test_the_summary_says_how_hard_each_contact_pushed_and_how_long_it_slid(pressed):
+    line = next(line for line in summarize(pressed).splitlines() if line.startswith("  distal-plate "))
+    contact = pressed.sel(contact="distal-plate")
+    normal, slip = contact.contact_normal_force.values, contact.contact_slip.values
+    shares = [100.0 * np.mean(normal > 0.0), 100.0 * np.mean((normal > 0.0) & (slip > 1e-6))]
+    found = [float(each) for each in line.replace("%", "").split()[1:]]
+    assert found == pytest.approx([normal.max(), contact.contact_friction.values.max(), *shares], abs=0.06)
 
 
 def test_what_pushes_back_loads_every_joint_as_the_same_force_at_the_fingertip_would(pressed):
