@@ -2,14 +2,18 @@ from . import analysis as analysis
 from . import control as control
 from . import studies as studies
 from . import views as views
+from .description.hand import HandDescription as HandDescription
 from .description.loading import list_fingers as list_fingers
+from .description.loading import list_hands as list_hands
 from .description.loading import list_scenarios as list_scenarios
 from .description.loading import load_finger as load_finger
+from .description.loading import load_hand as load_hand
 from .description.loading import load_scenario as load_scenario
 from .description.loading import to_toml as to_toml
 from .description.parameters import FingerDescription as FingerDescription
 from .description.scenario import Scenario as Scenario
 from .exceptions import AccuracyWarning as AccuracyWarning
+from .exceptions import ClosureWarning as ClosureWarning
 from .exceptions import FingerPinError as FingerPinError
 from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError
@@ -18,6 +22,8 @@ from .exceptions import MicroDampingWarning as MicroDampingWarning
 from .exceptions import ScenarioWarning as ScenarioWarning
 from .exceptions import SelfLockingWarning as SelfLockingWarning
 from .mechanism.finger import Finger as Finger
+from .mechanism.finger import Hand as Hand
+from .mechanism.from_mujoco import from_mujoco as from_mujoco
 from .mechanism.mjcf import to_mjcf as to_mjcf
 from .simulation.convergence import check_convergence as check_convergence
 from .simulation.recording import load_result as load_result

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from finger_pin.analysis.directions import directions_of_motion, sliding_velocity
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.description.hand import one_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
@@ -94,6 +95,7 @@ def critical_friction(
 
 
 def _tendons(finger: Finger | FingerDescription) -> Tendons:
+    one_finger(finger.description if isinstance(finger, Finger) else finger)
     return finger.tendons if isinstance(finger, Finger) else Tendons.from_description(finger)
 
 

@@ -11,6 +11,7 @@ from finger_pin.analysis.directions import directions_of_motion
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
@@ -68,6 +69,7 @@ def self_locking_map(
         InputError: If a joint does not exist, is named twice or is driven by a passive tendon, or there is no force
             closure.
     """
+    one_finger(finger.description)
     routing, limiter = finger.routing, finger.stroke_limiter
     coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
     free = [name for index, name in enumerate(routing.joints) if index not in coupling.followers]

@@ -64,7 +64,16 @@ def self_locking_margin(
             of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
         servos: Whether gears and the limits of motors count: then the finger is also locked from where the tensions
             that would move it slowly, with passive tendons as planned, are more than a motor can pull.
+
+    Of a hand it is that of the finger that is closest, with the position and the directions of its own joints.
     """
+    parts = scenario.parts()
+    if len(parts) > 1:
+        return min(
+            (self_locking_margin(part, samples, most, servos=servos) for part in parts.values()),
+            key=lambda each: each.margin,
+        )
+    scenario = next(iter(parts.values()))
     tendons = Tendons.from_description(scenario.finger)
     routing = tendons.routing
     # Midpoints: a reference that starts or ends at rest moves there.
@@ -139,10 +148,12 @@ def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
         scenario: The scenario.
         stacklevel: Of `warnings.warn`, as seen by the caller of this function.
     """
-    most = max(1, _CASES // 2 ** len(scenario.finger.passive_names))
+    margin = np.inf
     # Parameters at the edge of what numbers hold have no margin: warnings of arithmetic would not help.
     with np.errstate(all="ignore"):
-        margin = self_locking_margin(scenario, most=most).margin
+        for part in scenario.parts().values():
+            most = max(1, _CASES // 2 ** len(part.finger.passive_names))
+            margin = min(margin, self_locking_margin(part, most=most).margin)
     text = locking_advice(margin)
     if text:
         warnings.warn(text, SelfLockingWarning, stacklevel=stacklevel + 1)

@@ -16,6 +16,7 @@ import xarray as xr
 
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.pin_wrench import pin_wrench
+from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
@@ -204,4 +205,5 @@ def _scenario(result: xr.Dataset) -> tuple[Scenario, Finger]:
     except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
         raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
     scenario = validate(Scenario, table, ())
+    one_finger(scenario.finger)
     return scenario, Finger(scenario.finger)

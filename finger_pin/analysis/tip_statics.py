@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
@@ -164,7 +165,8 @@ def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> 
 
 
 def posture(finger: Finger, position: Sequence[float] | Array) -> Array:
-    """Return theta as an array of the right size."""
+    """Return theta as an array of the right size, for a finger alone."""
+    one_finger(finger.description)
     return finite_vector("position", position, len(finger.routing.joints))
 
 

@@ -44,11 +44,13 @@ def conclusions(
 ) -> None:
     """Put the paper's three conclusions to the test: figures, and a table of what was claimed, measured and found."""
     shown = talks(quiet)
+    from finger_pin.description.hand import one_finger
     from finger_pin.description.loading import load_scenario
     from finger_pin.studies.conclusions import findings_table, write_findings
     from finger_pin.views.plots import save_figure
 
     loaded = load_scenario(scenario)
+    one_finger(loaded.finger)
     findings: list[Finding] = []
     chosen = experiments(only or "abc")
     for each in chosen:

@@ -1,6 +1,6 @@
 """Figures drawn by a process of their own, which gets ready while the simulation runs.
 
-Run as a module it is that process: it takes the folder of a trajectory from standard input, and answers on standard
+Run as a module it is that process: it takes a result and a folder from standard input, pickled, and answers on standard
 output what went wrong.
 """
 
@@ -8,35 +8,30 @@ from __future__ import annotations
 
 import gc
 import json
+import multiprocessing
 import os
+import pickle
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
+from finger_pin.commands.imports import without
 from finger_pin.exceptions import FingerPinError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: An error number, and what went wrong; (0, "") if nothing did.
+Answer = tuple[int, str]
 
 
 class NotDrawn(FingerPinError):
     """Figures or animation cannot be drawn; the data are kept."""
-
-
-@contextmanager
-def without_dask() -> Iterator[None]:
-    """Keep xarray from importing Dask, which takes half a second, only because it is installed.
-
-    xarray remembers what there is: this is for a process that has not imported it yet, and does nothing in another.
-    """
-    if {"xarray", "dask"} & sys.modules.keys():
-        yield
-        return
-    sys.modules["dask"] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        del sys.modules["dask"]
 
 
 class Drawing:
@@ -51,23 +46,28 @@ class Drawing:
         pipe = subprocess.PIPE
         command = [sys.executable, "-P", "-m", __name__]
         # In a session of its own it gets no interrupt from the terminal; only the process that started it does.
-        self.process = subprocess.Popen(
-            command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, start_new_session=True
-        )
+        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True)
         return self
 
     def __exit__(self, *error: object) -> None:
         """End the process."""
-        self.process.kill()
+        self.stop()
         self.process.communicate()
 
-    def start(self, folder: Path) -> None:
-        """Have the figures of ``trajectory.nc`` in a folder drawn into ``figures`` there."""
+    def stop(self) -> None:
+        """Draw no more: nothing is written after this."""
+        with suppress(ProcessLookupError):
+            if hasattr(os, "killpg"):
+                # With the copy of itself that it may have made.
+                os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.kill()
+
+    def start(self, result: xr.Dataset, folder: Path) -> None:
+        """Have the figures of a result drawn into a folder."""
         assert self.process.stdin is not None
-        try:
-            print(json.dumps(str(folder.absolute())), file=self.process.stdin, flush=True)
-        except BrokenPipeError:
-            pass  # `wait` reports why it ended.
+        with suppress(BrokenPipeError):  # `wait` reports why it ended.
+            pickle.dump((result, folder.absolute()), self.process.stdin, pickle.HIGHEST_PROTOCOL)
+            self.process.stdin.flush()
 
     def wait(self) -> None:
         """Wait until the figures are drawn.
@@ -82,7 +82,10 @@ class Drawing:
         if answer:
             number, text = json.loads(answer)
         else:
-            number, text = 0, (self.process.stderr.read().strip().splitlines() or ["killed"])[-1]
+            number, text = (
+                0,
+                (self.process.stderr.read().decode(errors="replace").strip().splitlines() or ["killed"])[-1],
+            )
         if number:
             raise OSError(number, os.strerror(number))
         if text:
@@ -90,26 +93,42 @@ class Drawing:
 
 
 def serve() -> None:
-    """Draw the figures of the folder that standard input names, and answer an error number and a text."""
-    # Imports leave no garbage to look for, and the process does not live long.
+    """Draw the figures of the result that standard input gives, and answer an error number and a text."""
+    # It lives too shortly for garbage.
     gc.disable()
-    with without_dask():
-        import xarray as xr
+    with without("dask", "xarray"):
+        from finger_pin.views.plots import saving
+    with suppress(EOFError):
+        result, folder = pickle.load(sys.stdin.buffer)
+        names = list(saving.figures_of(result))
+        print(json.dumps(_drawn_by_two(partial(saving.draw_all, result, folder), names)), flush=True)
 
-        from finger_pin.views.plots import draw_all
 
-        folder = sys.stdin.readline()
-        if not folder:
-            return
-        answer: tuple[int, str] = (0, "")
+def _drawn_by_two(draw: Callable[[list[str]], object], names: list[str]) -> Answer:
+    """Draw figures side by side, half of them in a copy of this process where there are copies."""
+
+    def drawn(own: list[str]) -> Answer:
         try:
-            stage = Path(json.loads(folder))
-            draw_all(xr.load_dataset(stage / "trajectory.nc", engine="netcdf4"), stage / "figures")
+            draw(own)
         except Exception as error:
-            # The netCDF library has negative numbers of its own.
-            number = getattr(error, "errno", None) or 0
-            answer = (max(number, 0), f"{type(error).__name__}: {error}")
-        print(json.dumps(answer), flush=True)
+            # Some libraries have negative numbers of their own.
+            return max(getattr(error, "errno", None) or 0, 0), f"{type(error).__name__}: {error}"
+        return 0, ""
+
+    if "fork" not in multiprocessing.get_all_start_methods():
+        return drawn(names)
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe(duplex=False)
+    other = context.Process(target=lambda: theirs.send(drawn(names[1::2])))
+    other.start()
+    theirs.close()
+    answer = drawn(names[::2])
+    try:
+        second: Answer = ours.recv()
+    except EOFError:
+        second = (0, "a process that draws was killed")
+    other.join()
+    return second if second != (0, "") else answer
 
 
 if __name__ == "__main__":

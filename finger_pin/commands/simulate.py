@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import gc
 import warnings
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
-from finger_pin.commands.drawing import Drawing, NotDrawn, without_dask
+from finger_pin.commands.drawing import Drawing, NotDrawn
+from finger_pin.commands.imports import load_numba, without
 from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
 from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
 
@@ -36,25 +36,24 @@ def simulate(
     check: Annotated[
         bool, typer.Option("--check", help="Repeat the run at a tighter tolerance, and report where the two part.")
     ] = False,
+    mujoco: Annotated[
+        Path | None, typer.Option(metavar="XML", help="Instead of a scenario: move the hand of a MuJoCo model.")
+    ] = None,
     quiet: Quiet = False,
-    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers and methods, and exit.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List scenarios, fingers, hands, methods, and exit.")] = False,
 ) -> None:
     """Simulate a scenario, write its results, and print a summary."""
     changed = overrides(settings, duration=duration, method=method)
     if listed:
         print_text(listing())
         return
-    with Interrupts() as interrupts, without_dask(), Drawing() if figures else nullcontext() as drawing:
-        # Imports leave no garbage to look for.
-        gc.disable()
+    with Interrupts() as interrupts, without("dask", "xarray"), Drawing() if figures else nullcontext() as drawing:
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
         from finger_pin.views.summary import summarize
 
-        gc.enable()
-
-        loaded = load_scenario(scenario, changed)
+        loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
         output = output or Path("results", default_name(loaded, settings, duration, method))
         if check:
             tightened(loaded)
@@ -85,6 +84,19 @@ def simulate(
             show(result)
 
 
+def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
+    """Return a scenario that moves the hand of a MuJoCo model, and say what of the model is not carried over."""
+    from finger_pin.description.exercise import exercise
+    from finger_pin.description.loading import read_scenario
+    from finger_pin.mechanism.from_mujoco import from_mujoco
+
+    description = from_mujoco(path, path.stem)
+    assert description.tree is not None
+    if not quiet and description.tree.left_out:
+        print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
+    return read_scenario(exercise(description), changed)
+
+
 def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
     """Return the name of the folder of results: the scenario's, and of what was overridden besides it."""
     short = [f"{name}={text}" for name, text in (("duration", duration), ("method", method)) if text is not None]
@@ -98,6 +110,7 @@ def compute(
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.simulate import simulate
 
+    load_numba()
     if live:
         from finger_pin.views.viewer import LiveView
 
@@ -128,7 +141,7 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
     """Draw animation and figures, all or none; return what went wrong if anything did."""
     try:
         if drawing is not None:
-            drawing.start(folder.stage)
+            drawing.start(result, folder.stage / "figures")
         from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")
@@ -138,6 +151,8 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
         raise
     except (KeyboardInterrupt, Exception) as error:
         # A result is worth more than its pictures.
+        if drawing is not None:
+            drawing.stop()
         folder.discard_views()
         if isinstance(error, KeyboardInterrupt):
             return error
@@ -148,12 +163,13 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
 
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
-    from finger_pin.description.loading import list_fingers, list_motors, list_scenarios
+    from finger_pin.description.loading import list_fingers, list_hands, list_motors, list_scenarios
     from finger_pin.description.scenario import METHODS
 
     tables = {
         "Scenarios": list_scenarios(),
         "Fingers": list_fingers(),
+        "Hands": list_hands(),
         "Motors": list_motors(),
         "Methods": dict.fromkeys(METHODS, ""),
     }

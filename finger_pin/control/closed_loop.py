@@ -10,20 +10,25 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.hand import HandController, joined_controller
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
+from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
-from finger_pin.description.scenario import AXES, Scenario
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.state import State
 
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
@@ -38,13 +43,17 @@ Samples = tuple[ArrayLike, ArrayLike]
 class Dynamics(Protocol):
     """Anything that evaluates a finger: `Finger`, or the compiled core."""
 
-    def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
-        """Return all signals at packed states under given tensions."""
+    def evaluate(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return all signals at packed states under given tensions, on a base that moves or rests."""
 
-    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+    def powers(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return powers of the rows, and J^T F."""
 
-    def motion(self, position: Array, velocity: Array) -> Motion:
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body."""
 
 
@@ -65,11 +74,14 @@ class ClosedLoop:
         finger: The finger.
         controller: Turns reference and motion into tensions.
         reference: The desired motion.
-        fingertip_force: F, or what is constant of it, shape (3,), N, base frame.
+        fingertip_force: F, or what is constant of it, shape (3,), of several fingers (f, 3), N, base frame.
         dynamics: What evaluates the finger.
-        varying_force: What varies of F, three signals, N; None for nothing.
+        varying_force: What varies of F, three signals for each finger, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
         drives: Of motors in position drive; None without any.
+        parts: Of a hand whose controller and reference are the scenario's, the loops of its fingers, each alone on the
+            palm; otherwise none.
+        palm: Along which path the palm of a hand moves; None at rest.
     """
 
     finger: Finger
@@ -80,6 +92,8 @@ class ClosedLoop:
     varying_force: Signal | None = None
     start: Array | None = None
     drives: PositionDrives | None = None
+    parts: tuple[ClosedLoop, ...] = ()
+    palm: PalmPath | None = None
 
     @classmethod
     def from_scenario(
@@ -97,33 +111,45 @@ class ClosedLoop:
             controller: Replaces its controller: an object, or times (m,), s, and tensions (m, a), N.
             reference: Replaces its reference: an object, or times (m,), s, and angles (m, k), rad, one column for each
                 of the k joints that no passive tendon drives.
-            fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame.
+            fingertip_force: Replaces F: times (m,), s, and forces (m, 3), N, base frame; (m, 3 f) of several fingers.
             finger: Replaces the finger that its description makes, such as one with rows of its own.
 
         Raises:
             InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
                 or are not finite, or tensions are negative.
         """
-        finger, start = finger or Finger(scenario.finger), scenario.simulation.start_time
+        start, scenarios = scenario.simulation.start_time, scenario.parts()
+        parts: tuple[ClosedLoop, ...] = ()
+        if len(scenarios) > 1 and all(each is None for each in (controller, reference, fingertip_force, finger)):
+            parts = tuple(cls.from_scenario(each) for each in scenarios.values())
+            routing = Routing.from_description(scenario.finger)
+            controller = joined_controller([part.controller for part in parts], routing)
+        finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),
         ):
             if own != tuple(described):
                 raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
+        acting = {name: part.environment for name, part in scenarios.items()}
+        alone = len(acting) == 1
         loop = cls(
             finger=finger,
             controller=_controller(controller, scenario, finger),
             reference=_reference(reference, scenario, finger.routing),
-            fingertip_force=np.array(scenario.environment.fingertip_force),
+            fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
+            # Fingers that may touch something are not apart.
+            parts=parts if finger.surroundings is None else (),
+            palm=PalmPath.of(scenario.hand, start),
         )
-        signals = scenario.environment.fingertip_force_signal
+        signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
-            force = Signal.from_samples("fingertip_force", fingertip_force, AXES)
-            loop = replace(loop, fingertip_force=np.zeros(3), varying_force=force.later(start))
-        elif signals:
-            force = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES])
+            columns = AXES if alone else [f"{name}.{axis}" for name in acting for axis in AXES]
+            force = Signal.from_samples("fingertip_force", fingertip_force, columns)
+            loop = replace(loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.later(start))
+        elif any(signals):
+            force = Signal.from_settings([each.get(axis, ForceSignal()) for each in signals for axis in AXES])
             loop = replace(loop, varying_force=force.later(start))
         initial = scenario.simulation.initial
         if initial is not None:
@@ -144,6 +170,11 @@ class ClosedLoop:
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
 
+    def compiled(self) -> ClosedLoop:
+        """Return the same loop, whose finger is evaluated by the compiled core."""
+        parts = tuple(part.compiled() for part in self.parts)
+        return replace(self, dynamics=CompiledFinger(self.finger), parts=parts)
+
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""
         if self.start is not None:
@@ -152,16 +183,23 @@ class ClosedLoop:
         return self.rest_state(position, np.zeros_like(position))
 
     def force(self, time: Array | float) -> Array:
-        """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame."""
+        """Return F at one time, shape (3,), or at times of shape (m,), (m, 3) if it varies; N, base frame.
+
+        Of several fingers shapes are (f, 3) and (m, f, 3).
+        """
         if self.varying_force is None:
             return self.fingertip_force
-        return np.asarray(self.fingertip_force + self.varying_force.at(time)[0])
+        varying = self.varying_force.at(time)[0]
+        return np.asarray(self.fingertip_force + varying.reshape(*np.shape(time), *self.fingertip_force.shape))
 
     def knots(self) -> Array:
         """Return the times at which a signal may have a kink or a jump, s, in order."""
         owners = (self.reference, self.controller)
         signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
-        found = [each.knots for each in (*signals, self.varying_force) if each and not each.is_harmonic]
+        if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
+            signals.append(self.controller.fingertip.wanted)
+        signals += [each for each in (self.varying_force, self.palm and self.palm.signal) if each]
+        found = [each.knots for each in signals if not each.is_harmonic]
         return np.unique(np.concatenate([np.zeros(0), *found]))
 
     def longest_step(self) -> float:
@@ -176,21 +214,33 @@ class ClosedLoop:
         command = self._command(time, control)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
+        finger = self.dynamics.evaluate(x, command, self.force(time), self.base(time))
+        return LoopSignals(reference, control, finger)
+
+    def base(self, time: Array | float) -> Array | None:
+        """Return how the palm moves at one time, shape (27,), or at times of shape (m,), (m, 27); None at rest."""
+        return None if self.palm is None else self.palm.base(time)
+
+    def motion(self, time: Array, state: State) -> Motion:
+        """Return fingertips and energies at times (m,) and states, in the world: the base frame of a palm at rest."""
+        found = self.dynamics.motion(state.position, state.velocity, self.base(time))
+        if self.palm is None:
+            return found
+        return self.palm.to_world(time, found, self.finger.rigid_body.mass)
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:
-        """Return the inputs of the finger: tensions, and voltages of motors in position drive."""
+        """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
         command = control.tension[..., : self.finger.routing.actuated]
         if self.drives is not None:
             command = command.copy()
             command[..., self.drives.channels] = self.drives.voltages(time)
-        return command
+        return command if control.inputs is None else np.concatenate([command, control.inputs], axis=-1)
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
         state, reference = self.finger.layout.unpack(x), self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time))
+        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time), self.base(time))
         joints = state.velocity.shape[-1]
         fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)
@@ -205,7 +255,8 @@ def _controller(given: Controller | Samples | None, scenario: Scenario, finger: 
         return build_controller(scenario, finger)
     if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    if isinstance(given, ProportionalController | CompensatedController | PassiveTensionLoop):
+    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
+    if isinstance(given, own | RoutedController):
         return given
     kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
     return kind(given, finger.routing, scenario.simulation.start_time)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.control.distribution import Distribution, Plan
+from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.joint_compensation import JointCompensation
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
@@ -33,6 +34,7 @@ class CompensatedController:
         minimum: f0, shape (t,), N.
         tendons: Compensates tendon friction; None to leave it.
         joints: Compensates joint friction; None to leave it.
+        fingertip: What the fingertip is to exert besides; None for nothing.
     """
 
     routing: Routing
@@ -41,18 +43,21 @@ class CompensatedController:
     minimum: Array
     tendons: TendonFeedforward | None = None
     joints: JointCompensation | None = None
+    fingertip: FingertipForce | None = None
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return the torque that is asked of the tendons and the commands, for shapes (..., n)."""
-        return self.command_above(self.minimum, reference, position, velocity)
+        return self.command_above(self.minimum, time, reference, position, velocity)
 
     def command_above(
-        self, minimum: Array, reference: ReferenceSignals, position: Array, velocity: Array
+        self, minimum: Array, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
         """Return the commands with another minimum f0, shape (t,), N."""
         wanted = self.law.torque(reference, position, velocity)
+        if self.fingertip is not None:
+            wanted = wanted + self.fingertip.torque(time, position)
         plan = self.distribution.plan(wanted, minimum)
         if self.tendons is not None or self.joints is not None:
             if self.joints is not None:

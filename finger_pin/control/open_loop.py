@@ -12,7 +12,7 @@ from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 
@@ -24,7 +24,7 @@ class OpenLoopTensions:
     The torque that goes with it is what it would exert free of friction; passive tensions are planned to be zero.
 
     Attributes:
-        signal: A signal for each of the a actuated tendons, N.
+        signal: A signal for each of the a actuated tendons, N, then for each actuator of a tree.
         routing: The routing.
     """
 
@@ -36,10 +36,12 @@ class OpenLoopTensions:
         """Read ``controller.tensions``; a tendon without any is held at its minimum tension."""
         given = scenario.controller.tensions or {}
         least = expand(scenario.controller.minimum_tension, len(routing.tendons))
-        settings = [
+        settings: list[SignalSettings] = [
             given.get(name, ForceSignal(offset=float(tension)))
             for name, tension in zip(routing.tendons[: routing.actuated], least, strict=False)
         ]
+        driven = scenario.controller.inputs or {}
+        settings += [driven.get(name, InputSignal()) for name in _actuators(scenario)]
         return cls(Signal.from_settings(settings).later(scenario.simulation.start_time), routing)
 
     @classmethod
@@ -48,14 +50,17 @@ class OpenLoopTensions:
     ) -> OpenLoopTensions:
         """Return the tensions through samples: times, shape (m,), s, and tensions, shape (m, a), N.
 
+        Inputs of a tree's actuators follow in further columns.
+
         Raises:
             InputError: If shapes or numbers are wrong, or a tension is negative.
         """
-        signal = Signal.from_samples("controller", samples, routing.tendons[: routing.actuated])
-        if np.min(samples[1]) < 0.0:
-            raise InputError(
-                "controller", "tensions must not be negative: a tendon only pulls", float(np.min(samples[1]))
-            )
+        signal = Signal.from_samples(
+            "controller", samples, (*routing.tendons[: routing.actuated], *_actuators(scenario))
+        )
+        least = float(np.min(np.asarray(samples[1])[:, : routing.actuated], initial=0.0))
+        if least < 0.0:
+            raise InputError("controller", "tensions must not be negative: a tendon only pulls", least)
         return cls(signal.later(scenario.simulation.start_time), routing)
 
     def command(
@@ -63,6 +68,15 @@ class OpenLoopTensions:
     ) -> ControlSignals:
         """Return the tensions at one time, or at times of shape (m,)."""
         # Rounding may take what is at zero below it.
-        pulled = np.maximum(self.signal.at(time)[0], 0.0)
+        given, actuated = self.signal.at(time)[0], self.routing.actuated
+        pulled = np.maximum(given[..., :actuated], 0.0)
         planned = np.zeros((*pulled.shape[:-1], self.routing.passive))
-        return ControlSignals(pulled @ self.routing.actuated_coupling, np.concatenate([pulled, planned], axis=-1))
+        return ControlSignals(
+            pulled @ self.routing.actuated_coupling,
+            np.concatenate([pulled, planned], axis=-1),
+            inputs=given[..., actuated:],
+        )
+
+
+def _actuators(scenario: Scenario) -> tuple[str, ...]:
+    return tuple(scenario.finger.tree.actuators) if scenario.finger.tree else ()

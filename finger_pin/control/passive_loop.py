@@ -58,4 +58,4 @@ class PassiveTensionLoop(MeasuringController):
         actuated = self.controller.routing.actuated
         minimum = self.controller.minimum.copy()
         minimum[actuated:] = np.maximum(minimum[actuated:], self.wish + self.correction)
-        return self.controller.command_above(minimum, reference, position, velocity)
+        return self.controller.command_above(minimum, time, reference, position, velocity)

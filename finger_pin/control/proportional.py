@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array, Routing
@@ -22,11 +23,13 @@ class ControlSignals:
         torque: tau^d, shape (..., n), N m.
         tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
         shortfall: What tension limits keep from being exerted of tau^d, shape (..., n), N m; None without limits.
+        inputs: Of the actuators of a tree, shape (..., k); None without any.
     """
 
     torque: Array
     tension: Array
     shortfall: Array | None = None
+    inputs: Array | None = None
 
 
 class Controller(Protocol):
@@ -50,6 +53,7 @@ class ProportionalController:
         inverse: Pseudo-inverse of H_c^T, shape (t, n), 1/m.
         internal: f^k, shape (t,), internal tensions with the largest entry 1.
         damping: K_D, shape (n,), N m s/rad.
+        loop: The finger that each tendon belongs to, shape (t,): each has a lambda of its own; one for all by default.
     """
 
     gain: Array
@@ -57,6 +61,7 @@ class ProportionalController:
     inverse: Array
     internal: Array
     damping: Array
+    loop: NDArray[np.int64] | None = None
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> ProportionalController:
@@ -82,5 +87,10 @@ class ProportionalController:
         torque = proportional_torque(self.gain, reference.position, position)
         torque = torque + self.damping * (reference.velocity - velocity)
         minimal = torque @ self.inverse.T
-        level = np.max(internal_level(self.minimum, minimal, self.internal), axis=-1, keepdims=True)
+        levels = internal_level(self.minimum, minimal, self.internal)
+        if self.loop is None:
+            level = np.max(levels, axis=-1, keepdims=True)
+        else:
+            fingers = [np.max(levels[..., self.loop == each], axis=-1) for each in range(int(self.loop.max()) + 1)]
+            level = np.stack(fingers, axis=-1)[..., self.loop]
         return ControlSignals(torque, minimal + level * self.internal)

@@ -24,6 +24,8 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+# Where compiled code stands.
+_COMPILED = ("core/*.py", "laws/*.py", "mechanism/pieces.py", "mechanism/spans/*.py", "mechanism/gaps/*.py")
 _LOGGER = logging.getLogger("finger_pin")
 
 
@@ -34,7 +36,7 @@ def _root() -> str:
 def _digest() -> str:
     package = Path(__file__).parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted([*package.glob("core/*.py"), *package.glob("laws/*.py")]):
+    for source in sorted([path for room in _COMPILED for path in package.glob(room)]):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import inputs, tip_forces
+from finger_pin.core.inputs import inputs, move_base, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
+from finger_pin.core.paths import measure_paths, passes, push
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.tables import BENT, END, FED, FIRST, PRESSED, STATEFUL
 
@@ -54,6 +55,8 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
         pull = -load * value
         for t in range(tables.tip_body.size):
             pull += tables.carried[t, body] * tables.tip_force[t, r]
+        for e in range(tables.paths.columns.size):
+            pull += passes(tables.paths, e, body) * work.paths.push[e, r]
         work.pull[k, r] = pull
         total += pull * pull
     return np.sqrt(total)
@@ -79,21 +82,22 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         for k in range(begin, end):
-            length, speed = tables.offset[k], 0.0
+            length, speed = tables.offset[k] + work.paths.length[k], 0.0
             for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
                 j = tables.arm_at[e]
-                length += work.measure[e] * q[j]
+                length += tables.measure[e] * q[j]
                 speed += work.arm[e] * v[j]
             rows[LENGTH, k], rows[SPEED, k] = length, speed
         if tables.groups[g, BENT]:
             for k in range(begin, end):
-                curvature = tables.curvature_offset[k]
+                curvature = tables.curvature_offset[k] + work.paths.turn[k]
                 for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
                     curvature += tables.bend[e] * abs(q[tables.bend_at[e]])
                 rows[CURVATURE, k] = curvature
         if tables.groups[g, STATEFUL]:
             for k in range(begin, end):
-                rows[STATE, k] = z[tables.state[k]]
+                if tables.state[k] >= 0:
+                    rows[STATE, k] = z[tables.state[k]]
         if tables.groups[g, FED]:
             for k in range(begin, end):
                 command = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
@@ -102,7 +106,7 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
         if tables.groups[g, PRESSED]:
             for k in range(begin, end):
                 load = _sum_of_terms(tables, tables.load_start[k], tables.load_start[k + 1], work)
-                if tables.loaded and tables.pins[k] >= 0:
+                if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
                     rows[LOAD, k] = _pin_load(tables, k, load, work)
                 else:
                     work.pull[k, 0] = load
@@ -114,7 +118,10 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
                 work.torque[tables.arm_at[e]] += work.arm[e] * force
         if tables.groups[g, STATEFUL]:
             for k in range(begin, end):
-                rate[tables.state[k]] = rows[RATE, k]
+                if tables.state[k] >= 0:
+                    rate[tables.state[k]] = rows[RATE, k]
+        if tables.touch[begin] > 0:
+            push(tables, work)
 
 
 @compiled
@@ -123,10 +130,12 @@ def evaluate(tables: Any, control: Any, time: float, x: Any, work: Any, rate: An
     size, width = tables.parents.size, work.torque.size
     q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
     inputs(control, time, q, v, work.command)
+    move_base(control, time, tables, work)
     move(tables, q, v, work)
     if tables.loaded:
         tip_forces(control, time, tables)
         _tips(tables, work)
+    measure_paths(tables, work)
     _exert(tables, q, v, z, work, rate[2 * width :])
     mass_matrix(tables, work)
     factorise_mass(size, work)

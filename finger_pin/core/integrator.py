@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.charts import angular_velocity
@@ -35,10 +37,10 @@ class Held(Protocol):
 class _Recorder:
     """Carries one island forward and keeps its steps."""
 
-    def __init__(self, part: Part, chunk: int) -> None:
-        self.part = part
-        self.chunk = chunk
-        self.start = (part.x.copy(), part.attitude.copy())
+    def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
+        self._stepper, self._index = stepper, index
+        part = self.part
+        self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.kept = [part.room(0)]
         self.room = part.room(chunk)
         self.taken = 0
@@ -56,6 +58,11 @@ class _Recorder:
         return core.DONE
 
     @property
+    def part(self) -> Part:
+        """The island; a stepper that is loaded on the way replaces it."""
+        return self._stepper.parts[self._index]
+
+    @property
     def full(self) -> bool:
         """Whether no more steps can be kept."""
         return self.taken >= self.most
@@ -71,6 +78,7 @@ class _Steps:
     """The steps of one island, from a start; angles of free bodies begin anew at each."""
 
     part: Part
+    begin: float
     start: Array
     attitude: Array
     record: Record
@@ -78,7 +86,7 @@ class _Steps:
     @property
     def times(self) -> Array:
         """Ends of the steps with the start first."""
-        return np.concatenate([[0.0], self.record.times])
+        return np.concatenate([[self.begin], self.record.times])
 
     def interpolate(self, at: Array) -> tuple[Array, Array]:
         """Return states at times, shape (m, size), and the quaternions from which angles count, shape (m, f, 4)."""
@@ -109,24 +117,27 @@ def integrate_compiled(
     knots: Array | None = None,
     watch: Watch | None = None,
     chunk: int = 256,
+    together: bool = False,
     stop: Stop | None = None,
 ) -> Trajectory:
-    """Integrate from time zero with the compiled core, every island with steps of its own.
+    """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
 
     Args:
         stepper: Where to start, with which method and tolerances.
-        duration: s.
+        duration: Time of the end, s.
         names: Names of the numbers of the state, for messages.
         held: A controller that holds its tensions in between.
         knots: Times at which an input may jump, in order, s: steps end there.
-        watch: Called with the simulated time and the state after every chunk of steps.
+        watch: Called with the simulated time that all have reached and the state after every chunk of steps.
         chunk: Most steps between two calls.
+        together: Whether islands stop at the same times to be watched, which cuts some of their steps; otherwise a
+            state that is watched has each where it has got to.
         stop: Asked now and then; true ends the integration there.
     """
     # Advancing by nothing compiles, which is no part of an integration's cost.
     stepper.advance(stepper.time)
     began = time.perf_counter()
-    recorders = [_Recorder(part, chunk) for part in stepper.parts]
+    recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     alone = len(recorders) == 1
     reason, interrupted = "", False
     knotted = set(() if knots is None else knots[(knots > 0.0) & (knots < duration)].tolist())
@@ -137,15 +148,13 @@ def integrate_compiled(
             if stepper.time >= held.instant:
                 stepper.hold(held.act(stepper.x))
             end = min(end, held.instant)
-        elif not alone and watch is not None:
+        elif not alone and together:
             end = min(end, stepper.time + duration / _SLICES)
         # At a knot itself the value after the jump counts: a step that ends there must not see it.
         jump = end in knotted
         goal = float(np.nextafter(end, 0.0)) if jump else end
-        if alone:
-            statuses = [recorders[0].advance(goal, 1)]
-        else:
-            statuses = in_threads(partial(_Recorder.advance, end=goal), recorders)
+        chunks = -1 if together and not alone else 1
+        statuses = in_threads(partial(_Recorder.advance, end=goal, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
             places = stepper.places(recorder.part.island)
             reason = reason or failure(recorder.part, status, [names[at] for at in places])
@@ -181,4 +190,14 @@ def integrate_compiled(
         interrupted=interrupted,
         # Of a controller that acts in between, the linearised flow knows nothing.
         estimated_error=np.nan if held is not None or stepper.driven else stepper.estimated_error,
+        islands=()
+        if alone or any(len(each.attitude) for each in steps)
+        else tuple(_apart(each, stepper) for each in steps),
     )
+
+
+def _apart(steps: _Steps, stepper: Stepper) -> tuple[NDArray[np.int64], Array, Callable[[Array], Array]]:
+    """Return an island's places in the whole, the ends of its steps up to where all have got, and its states."""
+    times = steps.times
+    ends = np.unique(np.append(times[times < stepper.time], stepper.time))
+    return stepper.places(steps.part.island), ends, lambda at: steps.interpolate(at)[0]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.inputs import PLANNED, Control, Signal
+from finger_pin.core.path_tables import select_paths
 from finger_pin.core.tables import Tables
 
 Indices = NDArray[np.int64]
@@ -123,6 +124,8 @@ def select(tables: Tables, island: Island) -> Tables:
         arm=tables.arm[arms],
         measure=tables.measure[arms],
         state=state,
+        touch=tables.touch[rows],
+        touching=bool(tables.touch[rows].any()),
         channel=_mapped(channel, tables.channel[rows]),
         input_start=input_start,
         load_start=len(inputs) + load_start,
@@ -134,6 +137,7 @@ def select(tables: Tables, island: Island) -> Tables:
         bend_at=coordinate[tables.bend_at[bends]],
         bend=tables.bend[bends],
         curvature_offset=tables.curvature_offset[rows],
+        paths=select_paths(tables.paths, rows, bodies, lambda old: _mapped(body, old), _entries),
     )
 
 

@@ -16,7 +16,7 @@ from numba import types
 from numba.extending import intrinsic as _numba_intrinsic
 
 from finger_pin.core.compilation import address_of, compiled
-from finger_pin.laws.law import Law, Row
+from finger_pin.laws.law import ContactLaw, Law, Row, Touch
 
 # Typed as what it makes of a function: one that compiled code calls without the typing context.
 _intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsic
@@ -42,14 +42,17 @@ class Addresses(NamedTuple):
 
 
 @cache
-def addresses(law: Law) -> Addresses:
+def addresses(law: Law | ContactLaw) -> Addresses:
     """Return where a law's functions are, compiled; they live as long as the process."""
+    value, slopes, account = (
+        (_value, _slopes, _account) if law.arms == 1 else (_contact_value, _contact_slopes, _contact_account)
+    )
     return Addresses(
-        _address(law, _value, law.value), _address(law, _slopes, law.slopes), _address(law, _account, law.account)
+        _address(law, value, law.value), _address(law, slopes, law.slopes), _address(law, account, law.account)
     )
 
 
-def widest(laws: Sequence[Law]) -> tuple[int, int]:
+def widest(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
     """Return how many columns the table of rows and that of energies and powers need."""
     powers = max((len(law.supplies) + len(law.losses) for law in laws), default=0)
     return SIGNALS + max((len(law.signals) for law in laws), default=0), 1 + powers
@@ -65,7 +68,7 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
 
 
-def _address(law: Law, template: Callable[..., Any], function: Callable[..., Any]) -> int:
+def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Callable[..., Any]) -> int:
     assert isinstance(template, FunctionType)
     world = {
         **template.__globals__,
@@ -77,7 +80,7 @@ def _address(law: Law, template: Callable[..., Any], function: Callable[..., Any
     # Numba names what it keeps on disk after this.
     twin.__qualname__ = f"{template.__name__}[{function.__module__}.{function.__qualname__}]"
     pointer, index = types.CPointer(types.float64), types.int64  # type: ignore[no-untyped-call]
-    tables = 2 if template is _value else 3
+    tables = 2 if template in (_value, _contact_value) else 3
     kept = function.__module__.startswith("finger_pin.laws.")
     return address_of(types.void(*[pointer] * tables, index, index, index), twin, kept=kept)
 
@@ -139,6 +142,48 @@ def _account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end
         force, rate = _numbers(table, FORCE * stride + k, stride, 2)
         found = _law(_seen(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), force, rate, signals)
         _put(filled, k, stride, found)
+
+
+@compiled
+def _touched(table: Any, stride: int, k: int) -> Any:
+    gap, speed, state_1, state_2, side = (
+        table[LENGTH * stride + k],
+        table[SPEED * stride + k],
+        table[STATE * stride + k + 1],
+        table[STATE * stride + k + 2],
+        table[SIDE * stride + k],
+    )
+    return Touch(gap, speed, table[SPEED * stride + k + 1], table[SPEED * stride + k + 2], state_1, state_2, side)
+
+
+def _contact_value(table: Any, numbers: Any, stride: int, begin: int, end: int) -> None:
+    for k in range(begin, end, 3):
+        found = _law(_touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS))
+        _put(table, FORCE * stride + k, 1, found[:3])
+        _put(table, RATE * stride + k + 1, 1, found[3:5])
+        _put(table, SIGNALS * stride + k, stride, found[5:])
+
+
+def _contact_slopes(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+    # The slopes of forces stand in the columns of their rows, those of the states' rates below.
+    for k in range(begin, end, 3):
+        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
+        normal, first, second, rate_1, rate_2 = _law(
+            _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS), signals
+        )
+        _put(filled, k, stride, normal)
+        _put(filled, k + 1, stride, first)
+        _put(filled, k + 2, stride, second)
+        _put(filled, R_LENGTH * stride + k + 1, stride, rate_1)
+        _put(filled, R_LENGTH * stride + k + 2, stride, rate_2)
+
+
+def _contact_account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end: int) -> None:
+    for k in range(begin, end, 3):
+        signals = _numbers(table, SIGNALS * stride + k, stride, _COUNT)
+        forces, rates = _numbers(table, FORCE * stride + k, 1, 3), _numbers(table, RATE * stride + k + 1, 1, 2)
+        touch, own = _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS)
+        _put(filled, k, stride, _law(touch, own, forces, rates, signals))
 
 
 def _call(context: Any, builder: Any, signature: Any, arguments: Any, tables: int) -> Any:

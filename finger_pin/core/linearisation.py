@@ -10,7 +10,8 @@ from finger_pin.core.binding import Indices, Matrix, Vector
 from finger_pin.core.compilation import compiled
 from finger_pin.core.inputs import input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
-from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
+from finger_pin.core.paths import linearise_paths, passes, turn_pushes
+from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, bias_rate, inverse_dynamics
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.tables import END, FIRST, Tables
 
@@ -25,8 +26,10 @@ class Linear(NamedTuple):
         mass: M with the lumps, shape (N, N).
         by_position: d(M a + h - J^T F)/dq at the actual acceleration, shape (N, N).
         by_velocity: dh/dv, shape (N, N).
-        arm: As in the tables, shape (arms,).
-        measure: As in the tables, shape (arms,).
+        bias_rate: dh/dt by the motion of the base, shape (N,).
+        arm: dl'/dv, shape (arms,).
+        measure: dl/dq, shape (arms,).
+        turning: dl'/dq at constant v, shape (arms,).
         bend: d(curvature)/dq, as in the tables, shape (bends,).
         load_slope: dN/dS, S the sum of earlier forces, shape (K,).
         load_by_position: dN/dq at constant S, shape (K, N).
@@ -44,8 +47,10 @@ class Linear(NamedTuple):
     mass: Matrix
     by_position: Matrix
     by_velocity: Matrix
+    bias_rate: Vector
     arm: Vector
     measure: Vector
+    turning: Vector
     bend: Vector
     load_slope: Vector
     load_by_position: Matrix
@@ -73,8 +78,10 @@ def build_linear(tables: Tables) -> Linear:
         mass=mass,
         by_position=np.zeros((width, width)),
         by_velocity=np.zeros((width, width)),
+        bias_rate=np.zeros(width),
         arm=tables.arm.copy(),
         measure=tables.measure.copy(),
+        turning=np.zeros(len(tables.arm)),
         bend=tables.bend.copy(),
         load_slope=np.zeros(count),
         load_by_position=np.zeros((count, width)),
@@ -118,7 +125,7 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
     axes = work.spatial[AXIS]
     for k in range(tables.pins.size):
         body = tables.pins[k]
-        if not tables.loaded or body < 0:
+        if not (tables.loaded or tables.touching) or body < 0:
             # `evaluate` has left the sum itself here.
             linear.load_slope[k] = np.sign(work.pull[k, 0])
             continue
@@ -133,6 +140,11 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
             x -= tables.carried[t, body] * tables.tip_force[t, 0]
             y -= tables.carried[t, body] * tables.tip_force[t, 1]
             z -= tables.carried[t, body] * tables.tip_force[t, 2]
+        for c in range(tables.paths.columns.size):
+            passing = passes(tables.paths, c, body)
+            x -= passing * work.paths.push[c, 0]
+            y -= passing * work.paths.push[c, 1]
+            z -= passing * work.paths.push[c, 2]
         linear.load_by_time[k] = 0.0
         for t in range(tables.tip_body.size):
             for r in range(3):
@@ -146,6 +158,8 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
                 pull[0] * (a[1] * z - a[2] * y) + pull[1] * (a[2] * x - a[0] * z) + pull[2] * (a[0] * y - a[1] * x)
             ) / size
             j = tables.parents[j]
+        if tables.touching:
+            turn_pushes(tables, work, k, size, linear.load_by_position[k])
 
 
 @compiled
@@ -161,14 +175,17 @@ def linearise(tables: Any, control: Any, time: float, x: Any, work: Any, linear:
             linear.mass[i, j] = work.square[MASS_MATRIX, i, j]
             linear.by_position[i, j] = work.square[BY_POSITION, i, j]
             linear.by_velocity[i, j] = work.square[BY_VELOCITY, i, j]
+    if control.palm.harmonics.shape[0] > 0:
+        bias_rate(tables, velocity, work, linear.bias_rate)
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
     if tables.loaded:
         tip_force_rates(control, time, work.force_rate)
-    _load_slopes(tables, work, linear)
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
+    linearise_paths(tables, velocity, work, linear)
+    _load_slopes(tables, work, linear)

@@ -22,7 +22,7 @@ from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables, build_work
 from finger_pin.description.routing import Array
-from finger_pin.laws.law import Law
+from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import Mechanism
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
@@ -78,7 +78,7 @@ class Part:
     def __init__(
         self,
         island: Island,
-        laws: list[Law],
+        laws: Sequence[Law | ContactLaw],
         tables: Tables,
         control: Control,
         x: Array,
@@ -200,12 +200,13 @@ class Stepper:
             x: Packed state, shape (mechanism.size,).
             tableau: The method.
             rtol: Relative tolerance.
-            atol: Absolute tolerances, shape (2 N + states,).
+            atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
         tables = build_tables(mechanism)
         tables.tip_force[:] = 0.0 if force is None else force
+        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         laws = [table.law for table in mechanism.rows]
         self._width = mechanism.coordinates
@@ -231,7 +232,7 @@ class Stepper:
                     attitude[free].copy(),
                     tableau,
                     float(rtol),
-                    np.asarray(atol, dtype=float)[at].copy(),
+                    tolerances[at].copy(),
                     memory,
                 )
             )

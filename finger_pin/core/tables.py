@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.law_code import CURVATURE, SIGNALS, SLOPES, addresses, widest
+from finger_pin.core.path_tables import Paths, PathWork, build_path_work, reached, read_paths
 from finger_pin.core.rigid_body import (
+    ARMATURE,
     BODY_COLUMNS,
     CENTRE,
     INERTIA,
@@ -25,7 +27,7 @@ from finger_pin.core.rigid_body import (
 )
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.laws.law import Law
+from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import FREE_JOINTS
 
@@ -64,6 +66,8 @@ class Tables(NamedTuple):
         arm: Torque per force there, shape (arms,).
         measure: dl/dq there, shape (arms,).
         state: Index of each row's state in z, -1 without one, shape (K,).
+        touch: 1 for the first of the three rows of a contact, 2 for the others, 0 for all else, shape (K,).
+        touching: Whether any row is a contact's.
         channel: Index of its input from outside, -1 without one, shape (K,).
         input_start: Where the terms of its input from earlier rows begin in ``terms``, shape (K + 1,).
         load_start: Where those of its load begin, shape (K + 1,).
@@ -75,6 +79,7 @@ class Tables(NamedTuple):
         bend_at: Coordinates that bend its path, shape (bends,).
         bend: Curvature per |q| there, shape (bends,).
         curvature_offset: Shape (K,).
+        paths: Pieces of paths through space.
     """
 
     parents: Indices
@@ -100,6 +105,8 @@ class Tables(NamedTuple):
     arm: Vector
     measure: Vector
     state: Indices
+    touch: Indices
+    touching: bool
     channel: Indices
     input_start: Indices
     load_start: Indices
@@ -111,16 +118,20 @@ class Tables(NamedTuple):
     bend_at: Indices
     bend: Vector
     curvature_offset: Vector
+    paths: Paths
 
 
 class Work(NamedTuple):
     """Memory of one evaluation and its linearisation; never holds anything between calls.
 
     Attributes:
+        base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
+        base_rate: Their rates, shape (2, 6).
         rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
         slopes: Derivatives of the laws, shape (SLOPES, K).
         powers: Stored energy and powers of the rows, shape (1 + powers, K).
-        arm, measure: As in the tables, shape (arms,); those that depend on the posture are filled in.
+        arm: As in the tables, shape (arms,), with what paths through space add.
+        gradient: dl/dq there, with what they add, shape (arms,).
         pull: Total force on the pin of each row, shape (K, 3), N.
         lever: The pin's link direction, shape (K, 3).
         tip: Positions of the tips, shape (t, 3), m.
@@ -134,7 +145,9 @@ class Work(NamedTuple):
     origin: Matrix
     frame: Matrix
     centre: Vector
+    base_velocity: Vector
     base_acceleration: Vector
+    base_rate: Matrix
     spatial: Layers
     inertia: Matrix
     composite: Matrix
@@ -145,7 +158,7 @@ class Work(NamedTuple):
     slopes: Matrix
     powers: Matrix
     arm: Vector
-    measure: Vector
+    gradient: Vector
     pull: Matrix
     lever: Matrix
     tip: Matrix
@@ -156,6 +169,7 @@ class Work(NamedTuple):
     bias: Vector
     acceleration: Vector
     command: Vector
+    paths: PathWork
 
 
 class _Body(NamedTuple):
@@ -206,6 +220,7 @@ def _read(mechanism: Mechanism) -> Tables:
             parents[i], kinds[i] = above, part.kind
             bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
             bodies[i, TRANSLATION : TRANSLATION + 3] = translation
+            bodies[i, ARMATURE] = model.armature[i]
             above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
         inertia = model.inertias[joint]
         bodies[above, MASS] = inertia.mass
@@ -219,22 +234,27 @@ def _read(mechanism: Mechanism) -> Tables:
     tips = [model.frames[tip] for tip in body.tips]
     holders = [int(tip.parentJoint) for tip in tips]
     carriers = [body.carriers[joint] for joint in joint_of]
-    count = sum(len(table.names) for table in rows)
-    ends = np.cumsum([0, *(len(table.names) for table in rows)])
+    count = sum(table.count for table in rows)
+    ends = np.cumsum([0, *(table.count for table in rows)])
     first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
-    state = np.full(count, -1, dtype=np.int64)
+    state, touch = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
     parameters = np.zeros((max((len(table.law.parameters) for table in rows), default=0), count))
     for table, own, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
-        parameters[: len(table.parameters), begin:end] = table.parameters
-        if table.law.scale is not None:
-            state[begin:end] = np.arange(own.start, own.stop)
+        parameters[: len(table.parameters), begin : end : table.law.arms] = table.parameters
+        stateful = np.arange(begin, end)
+        if table.law.arms > 1:
+            touch[begin:end] = 2
+            touch[begin : end : table.law.arms] = 1
+            stateful = stateful[touch[begin:end] == 2]
+        if table.states:
+            state[stateful] = np.arange(own.start, own.stop)
     terms: list[int] = []
     weights: list[float] = []
     starts: list[list[int]] = []
     for wiring in ("inputs", "loads"):
         starts.append([len(terms)])
         for table in rows:
-            for k in range(len(table.names)):
+            for k in range(table.count):
                 for group, matrix in getattr(table, wiring).items():
                     found = np.flatnonzero(matrix[k])
                     terms.extend(first_row[group] + found)
@@ -246,8 +266,10 @@ def _read(mechanism: Mechanism) -> Tables:
         return np.concatenate([*none, *(getattr(table, name) for table in rows)])
 
     arm, measure, bends = stacked("arm"), stacked("measure"), stacked("bends")
-    arm_start, arm_rows, arm_at = _sparse((arm != 0.0) | (measure != 0.0))
-    bend_start, bend_rows, bend_at = _sparse(bends != 0.0)
+    paths = read_paths([path for table in rows for path in table.paths], parents, last, turns)
+    routed = reached(paths, count, mechanism.coordinates)
+    arm_start, arm_rows, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
+    bend_start, bend_rows, bend_at = _sparse((bends != 0.0) | routed)
     return Tables(
         parents=parents,
         kinds=kinds,
@@ -271,8 +293,8 @@ def _read(mechanism: Mechanism) -> Tables:
                 (
                     begin,
                     end,
-                    table.law.scale is not None,
-                    np.any(table.bends),
+                    table.states > 0,
+                    np.any(table.bends) or table.routed,
                     bool(table.inputs) or np.any(table.channels >= 0),
                     bool(table.loads) or np.any(table.pins >= 0),
                     SIGNALS + table.law.signals.index(table.law.kink) if table.law.kink else -1,
@@ -290,6 +312,8 @@ def _read(mechanism: Mechanism) -> Tables:
         arm=arm[arm_rows, arm_at],
         measure=measure[arm_rows, arm_at],
         state=state,
+        touch=touch,
+        touching=bool(touch.any()),
         channel=np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64),
         input_start=np.array(starts[0], dtype=np.int64),
         load_start=np.array(starts[1], dtype=np.int64),
@@ -301,10 +325,11 @@ def _read(mechanism: Mechanism) -> Tables:
         bend_at=bend_at,
         bend=bends[bend_rows, bend_at],
         curvature_offset=np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
+        paths=paths,
     )
 
 
-def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
+def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
     """Allocate the memory for tables whose rows follow some laws."""
     size, count = len(tables.parents), len(tables.state)
     width = size + len(tables.lumps)
@@ -319,7 +344,9 @@ def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
         origin=np.zeros((size, 3)),
         frame=np.zeros((3, 3)),
         centre=np.zeros(3),
+        base_velocity=np.zeros(6),
         base_acceleration=base,
+        base_rate=np.zeros((2, 6)),
         spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
         inertia=np.zeros((size, 10)),
         composite=np.zeros((size, 10)),
@@ -330,7 +357,7 @@ def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
         slopes=np.zeros((SLOPES, count)),
         powers=np.zeros((powers, count)),
         arm=tables.arm.copy(),
-        measure=tables.measure.copy(),
+        gradient=tables.measure.copy(),
         pull=np.zeros((count, 3)),
         lever=np.zeros((count, 3)),
         tip=np.zeros((tips, 3)),
@@ -341,6 +368,7 @@ def build_work(tables: Tables, laws: Sequence[Law], channels: int) -> Work:
         bias=np.zeros(width),
         acceleration=np.zeros(width),
         command=np.zeros(channels),
+        paths=build_path_work(tables.paths, count, width),
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 
@@ -42,6 +43,8 @@ class Trajectory:
         failure: What the integrator reported if it failed, otherwise empty.
         interrupted: Whether it was asked to stop.
         estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
+        islands: Where there are several, for each the indices of its numbers in the packed state, its own breakpoints,
+            and what maps times to its own packed states.
     """
 
     breakpoints: Array
@@ -50,6 +53,7 @@ class Trajectory:
     failure: str = ""
     interrupted: bool = False
     estimated_error: float = np.nan
+    islands: tuple[tuple[NDArray[np.int64], Array, Callable[[Array], Array]], ...] = ()
 
 
 class _Broken(Exception):

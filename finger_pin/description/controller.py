@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, field_serializer, field_validator
 
+from finger_pin.description.by_finger import flat, given, nested
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.signals import ForceSignal
+from finger_pin.description.signals import ForceSignal, InputSignal, of_axes
 from finger_pin.description.validation import (
     Description,
+    FullName,
     Name,
     Numbers,
     check_size,
@@ -99,6 +101,9 @@ class ControllerSettings(Description):
 
     With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
     columns are ``time`` and actuated tendons, and become samples of ``tensions``.
+
+    In a hand it is the controller of every finger, with what the finger's table in ``fingers`` has on top; only
+    ``sampling`` is the same for all.
     """
 
     file_keys = ("file",)
@@ -106,8 +111,11 @@ class ControllerSettings(Description):
     kind: Annotated[Literal["proportional", "tensions"], choice("proportional", "tensions")] = quantity(
         "proportional", unit="1", source="(19)", doc="Which controller; tensions: open loop."
     )
-    tensions: dict[Name, ForceSignal] | None = Field(
+    tensions: dict[FullName, ForceSignal] | None = Field(
         None, description="By actuated tendon; one without a signal is held at its minimum tension."
+    )
+    inputs: dict[Name, InputSignal] | None = Field(
+        None, description="By actuator of a tree; one without a signal has zero input."
     )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         1.0, unit="N m/rad", source="chosen", doc="K_P, one number or one per joint."
@@ -122,6 +130,9 @@ class ControllerSettings(Description):
         0.0, unit="N m s/rad", source="the paper has none", doc="K_D, one number or one per joint."
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
+    fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
+        None, description="What the fingertip is to exert besides, J^T F added to tau^d, by axis x, y, z of the base."
+    )
     spring_compensation: bool = Field(
         False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
     )
@@ -131,11 +142,11 @@ class ControllerSettings(Description):
     distribution: DistributionSettings | None = Field(None, description="Quadratic programme with tension limits.")
     sampling: SamplingSettings | None = Field(None, description="Sampled execution; continuous without it.")
 
-    @model_validator(mode="after")
-    def _sampled(self) -> Self:
-        if self.passive_tension_loop is not None and self.sampling is None:
-            raise problem("passive_tension_loop", "works from sample to sample: set controller.sampling.period too")
-        return self
+    fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, what differs there.")
+
+    _flat = field_validator("tensions", mode="before")(flat)
+    _nested = field_serializer("tensions", mode="wrap")(nested)
+    _sparse = field_serializer("fingers")(given)
 
     @property
     def is_paper(self) -> bool:
@@ -147,11 +158,14 @@ class ControllerSettings(Description):
             self.distribution,
         )
         plain = self.kind == "proportional" and not (self.gravity_compensation or self.spring_compensation)
-        return plain and all(each is None for each in added)
+        return plain and not self.fingertip_force and all(each is None for each in added)
 
 
 def check_controller(settings: ControllerSettings, finger: FingerDescription) -> None:
     """Raise the error of an entry that does not fit the finger, or another entry."""
+    if settings.passive_tension_loop is not None and settings.sampling is None:
+        entry = "controller.passive_tension_loop"
+        raise problem(entry, "works from sample to sample: set controller.sampling.period too")
     _check_tensions(settings, finger)
     joints, tendons = tuple(finger.joints), tuple(finger.tendons)
     of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
@@ -188,12 +202,19 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
         raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")
 
 
+_NOT_ROUTED = (
+    "tendon_friction_feedforward",
+    "joint_friction_compensation",
+    "passive_tension_loop",
+    "distribution",
+)
 # What only the controller (19)-(22) has.
 _CLOSED_LOOP = (
     "gain",
     "damping",
     "gravity_compensation",
     "spring_compensation",
+    "fingertip_force",
     "tendon_friction_feedforward",
     "joint_friction_compensation",
     "passive_tension_loop",
@@ -202,7 +223,20 @@ _CLOSED_LOOP = (
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
+    actuators = tuple(finger.tree.actuators) if finger.tree else ()
+    for name in settings.inputs or {}:
+        if name not in actuators:
+            near = nearest(name, actuators)
+            hint = f"; did you mean {near}?" if near else ""
+            allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
+            raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
+        if finger.tree is not None and (actuators or not finger.tendons):
+            raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
+        if any(tendon.along for tendon in finger.tendons.values()):
+            for entry in _NOT_ROUTED:
+                if getattr(settings, entry) is not None:
+                    raise problem(f"controller.{entry}", "is not for tendons along paths; leave it out")
         if settings.tensions is not None:
             raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return

@@ -14,8 +14,9 @@ from typing import Any, get_origin
 import tomli_w
 
 from finger_pin.description.columns import read_columns
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.scenario import AXES, Scenario
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, find_field, nearest, validate
 from finger_pin.exceptions import InputError
 
@@ -29,11 +30,25 @@ _SIGNAL_FILES = (
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
 _LARGEST = 10_000_000
+# Keys that put another finger or hand in place of what there is.
+_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")
+# Tables by joint or tendon, and which of the two.
+_BY_NAME = {
+    ("reference", "joints"): "joint",
+    ("controller", "tensions"): "tendon",
+    ("simulation", "initial", "position"): "joint",
+    ("simulation", "initial", "velocity"): "joint",
+}
 
 
 def list_fingers() -> dict[str, str]:
     """Return the fingers that ship with the package, with a line about each."""
     return _shipped("fingers")
+
+
+def list_hands() -> dict[str, str]:
+    """Return the hands that ship with the package, with a line about each."""
+    return _shipped("hands")
 
 
 def list_scenarios() -> dict[str, str]:
@@ -63,11 +78,29 @@ def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) ->
         return validate(FingerDescription, table["finger"], ("finger",))
 
 
+def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> HandDescription:
+    """Load a hand by the name of a shipped one or the path of a TOML file.
+
+    Args:
+        name: Such as ``ub_hand`` or ``my_hand.toml``.
+        overrides: Values by dotted key, such as ``{"hand.fingers.thumb.scale": 1.1}``.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    overrides = _from_here(overrides or {}, {"hand"})
+    table: Table = {"hand": str(name)}
+    with _depth_limited("hand"):
+        _override(overrides, table, Path())
+        return validate(HandDescription, table["hand"], ("hand",))
+
+
 def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """Load a scenario by the name of a shipped one or the path of a TOML file.
 
     A scenario file may say ``extends = "fig6"`` to start from another scenario, and ``finger = "ub"`` or, to change
-    some of a finger, ``[finger]`` with ``base = "ub"`` and further entries.
+    some of a finger, ``[finger]`` with ``base = "ub"`` and further entries. ``hand`` takes the place of ``finger``
+    where there are several; each of ``hand.fingers`` has a ``finger`` of its own.
 
     Args:
         name: Such as ``fig6`` or ``my_scenario.toml``.
@@ -87,8 +120,23 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
         return validate(Scenario, table, ())
 
 
+def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Return the scenario that a table describes, as `load_scenario` returns that of a file.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    checked, whole = _from_here(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
+    with _depth_limited("scenario"):
+        _override(checked, whole, Path())
+        _resolve_signals(whole, Path())
+        return validate(Scenario, whole, ())
+
+
 def to_toml(description: Description) -> str:
     """Return the TOML text of a description, complete: reading it gives the same description back."""
+    if isinstance(description, FingerDescription) and description.hand is not None:
+        description = description.hand
     return tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True)))
 
 
@@ -164,8 +212,15 @@ def _read_scenario(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tupl
     parent.pop("name", None)
     if "finger" in parent:
         parent["finger"] = _resolve_finger(parent["finger"], parent_folder)
-    if isinstance(table.get("finger"), str) or "base" in _as_table(table.get("finger")):
+    if "hand" in parent:
+        parent["hand"] = _resolve_hand(parent["hand"], parent_folder)
+    whole = isinstance(table.get("finger"), str) or "base" in _as_table(table.get("finger"))
+    if "hand" in table or whole:
         parent.pop("finger", None)
+    if "finger" in table or isinstance(table.get("hand"), str) or "base" in _as_table(table.get("hand")):
+        parent.pop("hand", None)
+    if "hand" in parent and "hand" in table:
+        table["hand"] = _on_top(parent.pop("hand"), table["hand"], folder)
     return _merge(parent, table), folder
 
 
@@ -208,6 +263,44 @@ def _resolve_motor(motor: Any, folder: Path) -> Any:
     return motor
 
 
+def _resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
+    """Return the table of a hand given by name, by path, or as a table that may start from a base."""
+    if isinstance(hand, str):
+        table, path = _read("hand", hand, folder)
+        identity = path.resolve()
+        if identity in seen:
+            raise InputError("hand.base", "a hand cannot start from itself", hand)
+        table.setdefault("name", _as_name(Path(hand).stem))
+        return _resolve_hand(table, path.parent, (*seen, identity))
+    if not isinstance(hand, dict):
+        raise InputError("hand", "must be the name of a hand, the path of a .toml file, or a table", hand)
+    rest = dict(hand)
+    base = rest.pop("base", {})
+    if not isinstance(base, str | dict):
+        raise InputError("hand.base", "must be the name or path of a hand", base)
+    return _on_top(_resolve_hand(base, folder, seen) if base else {}, rest, folder)
+
+
+def _on_top(base: Table, hand: Table, folder: Path) -> Table:
+    """Return the table of a hand with another on top, whose fingers may be other ones altogether."""
+    for name, placed in _as_table(_as_table(hand).get("fingers")).items():
+        finger = _as_table(placed).get("finger")
+        if isinstance(finger, str) or "base" in _as_table(finger):
+            with _named(f"hand.fingers.{name}."):
+                placed["finger"] = _resolve_finger(finger, folder)
+            _as_table(_as_table(base.get("fingers")).get(name)).pop("finger", None)
+    return _merge(base, hand)
+
+
+@contextmanager
+def _named(owner: str) -> Iterator[None]:
+    """Put the owner of a finger before the entries that errors name."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(owner + error.entry, error.allowed, error.value) from None
+
+
 def _resolve_signals(table: Table, folder: Path) -> None:
     """Put the columns of CSV files where a file may say them itself: as samples of signals by name."""
     for section, key, target in _SIGNAL_FILES:
@@ -243,17 +336,30 @@ def _merge(base: Table, top: Table) -> Table:
 
 
 def _override(overrides: Table, table: Table, folder: Path) -> None:
-    """Resolve the finger of a table, and apply overrides: another finger before entries on top of either."""
-    _apply({key: overrides.pop(key) for key in ("finger", "finger.base") if key in overrides}, table)
-    if "finger" not in table:
+    """Resolve the fingers of a table, and apply overrides: other fingers before entries on top of them."""
+    whole = {key: value for key, value in overrides.items() if _OTHER_FINGER.fullmatch(key)}
+    for key in whole:
+        del overrides[key]
+    for kind, other in (("hand", "finger"), ("finger", "hand")):
+        given = {key: whole.pop(key) for key in (kind, f"{kind}.base") if key in whole}
+        if given:
+            table.pop(other, None)
+        _apply(given, table)
+    if "hand" in table:
+        table["hand"] = _resolve_hand(table["hand"], folder)
+        _apply(whole, table)
+        table["hand"] = _resolve_hand(table["hand"], folder)
+    elif "finger" not in table:
         raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
-    table["finger"] = _resolve_finger(table["finger"], folder)
+    else:
+        table["finger"] = _resolve_finger(table["finger"], folder)
     spelt_out = {each: value for key, value in overrides.items() for each in _each(key, table)}
     # A kind comes before what belongs to it, and a motor before its entries.
     first = (".kind", ".motor")
     for early in (True, False):
         _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
-        _with_motors(table["finger"], Path())
+        for finger in [each.get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
+            _with_motors(_as_table(finger), Path())
 
 
 def _each(key: str, table: Table) -> list[str]:
@@ -276,7 +382,7 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
         for depth, part in enumerate(path):
             _refuse_new([*path[:depth], part], inner, table)
             below = inner.setdefault(part, {})
-            if isinstance(below, str) and path[: depth + 1] == ["finger"]:
+            if isinstance(below, str) and part in ("finger", "hand"):
                 below = inner[part] = {"base": below}
             if not isinstance(below, dict):
                 raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
@@ -290,22 +396,27 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
 def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
     """Raise where an override would bring a joint, a tendon or the like into being: only a file does."""
     *owner, name = path
-    field = find_field(Scenario, owner) if owner else None
-    if field is None or get_origin(field.annotation) is not dict:
-        return
     finger = _as_table(table.get("finger"))
-    # A signal for a joint, a tendon or an axis that is there may have no entry of its own yet.
-    present: dict[tuple[str, ...], Iterable[str]] = {
-        ("reference", "joints"): _as_table(finger.get("joints")),
-        ("controller", "tensions"): _as_table(finger.get("tendons")),
-        ("environment", "fingertip_force_signal"): AXES,
-        ("simulation", "initial", "position"): _as_table(finger.get("joints")),
-        ("simulation", "initial", "velocity"): _as_table(finger.get("joints")),
-    }
-    names = present.get(tuple(owner), siblings)
+    hand = {key: _as_table(each).get("finger") for key, each in _fingers(table).items()}
+    # A signal for a joint or a tendon that is there may have no entry of its own yet.
+    present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
+    for place, what in _BY_NAME.items():
+        present[place] = ("finger", hand) if hand else (what, _as_table(finger.get(f"{what}s")))
+        for key, each in hand.items():
+            present[*place, key] = what, _as_table(_as_table(each).get(f"{what}s"))
+    if hand:
+        present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
+    field = find_field(Scenario, owner) if owner else None
+    if tuple(owner) not in present and (field is None or get_origin(field.annotation) is not dict):
+        return
+    what, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
     if name not in names:
-        allowed = f"no such {owner[-1].removesuffix('s')}; there are {', '.join(names) or 'none'}"
+        allowed = f"no such {what}; there are {', '.join(names) or 'none'}"
         raise InputError(".".join(path), f"{allowed}{_hint(name, names)}")
+
+
+def _fingers(table: Table) -> Table:
+    return _as_table(_as_table(table.get("hand")).get("fingers"))
 
 
 def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
@@ -317,9 +428,9 @@ def _from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
             near = nearest(first, allowed)
             hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
             raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
-        if key in ("finger", "finger.base"):
+        if _OTHER_FINGER.fullmatch(key):
             value = _absolute(value)
-        if key == "finger" and isinstance(value, dict) and "base" in value:
+        if key.endswith("finger") and isinstance(value, dict) and "base" in value:
             value = {**value, "base": _absolute(value["base"])}
         checked[key] = value
     return checked

@@ -6,11 +6,12 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
+from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -26,6 +27,9 @@ from finger_pin.description.validation import (
     vector,
 )
 from finger_pin.exceptions import toml_like
+
+if TYPE_CHECKING:
+    from finger_pin.description.hand import HandDescription
 
 _MILLIMETRES = " m (is it in millimetres?)"
 
@@ -134,7 +138,8 @@ class Tendon(Description):
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
         0.0, unit="rad", source="(15)", doc="phi_off, curvature of the path at theta = 0."
     )
-    crossings: dict[Name, Crossing] = Field(min_length=1, description="By joint, in order along the tendon.")
+    crossings: dict[Name, Crossing] = Field({}, description="By joint, in order along the tendon.")
+    along: Name | None = Field(None, description="In place of crossings: the tendon of the tree whose path it takes.")
     mass_after: int | None = Field(
         None,
         ge=0,
@@ -148,6 +153,14 @@ class Tendon(Description):
             raise problem("mass_after", "is for passive tendons only", self.mass_after)
         if self.mass_after is not None and self.mass_after > len(self.crossings):
             raise problem("mass_after", f"must be at most the {len(self.crossings)} crossings", self.mass_after)
+        if self.along is not None:
+            if self.crossings:
+                raise problem("along", "has no place beside crossings", self.along)
+            if self.kind == "passive":
+                raise problem("along", "is for actuated tendons only", self.along)
+            return self
+        if not self.crossings:
+            raise problem("crossings", "must have at least one entry")
         if all(crossing.radius == 0.0 for crossing in self.crossings.values()):
             raise problem("crossings", "at least one radius must differ from zero")
         return self
@@ -261,12 +274,14 @@ class FingerDescription(Description):
         (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="In the base frame."
     )
     joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
-    tendons: dict[Name, Tendon] = Field(min_length=1, description="By name.")
+    tendons: dict[Name, Tendon] = Field(description="By name; at least one, unless there is a tree.")
     tendon_friction: TendonFriction = TendonFriction()
     joint_friction: JointFriction = JointFriction()
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
     actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    _hand: Any = PrivateAttr(None)
+    tree: Tree | None = Field(None, description="Bodies that are no chain of links, and what drives them.")
 
     @field_validator("tendons")
     @classmethod
@@ -276,12 +291,25 @@ class FingerDescription(Description):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         joints, tendons = tuple(self.joints), tuple(self.tendons)
+        if not self.tendons and self.tree is None:
+            raise problem("tendons", "must have at least one entry")
+        if self.tree is not None and tuple(self.tree.joints) != joints:
+            raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
         for name, tendon in self.tendons.items():
+            paths = tuple(self.tree.tendons) if self.tree else ()
+            if tendon.along is not None and tendon.along not in paths:
+                allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
+                raise problem(f"tendons.{name}.along", allowed, tendon.along)
             for joint in tendon.crossings:
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
+        for name, actuator in self.actuators.items():
+            for pulled in actuator.tendons:
+                if self.tendons[pulled].along is not None:
+                    allowed = "runs along a path through space: motors pull tendons with crossings"
+                    raise problem(f"actuators.{name}.tendons", allowed, pulled)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),
@@ -291,6 +319,12 @@ class FingerDescription(Description):
             for field, value in getattr(self, group):
                 check_size(value, names, f"{group}.{field}", what)
         return self
+
+    @property
+    def hand(self) -> HandDescription | None:
+        """The hand whose fingers together this is; None for a finger."""
+        hand: HandDescription | None = self._hand
+        return hand
 
     @property
     def passive_names(self) -> tuple[str, ...]:

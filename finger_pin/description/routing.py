@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from finger_pin.description.parameters import FingerDescription
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 # Below this share of the largest, an internal tension counts as none.
 _SLACK = 1e-9
@@ -33,6 +34,7 @@ class Routing:
         curvature_matrix: Phi, shape (t, n), zeros and ones, equation (15).
         curvature_offset: phi_off, shape (t,), rad.
         loads: Shape (n, s), one where a strand loads a joint, equation (17).
+        fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
     """
 
     joints: tuple[str, ...]
@@ -43,11 +45,13 @@ class Routing:
     curvature_matrix: Array
     curvature_offset: Array
     loads: Array
+    fingers: tuple[tuple[Indices, Indices], ...]
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Routing:
         """Build the matrices from the crossings of every tendon."""
-        joints = tuple(description.joints)
+        joints, tendons = tuple(description.joints), tuple(description.tendons)
+        names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
         column = {name: index for index, name in enumerate(joints)}
         coupling, curvature, strands, loads = [], [], [], []
         for tendon in description.tendons.values():
@@ -56,6 +60,9 @@ class Routing:
                 radii[column[joint], order] = crossing.radius
                 bends[column[joint], order] = float(crossing.bends)
                 crossed[column[joint], order] = 1.0
+            if tendon.along is not None and description.tree is not None:
+                # Its arms depend on the posture; which joints it crosses does not.
+                crossed = np.array([[float(joint in description.tree.crossed(tendon.along))] for joint in joints])
             coupling.append(radii.sum(axis=1))
             curvature.append(bends.sum(axis=1))
             split = tendon.proximal_crossings
@@ -65,13 +72,14 @@ class Routing:
                 loads.append(crossed[:, half].sum(axis=1))
         return cls(
             joints=joints,
-            tendons=tuple(description.tendons),
+            tendons=tendons,
             actuated=len(description.actuated_names),
-            coupling=np.array(coupling),
-            strand_coupling=np.array(strands),
-            curvature_matrix=np.array(curvature),
+            coupling=np.array(coupling).reshape(-1, len(joints)),
+            strand_coupling=np.array(strands).reshape(-1, len(joints)),
+            curvature_matrix=np.array(curvature).reshape(-1, len(joints)),
             curvature_offset=np.array([t.curvature_offset for t in description.tendons.values()]),
-            loads=np.array(loads).T,
+            loads=np.array(loads).reshape(-1, len(joints)).T,
+            fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
         )
 
     @property
@@ -105,8 +113,26 @@ class Routing:
         return index if index < self.actuated else 2 * index - self.actuated + int(distal)
 
     def force_closure(self) -> ForceClosure:
-        """Report whether tensions exist that are all positive and turn no joint."""
-        return ForceClosure.of(self.coupling, self.tendons)
+        """Report whether tensions exist that are all positive and turn no joint, finger by finger.
+
+        It does not hold where a tendon runs along a path through space: its arms depend on the posture.
+        """
+        if not np.any(self.coupling, axis=1).all():
+            return ForceClosure(
+                np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons, posed=False
+            )
+        found = [
+            ForceClosure.of(self.coupling[np.ix_(own, joints)], tuple(self.tendons[index] for index in own))
+            for joints, own in self.fingers
+        ]
+        if len(found) == 1:
+            return found[0]
+        tension, basis = np.zeros(len(self.tendons)), []
+        for (_, own), each in zip(self.fingers, found, strict=True):
+            tension[own] = each.tension
+            basis.append(np.zeros((len(self.tendons), each.null_space.shape[1])))
+            basis[-1][own] = each.null_space
+        return ForceClosure(np.hstack(basis), tension, self.tendons)
 
     def curvature(self, position: Array) -> Array:
         """Return phi(theta) of (15), shape (..., t), rad, at joint positions of shape (..., n)."""
@@ -133,18 +159,20 @@ class ForceClosure:
         tension: f^k, shape (t,): internal tensions with the largest entry 1 and the smallest as large as possible;
             zero where there are none.
         tendons: Names of the tendons.
+        posed: Whether arms are known; those of paths through space depend on the posture.
     """
 
     null_space: Array
     tension: Array
     tendons: tuple[str, ...]
+    posed: bool = True
 
     @classmethod
     def of(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
         """Find the internal tensions of a coupling matrix H_c, shape (t, n)."""
         # The radii differ by less than a few orders of magnitude, so a relative rank tolerance is safe.
         _, sizes, directions = np.linalg.svd(coupling.T)
-        null_space = directions[np.count_nonzero(sizes > 1e-10 * sizes[0]) :].T
+        null_space = directions[np.count_nonzero(sizes > 1e-10 * sizes.max(initial=0.0)) :].T
         count = null_space.shape[1]
         tension = np.zeros(len(tendons))
         if count == 1:
@@ -158,13 +186,15 @@ class ForceClosure:
     @property
     def holds(self) -> bool:
         """Whether every internal tension is positive."""
-        return bool(np.all(self.tension > _SLACK))
+        return len(self.tension) > 0 and bool(np.all(self.tension > _SLACK))
 
     def __str__(self) -> str:
         """Say in one line what holds or what is missing."""
         if self.holds:
             listed = ", ".join(f"{n} {f:.3g}" for n, f in zip(self.tendons, self.tension, strict=True))
             return f"force closure: internal tensions in the ratio {listed}"
+        if not self.posed:
+            return "force closure depends on the posture (fp.analysis.posed, fp.analysis.closure_over_range)"
         if self.null_space.shape[1] == 0:
             return "no force closure: no tensions balance each other at zero torque (too few tendons)"
         balance = self.tension
@@ -172,6 +202,10 @@ class ForceClosure:
             balance = _largest_one(self.null_space[:, 0])
         worst = [name for name, tension in zip(self.tendons, balance, strict=True) if tension <= _SLACK]
         return f"no force closure: {', '.join(worst)} cannot be kept taut at zero joint torque"
+
+
+def _beginning(names: tuple[str, ...], start: str) -> Indices:
+    return np.flatnonzero([name.startswith(start) for name in names])
 
 
 def _largest_one(vector: Array) -> Array:

@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Annotated, Self
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_serializer,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from finger_pin.description.actuators import check_currents, check_sources
+from finger_pin.description.by_finger import flat, flat_numbers, given, nested, of_finger
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.hand import HandDescription
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
-from finger_pin.description.signals import ForceSignal, JointReference
+from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.tautness import Tautness
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
     Description,
+    FullName,
     Name,
     choice,
     expand,
@@ -35,23 +48,28 @@ from finger_pin.exceptions import InputError
 METHODS_IN_NUMPY = ("Radau", "BDF", "LSODA")
 METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
 MOST_SAMPLES = 5_000_000
-AXES = ("x", "y", "z")
 LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
+_Item = TypeVar("_Item")
 
 
 class ReferenceSettings(Description):
     """References by joint; a joint without one is held at zero, a joint driven by a passive tendon follows (20).
+
+    In a hand the tables of a finger's joints stand in one of its own, such as ``joints.index.medial``.
 
     In a file, ``file`` names a CSV file: its columns are ``time`` and joints, and become their samples.
     """
 
     file_keys = ("file",)
 
-    joints: dict[Name, JointReference] = Field({}, description="By joint.")
+    joints: dict[FullName, JointReference] = Field({}, description="By joint.")
+
+    _flat = field_validator("joints", mode="before")(flat)
+    _nested = field_serializer("joints", mode="wrap")(nested)
 
 
 class EnvironmentSettings(Description):
-    """What acts on the finger from outside.
+    """What acts on the finger from outside; of a hand on every finger, unless its table in ``fingers`` says otherwise.
 
     In a file, ``fingertip_force_file`` names a CSV file: its columns are ``time`` and some of ``x``, ``y``, ``z``, and
     become samples of ``fingertip_force_signal``.
@@ -62,28 +80,28 @@ class EnvironmentSettings(Description):
     fingertip_force: Annotated[tuple[float, float, float], vector(3, -1e6, 1e6)] = quantity(
         (0.0, 0.0, 0.0), unit="N", source="(6)", doc="F, constant, base frame."
     )
-    fingertip_force_signal: dict[Name, ForceSignal] | None = Field(
+    fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
         None, description="What varies of F, added to the constant, by axis x, y, z of the base frame."
     )
+    fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, what differs there.")
 
-    @field_validator("fingertip_force_signal")
-    @classmethod
-    def _axes(cls, value: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | None:
-        for name in value or {}:
-            if name not in AXES:
-                raise problem(name, f"no such axis; the axes are {', '.join(AXES)}")
-        return value
+    _sparse = field_serializer("fingers")(given)
+
+    objects: dict[Name, Object] | None = Field(None, description="What the finger may touch, by name.")
 
 
 class InitialSettings(Description):
     """Where the joints start; the rest of the state follows: bristles relaxed, passive tendons taut in between."""
 
-    position: dict[Name, Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)]] = quantity(
+    position: dict[FullName, Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)]] = quantity(
         {}, unit="rad", source="chosen", doc="theta(0) by joint; a joint left out starts on its reference."
     )
-    velocity: dict[Name, Annotated[float, real(-1e4, 1e4)]] = quantity(
+    velocity: dict[FullName, Annotated[float, real(-1e4, 1e4)]] = quantity(
         {}, unit="rad/s", source="chosen", doc="theta'(0) by joint; a joint left out starts at rest."
     )
+
+    _flat = field_validator("position", "velocity", mode="before")(flat_numbers)
+    _nested = field_serializer("position", "velocity", mode="wrap")(nested)
 
 
 class SimulationSettings(Description):
@@ -115,13 +133,19 @@ class SimulationSettings(Description):
 
 
 class Scenario(Description):
-    """Everything that determines a simulation."""
+    """Everything that determines a simulation.
+
+    With a ``hand`` in place of a finger, ``finger`` is all its fingers together, and every other table is for all of
+    them alike: joints and tendons have dotted names, and lists of numbers are those of each finger.
+    """
 
     file_keys = ("extends",)
 
     name: Name = Field(description="Names the folder of results.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
-    finger: FingerDescription
+    # Filled in below where there is a hand.
+    finger: FingerDescription = Field(None)  # type: ignore[assignment]
+    hand: HandDescription | None = Field(None, description="Several fingers on a palm, in place of a finger.")
     controller: ControllerSettings = ControllerSettings()
     reference: ReferenceSettings = ReferenceSettings()
     environment: EnvironmentSettings = EnvironmentSettings()
@@ -129,38 +153,105 @@ class Scenario(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        finger = self.finger
-        check_controller(self.controller, finger)
-        routing = Routing.from_description(finger)
+        if self.hand is not None:
+            if self.finger is not None:
+                raise problem("finger", "leave it out: the hand has fingers of its own")
+            object.__setattr__(self, "finger", self.hand.joined())
+        if self.finger is None:
+            raise problem("finger", "is missing: a finger, or a hand")
+        self._check_names()
+        for name, part in self.parts().items():
+            try:
+                part._check()
+            except PydanticCustomError as error:
+                raise _of_finger(name, error) from None
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        table: dict[str, Any] = handler(self)
+        if self.hand is not None:
+            table.pop("finger")
+        return table
+
+    def parts(self) -> dict[str, Scenario]:
+        """Return the scenarios of the fingers of a hand, each alone on the palm, by name.
+
+        Of a finger it is the scenario itself, under no name.
+        """
+        if self.hand is None:
+            return {"": self}
+        if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
+            return dict.fromkeys(self.hand.fingers, self)
+        return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
+
+    def _part(self, name: str, alone: HandDescription) -> Scenario:
+        def own(table: Mapping[str, _Item]) -> dict[str, _Item]:
+            return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
+
+        controller = of_finger(self.controller, name)
+        if controller.tensions is not None:
+            controller = controller.model_copy(update={"tensions": own(controller.tensions)})
+        simulation, initial = self.simulation, self.simulation.initial
+        if initial is not None:
+            update = {"position": own(initial.position), "velocity": own(initial.velocity)}
+            simulation = simulation.model_copy(update={"initial": initial.model_copy(update=update)})
+        return self.model_copy(
+            update={
+                "finger": alone.joined(),
+                "hand": alone,
+                "controller": controller,
+                "reference": self.reference.model_copy(update={"joints": own(self.reference.joints)}),
+                "environment": of_finger(self.environment, name),
+                "simulation": simulation,
+            }
+        )
+
+    def _check_names(self) -> None:
+        """Raise where a table is for a joint or a finger that is not there."""
+        if self.environment.objects and self.hand and self.hand.palm.path is not None:
+            raise problem("environment.objects", "objects need a palm at rest: leave out hand.palm.path")
+        initial = self.simulation.initial or InitialSettings()
+        joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
+        tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
+            "reference.joints": (self.reference.joints, "joint", joints),
+            "simulation.initial.position": (initial.position, "joint", joints),
+            "simulation.initial.velocity": (initial.velocity, "joint", joints),
+            "controller.fingers": (self.controller.fingers or (), "finger", fingers),
+            "environment.fingers": (self.environment.fingers or (), "finger", fingers),
+        }
+        for name, settings in (self.controller.fingers or {}).items():
+            if "sampling" in settings.model_fields_set:
+                raise problem(f"controller.fingers.{name}.sampling", "is the same for all: set controller.sampling")
+        for table, (names, what, allowed) in tables.items():
+            for name in names:
+                if name not in allowed:
+                    near = nearest(name, allowed)
+                    hint = f"; did you mean {near}?" if near else ""
+                    listed = f"the {what}s are {', '.join(allowed)}" if allowed else "there is no hand"
+                    raise problem(f"{table}.{name}", f"no such {what}; {listed}{hint}")
+
+    def _check(self) -> None:
+        """Raise where the tables of a finger do not fit each other."""
+        check_controller(self.controller, self.finger)
+        routing = Routing.from_description(self.finger)
         # Tensions in open loop are what they are; (22) needs some that can be raised without turning a joint.
         closure = routing.force_closure()
         try:
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
-        if self.controller.kind == "proportional" and not closure.holds:
+        routed = any(tendon.along for tendon in self.finger.tendons.values())
+        if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
-        check_sources(finger.actuators, self.controller.tensions or {})
+        check_sources(self.finger.actuators, self.controller.tensions or {})
         rest = expand(self.controller.minimum_tension, len(routing.tendons))
         if self.controller.kind == "proportional" and closure.holds:
             rest = closure.tension * np.max(rest / closure.tension)
-        check_currents(finger.actuators, dict(zip(routing.tendons, rest, strict=True)))
-        initial = self.simulation.initial or InitialSettings()
-        tables: dict[str, Iterable[str]] = {
-            "reference.joints": self.reference.joints,
-            "simulation.initial.position": initial.position,
-            "simulation.initial.velocity": initial.velocity,
-        }
-        for table, names in tables.items():
-            for name in names:
-                if name not in finger.joints:
-                    near = nearest(name, finger.joints)
-                    hint = f"; did you mean {near}?" if near else ""
-                    raise problem(f"{table}.{name}", f"no such joint; the joints are {', '.join(finger.joints)}{hint}")
+        check_currents(self.finger.actuators, dict(zip(routing.tendons, rest, strict=True)))
         for name in self.reference.joints:
             if routing.joints.index(name) in followers:
                 raise problem(f"reference.joints.{name}", "follows from the passive tendon (20); leave it out")
-        return self
 
     def _check_taut(self, routing: Routing, missing: str) -> None:
         """Raise unless springs keep the tendons taut that (22) cannot without force closure."""
@@ -173,10 +264,15 @@ class Scenario(Description):
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return what the passive tendons impose on the references (20)."""
+        fingers = {"": self.finger}
+        if self.hand is not None:
+            fingers = {name: placed.finger for name, placed in self.hand.fingers.items()}
+        wishes = [
+            expand(of_finger(self.controller, name).passive_tension, len(finger.passive_names))
+            for name, finger in fingers.items()
+        ]
         return PassiveCoupling.from_routing(
-            routing,
-            expand(self.controller.passive_tension, routing.passive),
-            expand(self.finger.passive_tendon.stiffness, routing.passive),
+            routing, np.concatenate(wishes), expand(self.finger.passive_tendon.stiffness, routing.passive)
         )
 
     def sample_times(self) -> Array:
@@ -187,3 +283,13 @@ class Scenario(Description):
             times[-1] = duration
             return times
         return np.append(times, duration)
+
+
+def _of_finger(finger: str, error: PydanticCustomError) -> PydanticCustomError:
+    """Return an error of one finger as that of the whole hand."""
+    context = error.context or {}
+    entry, allowed, value = str(context["entry"]), str(context["allowed"]), context["value"].content
+    if finger and entry.startswith("finger."):
+        return problem(f"hand.fingers.{finger}.{entry}", allowed, value)
+    named = not finger or finger in f"{entry} {allowed}"
+    return problem(entry, allowed if named else f"{allowed} (finger {finger})", value)

@@ -23,6 +23,7 @@ from finger_pin.description.validation import (
 #: The most points or samples of a signal in a file. Arrays in Python may be longer.
 MOST_POINTS = 20_000
 _LATEST, _MOST_FORCE = 1e6, 1e6
+AXES = ("x", "y", "z")
 _NEEDED: dict[str, tuple[str, ...]] = {
     "sine": (),
     "step": ("time", "height"),
@@ -92,6 +93,12 @@ class SignalSettings(Description):
         return self.model_copy(update=update)
 
     @property
+    def greatest(self) -> float:
+        """A magnitude that the signal never exceeds."""
+        added = max(map(abs, self.values or (self.height or 0.0,)))
+        return abs(self.offset) + abs(self.amplitude) + added
+
+    @property
     def lowest(self) -> float:
         """A value that the signal is never below: the least of the sinusoid and of the rest together."""
         return self.offset - abs(self.amplitude) + min(self.values or (0.0, self.height or 0.0))
@@ -108,6 +115,17 @@ class JointReference(SignalSettings):
     )
 
 
+class InputSignal(SignalSettings):
+    """Input of an actuator of a tree, in the unit that its gain takes."""
+
+    offset: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _FORCE] | None = quantity(None, unit="1", source="chosen", doc="Of the step or ramp.")
+    values: Annotated[tuple[float, ...], series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
+        None, unit="1", source="chosen", doc="At the points or samples."
+    )
+
+
 class ForceSignal(SignalSettings):
     """Tension of a tendon, or a component of a force."""
 
@@ -117,3 +135,11 @@ class ForceSignal(SignalSettings):
     values: Annotated[tuple[float, ...], series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
         None, unit="N", source="chosen", doc="At the points or samples."
     )
+
+
+def of_axes(signals: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | None:
+    """Return signals by axis as they are; raise the error of a name that is no axis."""
+    for name in signals or {}:
+        if name not in AXES:
+            raise problem(name, f"no such axis; the axes are {', '.join(AXES)}")
+    return signals

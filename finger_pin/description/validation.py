@@ -20,6 +20,9 @@ from pydantic_core import PydanticCustomError
 from finger_pin.exceptions import InputError
 
 Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
+#: Of a joint or tendon, which begins with that of its finger and a dot where there is a hand.
+_FULL = r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"
+FullName = Annotated[str, StringConstraints(strict=True, pattern=_FULL, max_length=129)]
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"

@@ -6,9 +6,11 @@ or arrays; NumPy runs them as they are, and the compiler runs the same text.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 
 class Row(NamedTuple):
@@ -69,3 +71,94 @@ class Law:
     losses: tuple[str, ...] = ()
     scale: float | None = None
     kink: str = ""
+    arms: ClassVar[int] = 1
+    states: ClassVar[int] = 1
+
+    def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Row:
+        """Return what rows see, shape (..., k) each."""
+        return Row(length, speed, state, load, command, curvature)
+
+    def act(self, row: Row, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
+        """Return the rows' forces, the rates of their states, and their signals."""
+        force, rate, *signals = self.value(row, p)
+        return force, rate, tuple(signals)
+
+    def book(self, row: Row, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
+        """Return stored energy and powers of what `act` has returned."""
+        return self.account(row, p, force, rate, signals)
+
+
+class Touch(NamedTuple):
+    """What a contact of two bodies sees: numbers, or arrays that broadcast.
+
+    Attributes:
+        gap: Signed distance of the surfaces, m; negative where they penetrate.
+        speed: Its rate, m/s.
+        slip_1: Speed along the first tangent of the body that is pushed up the normal, against the other, m/s.
+        slip_2: Along the second.
+        state_1: The law's first state.
+        state_2: The second.
+        side: On which side of its law's kink the contact is held, as in `Row`.
+    """
+
+    gap: Any
+    speed: Any
+    slip_1: Any
+    slip_2: Any
+    state_1: Any
+    state_2: Any
+    side: Any = 0.0
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """The law of a row with three arms and two states: a contact, its normal and its tangents.
+
+    Forces act along the arms: the first drives the gap open, the others drive the slips up.
+
+    Attributes:
+        name: For messages.
+        parameters: Names of the numbers that each contact has; ``p`` holds them in this order.
+        value: (touch, p) -> (f_n, f_1, f_2, z_1', z_2', *signals).
+        slopes: (touch, p, signals) -> five tuples: derivatives of f_n, f_1, f_2, z_1' and z_2' by gap, speed, slip_1,
+            slip_2, state_1, state_2.
+        account: (touch, p, (f_n, f_1, f_2), (z_1', z_2'), signals) -> (stored energy, *lost powers), J and W. The power
+            of the three forces is what is neither lost nor stored.
+        signals: Names of the further numbers that ``value`` returns.
+        losses: Names of the powers that are lost.
+        scale: Typical magnitude of the states, for absolute tolerances.
+        kink: As in `Law`.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    value: Callable[..., Any]
+    slopes: Callable[..., Any]
+    account: Callable[..., Any]
+    signals: tuple[str, ...]
+    losses: tuple[str, ...]
+    scale: float
+    kink: str = ""
+    supplies: ClassVar[tuple[str, ...]] = ()
+    arms: ClassVar[int] = 3
+    states: ClassVar[int] = 2
+
+    def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Touch:
+        """Return what contacts see; arms stand side by side, shape (..., 3 k), and so do states, shape (..., 2 k)."""
+        slips = (speed[..., each::3] for each in range(3))
+        return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))
+
+    def act(self, touch: Touch, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
+        """Return the contacts' forces, shape (..., 3 k), the rates of their states, (..., 2 k), and their signals."""
+        found = self.value(touch, p)
+        return _side_by_side(found[:3]), _side_by_side(found[3:5]), tuple(found[5:])
+
+    def book(self, touch: Touch, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
+        """Return stored energy and powers of what `act` has returned."""
+        forces, rates = ([all_[..., each::count] for each in range(count)] for all_, count in ((force, 3), (rate, 2)))
+        return self.account(touch, p, forces, rates, signals)
+
+
+def _side_by_side(parts: Sequence[Any]) -> Any:
+    stacked = np.stack(np.broadcast_arrays(*parts), axis=-1)
+    return stacked.reshape(*stacked.shape[:-2], -1)

@@ -14,7 +14,7 @@ def penetration(position: Any, lower: Any, upper: Any) -> Any:
     return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
 
 
-def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any, side: Any = 0.0) -> Any:
+def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any) -> Any:
     """Return tau^r = max(0, k d (1 + c d')) with the sign of the penetration, N m.
 
     It enters (18) as -tau^r, so a positive torque acts against positive rotation.
@@ -24,18 +24,8 @@ def limiter_torque(depth: Any, velocity: Any, stiffness: Any, damping: Any, side
         velocity: theta', rad/s.
         stiffness: k, N m/rad.
         damping: c, s/rad.
-        side: See `Row`: 1 without the clamp, -1 without the contact.
     """
-    factor = 1.0 + damping * velocity * np.sign(depth)
-    return stiffness * depth * factor * beyond(factor, side)
-
-
-def limiter_slopes(depth: Any, velocity: Any, stiffness: Any, damping: Any, side: Any = 0.0) -> tuple[Any, Any]:
-    """Return the derivatives of the limiter torque with respect to theta and theta'; zero inside the range."""
-    sign = np.sign(depth)
-    factor = 1.0 + damping * velocity * sign
-    touching = np.abs(sign) * beyond(factor, side)
-    return stiffness * factor * touching, stiffness * damping * np.abs(depth) * touching
+    return stiffness * depth * np.maximum(1.0 + damping * velocity * np.sign(depth), 0.0)
 
 
 def limiter_energy(depth: Any, stiffness: Any) -> Any:
@@ -48,18 +38,26 @@ def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
     return (torque - stiffness * depth) * velocity
 
 
+def _seen(row: Row, p: Any) -> Any:
+    """Return on which side the nearer limit is, 1 or -1, how far the joint is beyond it, and 1 + c d'."""
+    lower, upper, _, damping = p
+    end = 2.0 * (row.length > 0.5 * (lower + upper)) - 1.0
+    return end, np.maximum(row.length - upper, lower - row.length), 1.0 + damping * row.speed * end
+
+
 def _value(row: Row, p: Any) -> Any:
-    lower, upper, stiffness, damping = p
-    depth = penetration(row.length, lower, upper)
-    # What the contact would exert if it could pull too, over its stiffness.
-    grip = np.abs(depth) + depth * damping * row.speed
-    return -limiter_torque(depth, row.speed, stiffness, damping, row.side), 0.0 * row.length, depth, grip
+    end, past, factor = _seen(row, p)
+    # The torque bends where the joint meets its limit, and where the limiter would begin to pull.
+    grip = np.minimum(past, factor)
+    torque = p[2] * end * past * factor * beyond(grip, row.side)
+    return -torque, 0.0 * row.length, end * np.maximum(past, 0.0), grip
 
 
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
     _, _, stiffness, damping = p
-    by_length, by_speed = limiter_slopes(signals[0], row.speed, stiffness, damping, row.side)
-    return (-by_length, -by_speed, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    _, past, factor = _seen(row, p)
+    gripping = stiffness * beyond(signals[1], row.side)
+    return (-factor * gripping, -damping * past * gripping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def _account(

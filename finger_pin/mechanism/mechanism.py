@@ -16,14 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
-from finger_pin.laws.law import Row
+from finger_pin.mechanism.pieces import Paths, Reach, moved, reach
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
+
+#: The power that a moving base supplies.
+BASE = "palm"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +45,13 @@ class Books:
     supplies: frozenset[str]
 
     @classmethod
-    def of(cls, rows: Sequence[Rows]) -> Books:
-        """Collect the names of tables."""
+    def of(cls, rows: Sequence[Rows], moved: bool = False) -> Books:
+        """Collect the names of tables, and that of a base that moves."""
+        base = (BASE,) if moved else ()
         return cls(
             stored=tuple(dict.fromkeys(table.stored for table in rows)),
-            powers=tuple(dict.fromkeys(name for table in rows for name in table.powers)),
-            supplies=frozenset(name for table in rows for name in table.powers[: len(table.law.supplies)]),
+            powers=(*dict.fromkeys(name for table in rows for name in table.powers), *base),
+            supplies=frozenset(name for table in rows for name in table.powers[: len(table.law.supplies)]) | {*base},
         )
 
 
@@ -61,6 +66,7 @@ class Evaluation:
         external: J^T F, shape (..., N).
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
+        base_power: That of a base that moves, shape (..., 1), W.
         booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
     """
 
@@ -70,6 +76,7 @@ class Evaluation:
     external: Array
     acceleration: Array
     rate: Array
+    base_power: Array | None = None
     booked: Array | None = None
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -88,6 +95,8 @@ class Evaluation:
             energies[signals.rows.stored] = energies[signals.rows.stored] + stored
             for name, value in flows.items():
                 powers[name] = powers[name] + value
+        if self.base_power is not None:
+            powers[BASE] = self.base_power[..., 0]
         return energies, powers
 
 
@@ -102,6 +111,7 @@ class Mechanism:
         states: For every table the range of its states in z.
         books: Names under which energies and powers of the rows are booked.
         channels: Number of inputs from outside.
+        moved: Whether the base moves along a path.
     """
 
     def __init__(
@@ -111,6 +121,7 @@ class Mechanism:
         lumps: Sequence[str] = (),
         inertia: Array | None = None,
         channels: int = 0,
+        moved: bool = False,
     ) -> None:
         """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
 
@@ -120,12 +131,13 @@ class Mechanism:
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
-        self.books = Books.of(self.rows)
+        self.moved = moved
+        self.books = Books.of(self.rows, moved)
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
         for table in self.rows:
-            begin, end = end, end + (0 if table.law.scale is None else len(table.names))
+            begin, end = end, end + table.states
             self.states.append(slice(begin, end))
         self.state_count = end
 
@@ -149,13 +161,11 @@ class Mechanism:
             for table in part.rows:
                 rows.append(
                     replace(
-                        table,
+                        table.spread(places, width),
                         group=f"{name}.{table.group}",
-                        arm=_spread(table.arm, places, width),
-                        measure=_spread(table.measure, places, width),
-                        bends=_spread(table.bends, places, width),
                         channels=np.where(table.channels >= 0, table.channels + channel, -1),
                         pins=np.where(table.pins >= 0, table.pins + joint, -1),
+                        paths=moved(table.paths, joint),
                         inputs={f"{name}.{group}": weights for group, weights in table.inputs.items()},
                         loads={f"{name}.{group}": weights for group, weights in table.loads.items()},
                     )
@@ -203,13 +213,15 @@ class Mechanism:
         linear[..., model.nv :] = q[..., model.nq :]
         return linear
 
-    def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
+    def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states.
 
         Args:
             x: Shape (size,) or (m, size).
             command: Inputs u, shape (channels,) or (m, channels).
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
+            base: How the base moves, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more); at rest by
+                default.
         """
         q, v, z = self.split(x)
         joints, turning = int(self.body.model.nv), q[..., : self.body.model.nq]
@@ -222,40 +234,71 @@ class Mechanism:
             forces[...] = given[..., None, :] if tips == 1 else given
         command = np.asarray(command, dtype=float)
         found: dict[str, RowSignals] = {}
+        touching: list[tuple[Paths, Array]] = []
         torque = np.zeros((*lead, self.coordinates))
         for table, part in zip(self.rows, self.states, strict=True):
-            row = Row(
-                length=linear @ table.measure.T + table.offset,
-                speed=v @ table.arm.T,
-                state=z[..., part] if table.law.scale is not None else np.zeros((*lead, len(table.names))),
-                load=self._load(table, found, turning, forces if pressed else None),
-                command=self._input(table, found, command, lead),
-                curvature=np.abs(linear) @ table.bends.T + table.curvature_offset,
+            routed = self._routed(table, turning)
+            arm = table.arm + routed.arm
+            row: Any = table.law.sees(
+                linear @ table.measure.T + table.offset + routed.length,
+                (arm @ v[..., None])[..., 0],
+                z[..., part] if table.states else np.zeros((*lead, table.count)),
+                self._load(table, found, turning, forces, touching),
+                self._input(table, found, command, lead),
+                np.abs(linear) @ table.bends.T + table.curvature_offset + routed.turn,
             )
-            exerted, rate, *signals = table.law.value(row, table.parameters)
-            found[table.group] = RowSignals(table, row, exerted, rate, tuple(signals))
-            torque = torque + exerted @ table.arm
+            exerted, rate, signals = table.law.act(row, table.parameters)
+            found[table.group] = RowSignals(table, row, exerted, rate, signals)
+            if table.law.arms > 1:
+                touching.append((table.paths[:: table.law.arms], _touching(exerted, routed.force, table.law.arms)))
+            torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
         external = np.zeros_like(torque)
         if pressed:
             external[..., :joints] = self.body.external_torque(turning, forces)
-        net = torque + external
+        net, power = torque + external, None
+        if base is not None:
+            net[..., :joints] += self._inertial(turning, v[..., :joints], base)
         acceleration = np.concatenate(
             [self.body.forward_dynamics(turning, v[..., :joints], net[..., :joints]), net[..., joints:] / self.inertia],
             axis=-1,
         )
+        if base is not None:
+            power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
         moving = self.body.position_rate(turning, v[..., :joints])
-        rates = [found[t.group].rate for t in self.rows if t.law.scale is not None]
+        rates = [found[t.group].rate for t in self.rows if t.states]
         return Evaluation(
             books=self.books,
             rows=found,
             torque=torque,
             external=external,
             acceleration=acceleration,
+            base_power=np.zeros((*lead, 1)) if power is None and self.moved else power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 
+    def _routed(self, table: Rows, q: Array) -> Reach:
+        """Return what paths through space add to the rows of a table, shape (..., k) and (..., k, N)."""
+        if not table.routed:
+            return Reach(*np.zeros((4, 1)))
+        if q.ndim == 1:
+            return reach(self.body, q, table.paths, self.coordinates)
+        each = [reach(self.body, one, table.paths, self.coordinates) for one in q]
+        return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
+
+    def _inertial(self, q: Array, v: Array, base: Array) -> Array:
+        """Return what a base that moves adds to the torques of one at rest under gravity, shape (..., n)."""
+        if q.ndim > 1:
+            return np.array([self._inertial(*each) for each in zip(q, v, base, strict=True)])
+        still = np.zeros_like(v)
+        return self.body.inverse_dynamics(q, v, still) - self.body.base_dynamics(q, v, still, base)[1]
+
+    def _base_power(self, q: Array, v: Array, a: Array, base: Array) -> Array:
+        if q.ndim > 1:
+            return np.array([self._base_power(*each) for each in zip(q, v, a, base, strict=True)])
+        return np.array([base[:6] @ self.body.base_dynamics(q, v, a, base)[0]])
+
     def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
-        total = np.zeros((*lead, len(table.names)))
+        total = np.zeros((*lead, table.count))
         wired = table.channels >= 0
         if wired.any():
             total[..., wired] = command[..., table.channels[wired]]
@@ -263,21 +306,38 @@ class Mechanism:
             total = total + found[group].force @ weights.T
         return total
 
-    def _load(self, table: Rows, found: dict[str, RowSignals], q: Array, forces: Array | None) -> Array:
+    def _load(
+        self,
+        table: Rows,
+        found: dict[str, RowSignals],
+        q: Array,
+        forces: Array,
+        touching: Sequence[tuple[Paths, Array]],
+    ) -> Array:
         """Return N: the magnitude of what earlier rows add up to, or of -e S + F for the pins of joints (17)."""
-        load = np.zeros((*q.shape[:-1], len(table.names)))
+        load = np.zeros((*q.shape[:-1], table.count))
         for group, weights in table.loads.items():
             load = load + found[group].force @ weights.T
-        if forces is None or not (table.pins >= 0).any():
+        if not (table.pins >= 0).any() or not (np.any(forces) or touching):
             return np.abs(load)
         directions = self.body.link_directions(q)[..., table.pins, :]
         beyond = self.body.supports[:, table.pins].T @ forces
+        for paths, pushes in touching:
+            beyond = beyond + self._passing(paths, table.pins) @ pushes
         total: Array = beyond - load[..., None] * directions
-        return np.asarray(np.sqrt(np.sum(total * total, axis=-1)))
+        magnitude = np.sqrt(np.sum(total * total, axis=-1))
+        return np.where(table.pins >= 0, magnitude, np.abs(load))
+
+    def _passing(self, paths: Paths, pins: NDArray[np.int64]) -> Array:
+        """Return how often a force on the first body of every path, and its reaction, pass each pin, shape (k, m)."""
+        supports = [set(each) for each in self.body.model.supports]
+        pieces = [legs[0].piece for legs in paths]
+        pairs = [[(pin + 1 in supports[p.ends[0].joint], pin + 1 in supports[p.joint]) for p in pieces] for pin in pins]
+        return np.array([[float(first) - float(second) for first, second in row] for row in pairs])
 
 
-def _spread(matrix: Array, places: NDArray[np.int64], width: int) -> Array:
-    """Return a matrix with its columns at some places among more."""
-    wide = np.zeros((len(matrix), width))
-    wide[:, places] = matrix
-    return wide
+def _touching(force: Array, directions: Array, arms: int) -> Array:
+    """Return the sum of the forces of every contact as vectors, shape (..., m, 3)."""
+    vectors = force[..., None] * directions
+    total: Array = vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2)
+    return total

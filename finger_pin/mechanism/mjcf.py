@@ -78,6 +78,8 @@ def to_mjcf(
     Raises:
         InputError: If a joint has no link, the posture has the wrong size, or the time step is not positive.
     """
+    if description.hand is not None:
+        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)

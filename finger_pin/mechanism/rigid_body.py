@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -20,9 +21,9 @@ class Kinematics:
     """Positions and velocities of the rigid body; leading dimensions such as time are kept.
 
     Attributes:
-        tip: p, fingertip position, shape (..., 3), m.
-        tip_velocity: p', shape (..., 3), m/s.
-        jacobian: J of (6), shape (..., 3, n).
+        tip: p, fingertip position, shape (..., 3), m; of several shape (..., t, 3).
+        tip_velocity: p', shape (..., 3), m/s, of the first.
+        jacobian: J of (6), shape (..., 3, n), of the first.
         directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
@@ -41,7 +42,7 @@ class Motion:
     """Where the fingertip is and what energy the rigid body has; leading dimensions are kept.
 
     Attributes:
-        tip: p, shape (..., 3), m.
+        tip: p, shape (..., 3), m; of several shape (..., t, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
     """
@@ -106,9 +107,19 @@ class RigidBody:
             self.carriers.append(self.carriers[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
 
+    @property
+    def mass(self) -> float:
+        """Of all bodies, kg."""
+        return float(pin.computeTotalMass(self.model))
+
     @classmethod
-    def join(cls, parts: Mapping[str, RigidBody]) -> RigidBody:
+    def join(cls, parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:
         """Return several bodies on one base; names of joints and tips begin with that of their part and a dot.
+
+        Args:
+            parts: By name.
+            places: Where the base frames of parts stand on the common base; there itself by default. Gravity is that
+                of the common base.
 
         Raises:
             InputError: If gravity is not the same for all.
@@ -118,20 +129,26 @@ class RigidBody:
         model.gravity = next(iter(parts.values())).model.gravity
         for part, body in parts.items():
             own, shift = body.model, model.njoints - 1
+            place = (places or {}).get(part, pin.SE3.Identity())
             if own.gravity != model.gravity:
                 raise InputError(f"{part}.gravity", f"must be {model.gravity.linear}", own.gravity.linear)
             for index in range(1, own.njoints):
                 parent = int(own.parents[index])
                 joint, placement = own.joints[index], own.jointPlacements[index]
+                placement = placement if parent else place * placement
                 at = model.addJoint(parent and parent + shift, joint, placement, f"{part}.{own.names[index]}")
                 # Appending bodies, or frames with theirs, would round.
                 model.inertias[at] = own.inertias[index]
+                at, moved = model.joints[at].idx_v, own.joints[index]
+                model.armature[at : at + moved.nv] = own.armature[moved.idx_v : moved.idx_v + moved.nv]
             for tip in body.tips:
                 frame = own.frames[tip]
                 holder = frame.parentJoint and frame.parentJoint + shift
                 tips.append(f"{part}.{frame.name}")
-                model.addFrame(pin.Frame(tips[-1], holder, 0, frame.placement, pin.FrameType.OP_FRAME), False)
-            axes += body.proximal_axes[1:]
+                held = frame.placement if holder else place * frame.placement
+                model.addFrame(pin.Frame(tips[-1], holder, 0, held, pin.FrameType.OP_FRAME), False)
+            along = zip(body.proximal_axes[1:], body.carriers[1:], strict=True)
+            axes += [axis if carrier else place.rotation @ axis for axis, carrier in along]
             carriers += [carrier and carrier + shift for carrier in body.carriers[1:]]
         joined = cls(model, tips)
         joined.proximal_axes, joined.carriers = axes, carriers
@@ -171,6 +188,17 @@ class RigidBody:
         pin.forwardKinematics(self.model, self._data, q)
         return self._directions()
 
+    def placements(self, q: Array) -> tuple[list[pin.SE3], list[Array]]:
+        """Return placement and Jacobian of every joint, the base first, at q of shape (nq,).
+
+        A Jacobian's columns are velocity of the body's point at the origin, and angular velocity; base frame.
+        """
+        model, data = self.model, self._data
+        pin.computeJointJacobians(model, data, q)
+        still, reference = np.zeros((6, model.nv)), pin.ReferenceFrame.WORLD
+        twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]
+        return [pin.SE3(each) for each in data.oMi], [still, *(np.asarray(each).reshape(6, -1) for each in twists)]
+
     def tip_position(self, q: Array) -> Array:
         """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
         pin.framesForwardKinematics(self.model, self._data, q)
@@ -205,22 +233,69 @@ class RigidBody:
             return np.array(pin.aba(self.model, self._data, q, v, torque))
         return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
 
+    def base_dynamics(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array]:
+        """Return what moves a base and the joints on it as given: a wrench and torques, by Newton-Euler.
+
+        Args:
+            q: Shape (n,).
+            v: Shape (n,).
+            a: Shape (n,).
+            base: Velocity of the base and its acceleration less gravity in its own axes, angular parts first, as in
+                `laws.palm`; shape (12,) or more.
+
+        Returns:
+            Moment and force on the base about its origin, in its axes, shape (6,), and torques, shape (n,).
+        """
+        model, data = self._afloat
+        turned = np.r_[3:6, 0:3]
+        pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        moving, speeding = np.append(base[:6][turned], v), np.append(base[6:12][turned], a)
+        found = np.array(pin.rnea(model, data, np.append(pose, q), moving, speeding))
+        return found[:6][turned], found[6:]
+
+    @cached_property
+    def _afloat(self) -> tuple[pin.Model, pin.Data]:
+        """The same joints on a base that floats free of gravity."""
+        own, model = self.model, pin.Model()
+        base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
+        for index in range(1, own.njoints):
+            parent = int(own.parents[index])
+            at = model.addJoint(base + parent, own.joints[index], own.jointPlacements[index], own.names[index])
+            model.inertias[at] = own.inertias[index]
+        model.gravity.linear[:] = 0.0
+        return model, model.createData()
+
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
         pin.computeSubtreeMasses(self.model, self._data)
         return np.outer(np.array(self._data.mass)[1:], self.model.gravity.linear)
 
-    def kinematics(self, q: Array, v: Array) -> Kinematics:
-        """Return what follows from position and velocity, for shapes (..., n)."""
+    def kinematics(self, q: Array, v: Array, base: Array | None = None) -> Kinematics:
+        """Return what follows from position and velocity, for shapes (..., n).
+
+        With a base that moves, (..., 15) or more numbers of `laws.palm`, energies are those of the motion in the world,
+        where the base has no height; all else is as seen from the base.
+        """
         if q.ndim > 1:
-            each = [self.kinematics(*row) for row in zip(q, v, strict=True)]
+            bases = [None] * len(q) if base is None else base
+            each = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]
             return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
-        tip = np.array(self._data.oMf[self.tip_frame].translation)
-        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v)
+        # Pinocchio's kinetic energy is without what turns with the joints' motors.
+        kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
+        if base is not None:
+            model, data = self._afloat
+            pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+            moving = np.concatenate([base[3:6], base[:3], v])
+            kinetic = pin.computeKineticEnergy(model, data, np.append(pose, q), moving)
+            centre = pin.centerOfMass(self.model, self._data, q)
+            potential = -self.mass * float(base[12:15] @ centre)
+        pin.framesForwardKinematics(self.model, self._data, q)
+        tips = np.array([self._data.oMf[each].translation for each in self.tips])
+        tip = tips[0] if len(tips) == 1 else tips
         return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
 
     def _directions(self) -> Array:

@@ -8,7 +8,7 @@ evaluated.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.laws.law import Law, Row
+from finger_pin.laws.law import ContactLaw, Law
+from finger_pin.mechanism.pieces import Leg
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
     """A table of rows that share a law; k rows, N coordinates.
+
+    A contact has three rows: along its normal, and along two tangents. The parameters are then those of a third of k.
 
     Attributes:
         group: Name of the table, by which later ones refer to it.
@@ -38,12 +41,13 @@ class Rows:
             the link before the joint, and forces at the tips beyond it add.
         bends: Shape (k, N), how much |q| adds to the curvature (15).
         curvature_offset: Shape (k,), rad.
+        paths: For every row what pieces of paths through space add to its length, arm and curvature.
         stored: Name of the energy that the rows store; by default the group's.
         powers: Names of the law's powers, supplies first; by default the group's name and the law's.
     """
 
     group: str
-    law: Law
+    law: Law | ContactLaw
     names: tuple[str, ...]
     parameters: Array
     arm: Array
@@ -56,15 +60,16 @@ class Rows:
     pins: NDArray[np.int64] = None  # type: ignore[assignment]
     bends: Array = None  # type: ignore[assignment]
     curvature_offset: Array = None  # type: ignore[assignment]
+    paths: tuple[tuple[Leg, ...], ...] = ()
     stored: str = ""
     powers: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Fill in what was left out, and check the sizes."""
-        count, width = len(self.names), np.shape(self.arm)[-1]
+        count, width = self.count, np.shape(self.arm)[-1]
         powers = (*self.law.supplies, *self.law.losses)
         shapes: dict[str, tuple[Any, tuple[int, ...], Any]] = {
-            "parameters": (self.parameters, (len(self.law.parameters), count), None),
+            "parameters": (self.parameters, (len(self.law.parameters), len(self.names)), None),
             "arm": (self.arm, (count, width), None),
             "measure": (self.measure, (count, width), self.arm),
             "offset": (self.offset, (count,), np.zeros(count)),
@@ -78,10 +83,38 @@ class Rows:
             if array.shape != shape:
                 raise InputError(f"rows.{self.group}.{name}", f"must have shape {shape}, not {array.shape}")
             object.__setattr__(self, name, array)
+        object.__setattr__(self, "paths", tuple(self.paths) or ((),) * count)
+        if len(self.paths) != count:
+            raise InputError(f"rows.{self.group}.paths", f"must be {count}, not {len(self.paths)}")
         object.__setattr__(self, "stored", self.stored or self.group)
         object.__setattr__(self, "powers", self.powers or tuple(f"{self.group}_{name}" for name in powers))
         if len(self.powers) != len(powers):
             raise InputError(f"rows.{self.group}.powers", f"must name {', '.join(powers)}", list(self.powers))
+
+    @property
+    def count(self) -> int:
+        """Number of arms."""
+        return len(self.names) * self.law.arms
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return 0 if self.law.scale is None else len(self.names) * self.law.states
+
+    @property
+    def routed(self) -> bool:
+        """Whether paths through space belong to any row."""
+        return any(self.paths)
+
+    def spread(self, places: NDArray[np.int64], width: int) -> Rows:
+        """Return the same rows where their coordinates stand at some places among more."""
+
+        def wide(matrix: Array) -> Array:
+            found = np.zeros((len(matrix), width))
+            found[:, places] = matrix
+            return found
+
+        return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
     def signal(self, name: str) -> int:
         """Return the index of a signal of the law by its name."""
@@ -94,14 +127,14 @@ class RowSignals:
 
     Attributes:
         rows: The table.
-        row: What they see.
+        row: What they see, a `Row`, or a `Touch` for contacts.
         force: phi.
         rate: z'.
         signals: What the law shows, in its order.
     """
 
     rows: Rows
-    row: Row
+    row: Any
     force: Array
     rate: Array
     signals: tuple[Array, ...]
@@ -113,7 +146,7 @@ class RowSignals:
     def account(self) -> tuple[Array, dict[str, Array]]:
         """Return the stored energy of all rows together, J, and their powers by the names of the table, W."""
         rows = self.rows
-        stored, *powers = rows.law.account(self.row, rows.parameters, self.force, self.rate, self.signals)
+        stored, *powers = rows.law.book(self.row, rows.parameters, self.force, self.rate, self.signals)
         return np.sum(stored, axis=-1), {
             name: np.sum(power, axis=-1) for name, power in zip(rows.powers, powers, strict=True)
         }
@@ -121,4 +154,9 @@ class RowSignals:
 
 def further_states(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
     """Return name and scale of every state of tables of rows."""
-    return tuple((f"{t.group}[{n}]", t.law.scale) for t in rows if t.law.scale is not None for n in t.names)
+    found: list[tuple[str, float]] = []
+    for table in rows:
+        if table.law.scale is not None:
+            for name in table.names:
+                found += [(f"{table.group}[{name}]", table.law.scale)] * table.law.states
+    return tuple(found)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from functools import lru_cache
 
+import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -34,6 +37,8 @@ def to_urdf(description: FingerDescription) -> str:
     Raises:
         InputError: If a joint has no link, or a name that the URDF needs itself.
     """
+    if description.hand is not None:
+        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     links = _links(description)
     shapes = link_shapes(description, links)
     first, last = next(iter(links)), next(reversed(links.values()))
@@ -66,10 +71,27 @@ def effort_limit(description: FingerDescription, joint: str) -> float:
 
 
 def build_rigid_body(description: FingerDescription) -> RigidBody:
-    """Return the rigid body of a finger: its URDF read by Pinocchio, with its gravity."""
-    model = pin.buildModelFromXML(to_urdf(description))
+    """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
+    if description.hand is not None:
+        return build_hand(description.hand)
+    model = _read(to_urdf(description)).copy()
     model.gravity.linear[:] = description.gravity
     return RigidBody(model, TIP_FRAME)
+
+
+@lru_cache(maxsize=16)
+def _read(text: str) -> pin.Model:
+    """Return the model of a URDF; a hand is read as a whole and finger by finger."""
+    return pin.buildModelFromXML(text)
+
+
+def build_hand(hand: HandDescription) -> RigidBody:
+    """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
+    parts = {name: build_rigid_body(finger) for name, finger in hand.built().items()}
+    for body in parts.values():
+        body.model.gravity.linear[:] = hand.gravity
+    places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
+    return RigidBody.join(parts, places)
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:

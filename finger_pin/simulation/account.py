@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.textbook import Trajectory
+from finger_pin.core.textbook import Stop, Trajectory, integrate
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.simulation.energy import Flows, energies, powers
+from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
 # tensions at the ends of steps, where a node would see those of the next one.
@@ -20,6 +22,10 @@ _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 # other two, shape (3, 3).
 _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]])
 _CHUNK = 4096
+# Of all energy exchanged: what may stay open before stretches of the motion are integrated again, and how finely; at
+# most so many stretches, in so many seconds altogether.
+_CLOSED, _FINE = 1e-6, 1e-9
+_MOST_REFINED, _LONGEST = 20, 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,19 +56,84 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         motion: Fingertip and energies of the rigid body at those times.
     """
     booked = powers(signals.finger)
-    works = Flows(_works(loop, trajectory, times, len(booked.names)), booked.names, booked.supplies)
+    done = np.zeros((len(times), len(booked.names)))
+    for part, ends, states in _apart(loop, trajectory):
+        # A finger without motors, say, has fewer powers than the hand.
+        columns = [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)]
+        done[:, columns] += _works(part, ends, states, times, len(columns))
+    works = Flows(done, booked.names, booked.supplies)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
-    return Account(stored=stored, powers=booked, works=works, residual=total - total[0] - works.net)
+    gained = total - total[0]
+    began = time.perf_counter()
+    for begin, end in _open(gained - works.net, works.values, times, trajectory.breakpoints):
+        _refine(loop, trajectory, begin, end, times, works.values, lambda: time.perf_counter() - began > _LONGEST)
+    return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
 
 
-def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array, count: int) -> Array:
+def _open(residual: Array, works: Array, times: Array, breakpoints: Array) -> list[tuple[float, float]]:
+    """Return the stretches of steps in which the account does not close; none where all of it is as good as closed."""
+    allowed = _CLOSED * float(np.sum(np.max(np.abs(works), axis=0, initial=0.0)))
+    if len(breakpoints) < 2 or not allowed < float(np.max(np.abs(residual))) < np.inf:
+        return []
+    jumps = np.abs(np.diff(residual))
+    order = np.argsort(jumps)
+    worst = order[np.cumsum(jumps[order]) > allowed][-_MOST_REFINED:]
+    first = np.searchsorted(breakpoints, times[worst], side="right") - 1
+    last = np.searchsorted(breakpoints, times[worst + 1], side="left")
+    found: list[tuple[float, float]] = []
+    for begin, end in sorted(zip(breakpoints[first], breakpoints[np.minimum(last, len(breakpoints) - 1)], strict=True)):
+        if found and begin < found[-1][1]:
+            begin, end = found[-1][0], max(end, found.pop()[1])
+        found.append((float(begin), float(end)))
+    return found
+
+
+def _refine(
+    loop: ClosedLoop, trajectory: Trajectory, begin: float, end: float, times: Array, works: Array, stop: Stop
+) -> None:
+    """Integrate a stretch again, finely, and put its works in place of those of the steps that passed it.
+
+    A step may end well and yet pass in between too far from the motion for its powers, as where a joint that starts
+    deep in a stiff limiter is thrown back.
+    """
+    start = trajectory.interpolate(np.array([begin]))[0]
+    fine = integrate(
+        lambda instant, x: loop.rhs(begin + instant, x),
+        start,
+        end - begin,
+        method="Radau",
+        rtol=_FINE,
+        atol=_FINE * loop.finger.layout.scales(),
+        stop=stop,
+    )
+    if fine.failure or fine.interrupted or stop():
+        return
+    inside = (times > begin) & (times < end)
+    at, count = np.append(times[inside], end), works.shape[1]
+    steps = trajectory.breakpoints[(trajectory.breakpoints >= begin) & (trajectory.breakpoints <= end)]
+    more = _works(loop, np.unique(begin + fine.breakpoints), lambda nodes: fine.interpolate(nodes - begin), at, count)
+    more -= _works(loop, steps, trajectory.interpolate, at, count)
+    works[inside] += more[:-1]
+    works[times >= end] += more[-1]
+
+
+def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[tuple[ClosedLoop, Array, Callable[[Array], Array]]]:
+    """Return loops with their breakpoints and states: of the fingers of a hand that move apart, or of the whole."""
+    sizes = [part.finger.layout.size for part in loop.parts]
+    if sizes and sizes == [len(places) for places, _, _ in trajectory.islands]:
+        # Islands stand in the order of their first joint, as fingers do.
+        return [(part, ends, states) for part, (_, ends, states) in zip(loop.parts, trajectory.islands, strict=True)]
+    return [(loop, trajectory.breakpoints, trajectory.interpolate)]
+
+
+def _works(loop: ClosedLoop, breakpoints: Array, states: Callable[[Array], Array], times: Array, count: int) -> Array:
     """Return the integrals of all powers from the start to the saved times, shape (m, count).
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
     """
-    begin, length = trajectory.breakpoints[:-1], np.diff(trajectory.breakpoints)
+    begin, length = breakpoints[:-1], np.diff(breakpoints)
     works, reached = np.zeros((len(times), count)), np.zeros(count)
     if len(length) == 0:
         return works
@@ -70,7 +141,7 @@ def _works(loop: ClosedLoop, trajectory: Trajectory, times: Array, count: int) -
     for first in range(0, len(begin), _CHUNK):
         part = slice(first, first + _CHUNK)
         nodes = (begin[part, None] + length[part, None] * _NODES).ravel()
-        values = loop.powers(nodes, trajectory.interpolate(nodes))
+        values = loop.powers(nodes, states(nodes))
         values = values.reshape(-1, len(_NODES), count) * length[part, None, None]
         steps = sum(weight * values[:, node] for node, weight in enumerate(_WEIGHTS))
         before = reached + np.cumsum(steps, axis=0) - steps

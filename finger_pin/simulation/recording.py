@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
@@ -22,6 +23,7 @@ from finger_pin.mechanism.mechanism import Evaluation
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.touching import contact_coordinates, contact_variables
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR = ("time", "motor")
@@ -34,6 +36,9 @@ _STORED = {
     "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
+    "contacts": "elastic energy of contacts",
+    "objects_kinetic": "kinetic energy of free objects",
+    "objects_gravity": "potential energy of free objects",
     "elastic_tendons": "elastic energy of the tendons on spools",
     "gearboxes": "elastic energy of the gearboxes' bristles",
     "rotors": "kinetic energy of the rotors",
@@ -46,6 +51,7 @@ _EXCHANGED = {
     "gearbox_coulomb": "lost by gears sliding",
     "gearbox_viscous": "lost in the gears' viscous friction",
     "elastic_damping": "lost as tendons on spools stretch",
+    "palm": "supplied by what moves the palm",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",
@@ -54,24 +60,30 @@ _EXCHANGED = {
     "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
     "joint_springs": "lost in the joints' springs",
+    "contacts_impact": "lost in contacts along their normals",
+    "contacts_sliding": "lost in contacts sliding",
+    "contacts_micro_damping": "lost in the bristles of contacts",
     "slack": "booked where a tension is cut at zero",
 }
 
 
-def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str) -> xr.Dataset:
-    """Return all signals of a trajectory at the scenario's sample times, as far as the trajectory goes.
+def record(
+    scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str, times: Array | None = None
+) -> xr.Dataset:
+    """Return all signals of a trajectory at times, by default the scenario's, as far as the trajectory goes.
 
     The signals are recomputed from the states by the evaluation that the dynamics use.
     """
-    times = scenario.sample_times()
+    times = scenario.sample_times() if times is None else times
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
     signals = loop.evaluate(times, trajectory.interpolate(times))
     state = signals.finger.state
-    motion = loop.dynamics.motion(state.position, state.velocity)
+    motion = loop.motion(times, state)
     kept = account(loop, trajectory, times, signals, motion)
     routing = loop.finger.routing
     further = loop.finger.further
-    variables = _signals(loop, signals, motion) | _further(further, signals.finger.mechanism) | _energies(kept)
+    variables = _signals(loop, times, signals, motion) | contact_variables(loop.finger, signals.finger)
+    variables |= _further(further, signals.finger.mechanism) | _energies(kept)
     dataset = xr.Dataset(
         {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
         coords={
@@ -83,6 +95,9 @@ def record(scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method:
         attrs=_attributes(scenario, trajectory, method),
     )
     dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
+    dataset = dataset.assign_coords(contact_coordinates(loop.finger))
+    if scenario.hand is not None and len(scenario.hand.fingers) > 1:
+        dataset = dataset.assign_coords(finger=list(scenario.hand.fingers))
     if routing.passive > 1:
         dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
     if loop.finger.actuators.names:
@@ -119,20 +134,23 @@ def load_result(path: str | Path) -> xr.Dataset:
     return xr.load_dataset(file, engine="netcdf4")
 
 
-def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+def _signals(
+    loop: ClosedLoop, times: Array, signals: LoopSignals, motion: Motion
+) -> dict[str, tuple[Any, Array, dict[str, str]]]:
     finger, tendons, joints, state = signals.finger, signals.finger.tendons, signals.finger.joints, signals.finger.state
     actuated, passive = loop.finger.routing.actuated, loop.finger.routing.passive
     halves = tendons.strands[..., actuated:]
     tension = loop.finger.routing.tendon_tension(tendons.strands)
     error = signals.reference.position - state.position
     force = np.broadcast_to(finger.fingertip_force, motion.tip.shape)
+    tip = ("time", "axis") if motion.tip.ndim == 2 else ("time", "finger", "axis")
     table: dict[str, tuple[Any, Array, dict[str, str]]] = {
         "joint_position": _entry(_JOINT, state.position, "rad", "joint angle"),
         "joint_velocity": _entry(_JOINT, state.velocity, "rad/s", "joint velocity"),
         "joint_acceleration": _entry(_JOINT, finger.acceleration, "rad/s2", "joint acceleration", "18"),
         "joint_reference": _entry(_JOINT, signals.reference.position, "rad", "desired joint angle", "20"),
         "tracking_error": _entry(_JOINT, error, "rad", "desired less actual joint angle"),
-        "fingertip_position": _entry(("time", "axis"), motion.tip, "m", "fingertip position", "1"),
+        "fingertip_position": _entry(tip, motion.tip, "m", "fingertip position", "1"),
         "tendon_command": _entry(_TENDON, signals.control.tension, "N", "commanded or planned tension", "21b"),
         "tendon_tension": _entry(_TENDON, tension, "N", "delivered tension; distal half of a passive tendon", "12"),
         "tendon_velocity": _entry(_TENDON, tendons.velocity, "m/s", "sliding velocity", "3"),
@@ -147,10 +165,16 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "joint_stiction": _entry(_JOINT, state.joint_stiction, "N m", "joint stiction torque", "9a"),
         "joint_reaction": _entry(_JOINT, joints.reaction, "N", "joint reaction force", "17"),
         "limiter_torque": _entry(_JOINT, finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": _entry(("time", "axis"), force, "N", "force on the fingertip", "6"),
+        "fingertip_force": _entry(tip, force, "N", "force on the fingertip", "6"),
         "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
+    if loop.palm is not None:
+        place, rotation = loop.palm.place(times)
+        quaternions = [pin.Quaternion(each).coeffs() for each in rotation]
+        table["palm_position"] = _entry(("time", "axis"), place, "m", "place of the palm in the world")
+        text = "rotation of the palm to the world, x, y, z, w"
+        table["palm_orientation"] = _entry(("time", "quaternion"), np.array(quaternions), "1", text)
     if signals.control.shortfall is not None:
         text = "desired torque that tension limits keep from being planned"
         table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)
@@ -190,6 +214,8 @@ def _further(tables: tuple[Rows, ...], found: Evaluation) -> dict[str, tuple[Any
         own, dims = found.rows[table.group], ("time", table.group)
         values = {"force": own.force, "length": own.row.length, "speed": own.row.speed}
         values |= dict(zip(table.law.signals, own.signals, strict=True))
+        if np.any(table.channels >= 0):
+            values["input"] = own.row.command
         if table.law.scale is not None:
             values["state"] = own.row.state
         for name, value in values.items():

@@ -33,7 +33,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import AccuracyWarning, InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, open_account, ringing
+from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, floor_advice, open_account, ringing
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -116,9 +116,14 @@ def simulate(
     elif loop.finger.actuators.names:
         # Before the controller is sampled: then it must not be asked for a start.
         loop = replace(loop, start=loop.initial_state())
+    if loop.finger.surroundings is not None:
+        start = loop.finger.layout.unpack(loop.initial_state())
+        assert start.object_pose is not None
+        loop.finger.surroundings.check(start.position, start.object_pose)
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     # The margin is that of the paper's controller on the scenario's reference.
-    judged = controller is None and reference is None and scenario.controller.kind == "proportional"
+    planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
+    judged = controller is None and reference is None and planned
     judged = judged and loop.finger.routing.force_closure().holds
     margin = warn_of_self_locking(scenario) if judged else None
     driving = micro_damping_advice(scenario.finger)
@@ -137,15 +142,15 @@ def simulate(
             )
         method = _CONTINUOUS
     if scenario.simulation.method not in METHODS_IN_NUMPY:
-        loop = replace(loop, dynamics=CompiledFinger(loop.finger))
+        loop = loop.compiled()
     answers = loop.controller
     sampled = None if sampling is None else SampledController(loop, sampling)
     if positioned:
         duration = scenario.simulation.duration
         drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
-        loop = replace(loop, drives=drives)
+        loop = replace(loop, drives=drives, parts=())
     if sampled is not None:
-        loop = replace(loop, controller=sampled)
+        loop = replace(loop, controller=sampled, parts=())
     elif own:
         # A wrong answer of a user's own controller is refused before anything is computed.
         loop.evaluate(0.0, loop.initial_state())
@@ -195,6 +200,10 @@ def simulate(
         advice = _ADVICE_TIGHT if tight else _ADVICE
         if "physical range" in trajectory.failure:
             advice = _ADVICE_RUNAWAY
+        else:
+            with np.errstate(all="ignore"):
+                last = loop.evaluate(reached, trajectory.interpolate(np.array([reached]))[0])
+                advice = floor_advice(last.finger) or advice
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:
@@ -253,6 +262,7 @@ def _integrate(
             knots=loop.knots(),
             watch=watch,
             chunk=chunk,
+            together=chunk == _CHUNK_OBSERVED,
             stop=stop,
         )
     if method == "CVODE":

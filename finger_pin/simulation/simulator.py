@@ -7,8 +7,11 @@ import math
 import numbers
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
+from finger_pin.control.closed_loop import Samples
+from finger_pin.control.reference import Reference
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepper import TABLEAUS, Stepper
@@ -17,6 +20,8 @@ from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.state import State
+from finger_pin.simulation.accuracy import floor_advice
+from finger_pin.simulation.told import Told
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
@@ -68,17 +73,20 @@ class Simulator:
         start = 0.5 * (limiter.lower + limiter.upper) if position is None else position
         self.finger = finger
         self._compiled = CompiledFinger(finger)
-        self._tension = np.zeros(finger.routing.actuated)
+        self._tension = np.zeros(finger.mechanism.channels)
         mechanism = finger.mechanism
         self._stepper = Stepper(
             mechanism,
             held_control(mechanism.channels, mechanism.coordinates),
-            finger.rest_state(_vector("position", start, len(finger.routing.joints))),
+            finger.rest_state(_numbers("position", start, (len(finger.routing.joints),))),
             TABLEAUS[method](),
             rtol,
             atol_scale * finger.layout.scales(),
         )
-        self._force = np.zeros(3)
+        tips = len(mechanism.body.tips)
+        self._force = np.zeros(3 if tips == 1 else (tips, 3))
+        self._told = Told(self._stepper.copy())
+        self._settings = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
 
     @property
     def time(self) -> float:
@@ -87,12 +95,16 @@ class Simulator:
 
     @property
     def x(self) -> Array:
-        """The packed state, shape (size,); a copy. Setting it continues from there, at the same time."""
+        """The packed state, shape (size,); a copy.
+
+        Setting it continues from there, at the same time, with a new result.
+        """
         return self._stepper.x.copy()
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
-        self._stepper.restart(_vector("x", value, self.finger.layout.size))
+        self._stepper.restart(_numbers("x", value, (self.finger.layout.size,)))
+        self._told = Told(self._stepper.copy())
 
     @property
     def state(self) -> State:
@@ -103,31 +115,52 @@ class Simulator:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon.
+            tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon. Inputs of a
+                tree's actuators follow.
             dt: s.
-            fingertip_force: F over the step, shape (3,), N, base frame; none by default.
+            fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
         Raises:
             InputError: If an argument is not finite or has the wrong size, or a tension is negative; nothing has moved
                 then.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        command = _vector("tension", tension, self._tension.size)
-        tensions = np.delete(command, self.finger.actuators.voltages)
+        command = _numbers("tension", tension, self._tension.shape)
+        tensions = np.delete(command[: self.finger.routing.actuated], self.finger.actuators.voltages)
         if np.any(tensions < 0.0):
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
-        force = np.zeros(3) if fingertip_force is None else _vector("fingertip_force", fingertip_force, 3)
+        shape = self._force.shape
+        force = np.zeros(shape) if fingertip_force is None else _numbers("fingertip_force", fingertip_force, shape)
         stepper = self._stepper
         if np.any(force != self._force):
             stepper.load(force)
         self._tension, self._force = command, force
         stepper.hold(command)
         status = stepper.advance(stepper.time + dt)
+        self._told.add(stepper.time, command, force)
         if status:
-            raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), _ADVICE)
+            advice = floor_advice(self.signals()) or _ADVICE
+            raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), advice)
         return self.state
+
+    def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:
+        """Return what has been run so far, as `simulate` does: for figures, the viewer and `save`.
+
+        The record begins at the start, or where `x` was last set. It takes about as long as the steps did: they are
+        kept as what was held during them, and repeated bit by bit. The attribute ``own`` marks the result.
+
+        Args:
+            sample_rate: Of the signals, Hz.
+            reference: theta^d, for the record alone: an object with ``at``, or times and angles, as for `simulate`; by
+                default the posture at the start.
+
+        Raises:
+            InputError: If nothing has been run, or the sample rate or reference is wrong.
+            IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
+        """
+        return self._told.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference)
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
@@ -138,16 +171,18 @@ class Simulator:
         twin = copy.copy(self)
         twin._compiled = CompiledFinger(self.finger)
         twin._stepper = self._stepper.copy()
+        twin._told = self._told.copy()
         return twin
 
 
-def _vector(name: str, value: ArrayLike, size: int) -> Array:
+def _numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    wanted = f"must be {' times '.join(map(str, shape))} numbers"
     try:
-        vector = np.array(value, dtype=float)
+        numbers = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(name, f"must be {size} numbers", value) from None
-    if vector.shape != (size,):
-        raise InputError(name, f"must be {size} numbers, not an array of shape {vector.shape}")
-    if not np.isfinite(vector).all():
-        raise InputError(name, "must be finite", vector.tolist())
-    return vector
+        raise InputError(name, wanted, value) from None
+    if numbers.shape != shape:
+        raise InputError(name, f"{wanted}, not an array of shape {numbers.shape}")
+    if not np.isfinite(numbers).all():
+        raise InputError(name, "must be finite", numbers.tolist())
+    return numbers

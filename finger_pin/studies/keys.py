@@ -152,7 +152,9 @@ def split(key: str) -> tuple[str, int | None]:
 def describe(key: str) -> dict[str, str]:
     """Return ``units`` and ``long_name`` of what a key holds, from its description."""
     name, index = split(key)
-    field = find_field(Scenario, name.split("."))
+    first, *rest = parts = name.split(".")
+    # In a hand the joints of a finger stand in a table of its own.
+    field = find_field(Scenario, parts) or find_field(Scenario, [first, *rest[:1], *rest[2:]])
     extra = field.json_schema_extra if field is not None else None
     unit = extra.get("unit", "1") if isinstance(extra, dict) else "1"
     text = (field.description or "").rstrip(".") if field is not None else ""

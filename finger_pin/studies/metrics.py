@@ -159,11 +159,15 @@ def fingertip_force(run: Run) -> float:
     """Return the force that the fingertip can exert whichever way its joints move it, N.
 
     It is the radius of the largest ball around zero in the polytope of forces, without friction, at the mean posture
-    of the reference, with tensions up to `FORCE_TENSION`.
+    of the reference, with tensions up to `FORCE_TENSION`; of a hand that of its weakest finger.
     """
-    finger = Finger(run.scenario.finger)
-    times = run.scenario.simulation.duration * (np.arange(500) + 0.5) / 500
-    posture = np.mean(SignalReference.from_scenario(run.scenario, finger.routing).at(times).position, axis=0)
+    return min(_fingertip_force(part) for part in run.scenario.parts().values())
+
+
+def _fingertip_force(scenario: Scenario) -> float:
+    finger = Finger(scenario.finger)
+    times = scenario.simulation.duration * (np.arange(500) + 0.5) / 500
+    posture = np.mean(SignalReference.from_scenario(scenario, finger.routing).at(times).position, axis=0)
     offsets = force_polytope(finger, posture, FORCE_TENSION).offsets
     return float(np.min(offsets)) if offsets.size else 0.0
 

@@ -144,21 +144,26 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
 
 
 def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_that_started_it(tmp_path):
+    result = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
+    (tmp_path / "file").touch()
     with Drawing() as drawing:
-        drawing.start(tmp_path / "no\nwhere é")
-        with pytest.raises(FileNotFoundError):
+        drawing.start(result, tmp_path / "file")
+        with pytest.raises(FileExistsError):
             drawing.wait()
     with Drawing() as drawing:
-        (tmp_path / "trajectory.nc").write_text("no netCDF")
-        drawing.start(tmp_path)
-        with pytest.raises(NotDrawn, match="Unknown file format"):
+        drawing.start(result.drop_vars("tendon_tension"), tmp_path / "no\nwhere é")
+        with pytest.raises(NotDrawn, match="tendon_tension"):
             drawing.wait()
     with Drawing() as drawing:
         os.kill(drawing.process.pid, signal.SIGKILL)
         drawing.process.wait()
-        drawing.start(tmp_path)
+        drawing.start(result, tmp_path)
         with pytest.raises(NotDrawn, match="killed"):
             drawing.wait()
+    with Drawing() as drawing:
+        drawing.start(result, tmp_path / "figures")
+        drawing.wait()
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"fig6.png", "losses.png", "energy.png"}
     with Drawing() as drawing:
         pass
     assert drawing.process.returncode == -signal.SIGKILL

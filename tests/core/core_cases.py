@@ -21,13 +21,13 @@ BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
     name + push
     for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos")
+    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos", "carried")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
 
 def tree_model():
-    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes."""
+    """Seven joints on two branches of one trunk: revolute and prismatic, about main and inclined axes, with rotors."""
     pin.seed(5)
     turned = np.array([0.48, -0.6, 0.64])
     joints = [
@@ -44,6 +44,7 @@ def tree_model():
         index = model.addJoint(parent, kind, pin.SE3.Random(), name)
         model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Random())
     model.addFrame(pin.Frame("tip", 5, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    model.armature[:] = np.linspace(0.1, 0.7, model.nv)
     return model
 
 
@@ -128,6 +129,16 @@ class Unpowered:
 
     def planned(self, time, reference, control):
         return control
+
+
+def carried():
+    """The thumb of a hand whose palm swings about and along all axes."""
+    names, rates = ("x", "y", "z", "roll", "pitch", "yaw"), (1.1, 1.7, 2.3, 1.3, 0.9, 1.9)
+    path = {
+        name: {"amplitude": 0.05 if index < 3 else 0.5, "frequency": rate, "phase": 0.3 * index}
+        for index, (name, rate) in enumerate(zip(names, rates, strict=True))
+    }
+    return fp.load_scenario("hand", {"hand.palm.path": path}).parts()["thumb"]
 
 
 def without_abduction_link(loop):

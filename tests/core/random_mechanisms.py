@@ -4,9 +4,13 @@ import numpy as np
 import pinocchio as pin
 from law_cases import every_law, random_parameters
 
+from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.gaps import PRISM, prism_parameters
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.pieces import Leg, Piece, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.spans import SPHERE, STRAIGHT
 
 KINDS = (
     pin.JointModelRX,
@@ -48,6 +52,39 @@ def random_body(rng, free=False):
     return RigidBody(model, tips)
 
 
+def random_path(rng, joints):
+    """Pieces one after the other, between points of any bodies; most begin where the last one ends."""
+    legs, last = [], None
+    for _ in range(rng.integers(1, 4)):
+        follows = last is not None and rng.random() < 0.7
+        first = last if follows else Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
+        last = Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
+        shape, numbers = (STRAIGHT, ()) if rng.random() < 0.6 else (SPHERE, (0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
+        frame = int(rng.integers(0, joints + 1))
+        piece = Piece(shape, np.array(numbers), (first, last), frame, random_placement(rng))
+        measure = None if rng.random() < 0.5 else rng.normal()
+        legs.append(Leg(piece, arm=rng.normal(), measure=measure, follows=follows))
+    return tuple(legs)
+
+
+def random_contacts(rng, joints, width):
+    """Three or four contacts of capsules with balls so large that most are inside; they slide or stick."""
+    count = int(rng.integers(3, 5))
+    paths = []
+    for _ in range(count):
+        holder, frame = int(rng.integers(0, joints + 1)), int(rng.integers(0, joints + 1))
+        ends = Place(holder, rng.normal(size=3)), Place(holder, rng.normal(size=3))
+        numbers = np.array([0.3, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
+        piece = Piece(PRISM, numbers, ends, frame, random_placement(rng))
+        paths += [(Leg(piece, column),) for column in range(3)]
+    # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor.
+    least = [1.0, 0.0, 1.0, 0.8, 0.3, 1.0, 0.1, 0.5, 0.1]
+    most = [2.0, 0.1, 1.5, 1.0, 0.7, 3.0, 1.0, 2.0, 0.2]
+    parameters = rng.uniform(least, most, (count, len(least))).T
+    names = tuple(f"contact{k}" for k in range(count))
+    return Rows("contacts", CONTACT, names, parameters, np.zeros((3 * count, width)), paths=paths)
+
+
 def random_mechanism(rng, free=False):
     """Tables of rows of all laws in any order, each fed and pressed by some of those before."""
     body = random_body(rng, free)
@@ -58,11 +95,13 @@ def random_mechanism(rng, free=False):
         return np.where(rng.random((count, others)) < 0.6, rng.normal(size=(count, others)), 0.0)
 
     tables, channels = [], int(rng.integers(1, 4))
+    if rng.random() < 0.5:
+        tables.append(random_contacts(rng, joints, width))
     laws = list(every_law().values())
     for index in rng.permutation(len(laws)):
         law, count = laws[index], int(rng.integers(1, 4))
-        earlier = {table.group: weights(count, len(table.names)) for table in tables if rng.random() < 0.4}
-        pressing = {table.group: weights(count, len(table.names)) for table in tables if rng.random() < 0.5}
+        earlier = {table.group: weights(count, table.count) for table in tables if rng.random() < 0.4}
+        pressing = {table.group: weights(count, table.count) for table in tables if rng.random() < 0.5}
         tables.append(
             Rows(
                 group=f"table{len(tables)}",
@@ -78,6 +117,7 @@ def random_mechanism(rng, free=False):
                 pins=rng.integers(0, joints, count) if rng.random() < 0.5 else None,
                 bends=np.abs(weights(count, width)) if rng.random() < 0.5 else None,
                 curvature_offset=rng.uniform(0.1, 1.0, count),
+                paths=[random_path(rng, joints) for _ in range(count)] if rng.random() < 0.3 else (),
             )
         )
     return Mechanism(body, tables, lumps, rng.uniform(0.5, 2.0, len(lumps)))

@@ -10,7 +10,15 @@ import finger_pin.laws
 from finger_pin.laws.law import Law, Row
 
 #: Where a parameter is drawn from, by its name; others from 0.1 to 2.
-RANGES = {"lower": (-1.5, -0.1), "surface": (0.1, 0.8), "ratio": (1.0, 2.0), "lag": (0.0, 0.5), "floor": (1e-3, 1.0)}
+RANGES = {
+    "lower": (-1.5, -0.1),
+    "least": (-1.5, -0.1),
+    "lowest": (-0.4, 0.5),
+    "surface": (0.1, 0.8),
+    "ratio": (1.0, 2.0),
+    "lag": (0.0, 0.5),
+    "floor": (1e-3, 1.0),
+}
 
 
 def every_law():

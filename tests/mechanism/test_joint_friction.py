@@ -7,7 +7,6 @@ import pytest
 from exerted import pin_forces
 
 import finger_pin as fp
-from finger_pin.laws.reaction import joint_reaction
 from finger_pin.mechanism.joint_friction import JointFriction
 
 COULOMB, STICTION, STIFFNESS, VISCOUS, STRIBECK, FLOOR = 2.5e-4, 3.5e-4, 5.0, 1e-3, 0.1, 1e-7
@@ -58,13 +57,6 @@ def test_reaction_is_the_norm_of_tendon_pull_and_external_force_at_random_postur
         for e, load in zip(directions(theta), loads([*command, tension, tension]), strict=True):
             expected.append(math.sqrt(sum((f - c * load) ** 2 for c, f in zip(e, force, strict=True))))
         np.testing.assert_allclose(signals.joints.reaction, expected, rtol=1e-9)
-
-
-def test_a_pull_at_the_tip_along_the_tendons_unloads_the_joint_they_press_on():
-    assert joint_reaction(5.0, 5.0, 0.0) == 0.0
-    assert joint_reaction(5.0, 2.0, 0.0) == pytest.approx(3.0)
-    assert joint_reaction(5.0, -2.0, 0.0) == pytest.approx(7.0)
-    assert joint_reaction(3.0, 0.0, 4.0) == pytest.approx(5.0)
 
 
 def test_joint_friction_is_law_9_loaded_by_the_reaction(joints):

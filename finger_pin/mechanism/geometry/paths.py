@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -13,8 +13,10 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry.cuts import Cut, Groove, cuts
-from finger_pin.mechanism.geometry.lanes import tendon_lanes
-from finger_pin.mechanism.geometry.winding import Arc, Span, wind
+from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model, palm_of
+from finger_pin.mechanism.geometry.foreign import turned_model
+from finger_pin.mechanism.geometry.winding import Arc, Span
+from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.urdf import build_rigid_body
 
 #: Drawn sag of a loose span in parts of its length, and lift of a loose arc off its pulley in parts of its radius.
@@ -49,59 +51,75 @@ class TendonPath:
     distal: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Pulley:
-    """The winding surface of one tendon at one joint.
-
-    Attributes:
-        tendon: Name of the tendon.
-        joint: Index of the joint, 1 for the first; its axis is the z axis of the link after it.
-        radius: r, signed, m.
-        offset: Along the joint axis, m.
-    """
-
-    tendon: str
-    joint: int
-    radius: float
-    offset: float
-
-
 class TendonGeometry:
-    """The tendons of a finger: wound once, placed for any joint position.
+    """The tendons of a finger, or of all fingers of a hand: wound once, placed for any joint position.
 
     Attributes:
         description: What it was built from.
-        model: Pinocchio model of the generated URDF.
+        model: Pinocchio model; the axis of every joint is the z axis of its frame.
         lanes: How far along the joint axes each tendon runs.
         pulleys: Winding surfaces whose radius is not zero.
+        visuals: The solids.
+        tips: The fingertips: index of the link, and place in its frame, shape (3,), m.
+        size: How far the fingertips can be from the base, about, m.
+        widths: Of the links, m.
+        first_seen: First link that the camera must have in view.
     """
 
-    def __init__(self, description: FingerDescription, *, resolution: int = 8) -> None:
+    first_seen = 0
+
+    def __init__(
+        self,
+        description: FingerDescription,
+        *,
+        resolution: int = 8,
+        body: RigidBody | None = None,
+        solids: pin.GeometryModel | None = None,
+    ) -> None:
         """Wind the tendons.
 
         Args:
-            description: A finger whose joints all carry links.
+            description: A finger or hand whose joints all carry links, or one on a body of the user's own.
             resolution: Points per straight span and per radian of arc.
+            body: The body that the joints are of, if it is not made of links.
+            solids: Of that body.
 
         Raises:
-            InputError: If a joint carries no link.
+            InputError: If a joint carries no link, or the body has joints that do not turn.
         """
         self.description = description
-        self.model = build_rigid_body(description).model
-        self.lanes = tendon_lanes(description, self.model)
-        self._pieces = {
-            name: wind(description, self.model, self.lanes, name, resolution) for name in description.tendons
-        }
-        indices = {name: index for index, name in enumerate(description.joints, start=1)}
-        self.pulleys = tuple(
-            Pulley(name, indices[joint], crossing.radius, self.lanes.offset[name, indices[joint]])
-            for name, tendon in description.tendons.items()
-            for joint, crossing in tendon.crossings.items()
-            if crossing.radius
+        if body is None:
+            fingers, own = fingers_of_links(description, resolution), palm_of(description.hand)
+            body = build_rigid_body(description)
+            self.model = body.model
+        else:
+            self.model, fingers, own = fingers_on_model(description, body, solids, resolution)
+        rotations = [np.eye(3)] * self.model.njoints if body.model is self.model else turned_model(body)[1]
+        frames = [body.model.frames[tip] for tip in body.tips]
+        self.tips = tuple((int(f.parentJoint), rotations[f.parentJoint].T @ f.placement.translation) for f in frames)
+        pieces = {name: each for finger in fingers for name, each in finger.pieces.items()}
+        self._pieces = {name: pieces[name] for name in description.tendons}
+        self.pulleys = tuple(pulley for finger in fingers for pulley in finger.pulleys)
+        self.visuals = (*own, *(visual for finger in fingers for visual in finger.visuals))
+        self.widths = tuple(width for finger in fingers for width in finger.widths)
+        travel = 0.0
+        if description.hand is not None:
+            travel = sum(description.hand.palm.on_path(axis).greatest for axis in ("x", "y", "z"))
+        self.size = max(finger.size for finger in fingers) + travel
+        # Joints are looked at along the axes of the finger that reaches farthest.
+        self.lanes = replace(
+            max(fingers, key=lambda finger: finger.size).lanes,
+            offset={key: at for finger in fingers for key, at in finger.lanes.offset.items()},
+            spacing=min(finger.lanes.spacing for finger in fingers),
         )
 
-    def poses(self, joint_position: ArrayLike) -> LinkPoses:
-        """Return where the links are at theta, shape (..., n), rad."""
+    def poses(self, joint_position: ArrayLike, base: LinkPoses | None = None) -> LinkPoses:
+        """Return where the links are at theta, shape (..., n), rad.
+
+        Args:
+            joint_position: theta.
+            base: Poses of the base, shapes (..., 3, 3) and (..., 3), where it moves.
+        """
         q = self._checked(joint_position)
         flat, count = np.ascontiguousarray(q.reshape(-1, self.model.nq)), self.model.njoints
         rotation, translation = np.empty((len(flat), count, 3, 3)), np.empty((len(flat), count, 3))
@@ -111,6 +129,10 @@ class TendonGeometry:
             for index, placement in enumerate(data.oMi):
                 rotation[row, index], translation[row, index] = placement.rotation, placement.translation
         leading = q.shape[:-1]
+        if base is not None:
+            turned, moved = base.rotation.reshape(-1, 1, 3, 3), base.translation.reshape(-1, 1, 3)
+            translation = (turned @ translation[..., None])[..., 0] + moved
+            rotation = turned @ rotation
         return LinkPoses(rotation.reshape(*leading, count, 3, 3), translation.reshape(*leading, count, 3))
 
     def paths(
@@ -135,7 +157,7 @@ class TendonGeometry:
         return tuple(paths)
 
     def cuts(self, groove: Groove = Groove.DISTAL) -> tuple[Cut, ...]:
-        """Return where and in which direction every tendon crosses the joints; see `cuts`."""
+        """Return where and in which direction every tendon of a finger crosses the joints; see `cuts`."""
         found = (cuts(self.model, name, pieces, groove) for name, pieces in self._pieces.items())
         return tuple(cut for each in found for cut in each)
 

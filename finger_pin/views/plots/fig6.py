@@ -9,21 +9,39 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, series, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, new_figure, styled
 
+_DEGREES = 180.0 / np.pi
+_COLUMNS = (
+    ("references θᵈ", "joint_reference", _DEGREES, "°"),
+    ("tracking errors θᵈ \N{MINUS SIGN} θ", "tracking_error", _DEGREES, "°"),
+    ("delivered tendon tensions", "tendon_tension", 1.0, "N"),
+)
+
 
 @styled
-def plot_fig6(result: xr.Dataset) -> Figure:
+def plot_fig6(result: xr.Dataset, finger: str | None = None) -> Figure:
     """Draw Fig. 6 from a result.
 
     (a) theta^d and (b) theta^d - theta, deg. (c) One panel per tendon, N: dashed f_hat, solid f; for a passive
     tendon f is the tension of its distal half (f5_4), and that of its proximal half (f5_3) is dotted.
 
+    Of a hand there is a row for each finger, with references, errors and delivered tensions.
+
     Args:
-        result: Dataset of `simulate`, of any finger.
+        result: Dataset of `simulate`, of any finger or hand.
+        finger: One finger of a hand, drawn as a finger is.
+
+    Raises:
+        InputError: If there is no such finger.
     """
+    if finger is not None:
+        result = finger_of(result, finger)
+    elif len(fingers_of(result)) > 1:
+        return plot_by_finger(result, _COLUMNS)
     tendons = names(result, "tendon")
     figure = new_figure(11.0, max(6.6, 1.3 * len(tendons)))
     labels = ["reference θᵈ (°)", "error θᵈ \N{MINUS SIGN} θ (°)"]

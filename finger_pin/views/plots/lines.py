@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -10,8 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
 from finger_pin.views.plots.style import COLOURS, DASHES
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
 
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.
 BINS = 800

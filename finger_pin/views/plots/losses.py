@@ -2,27 +2,47 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.routing import Array
+from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
-from finger_pin.views.plots.panels import labelled, legend, stack, title
+from finger_pin.views.plots.panels import flatten_rounding, labelled, legend, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
+
+_COLUMNS = (
+    ("tendon friction", "tendon_friction", 1.0, "N"),
+    ("joint friction", "joint_friction", 1e3, "mN m"),
+)
 
 
 @styled
-def plot_losses(result: xr.Dataset) -> Figure:
+def plot_losses(result: xr.Dataset, finger: str | None = None) -> Figure:
     """Draw what friction takes, from a result.
 
     (a) One panel per tendon, N: the tension before its friction (the command, or that at a spool; of a passive tendon,
     the proximal half) and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d
     of (19), the torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
 
+    Of a hand there is a row for each finger, with the friction of its tendons and of its joints.
+
     Args:
-        result: Dataset of `simulate`, of any finger.
+        result: Dataset of `simulate`, of any finger or hand.
+        finger: One finger of a hand, drawn as a finger is.
+
+    Raises:
+        InputError: If there is no such finger.
     """
+    if finger is not None:
+        result = finger_of(result, finger)
+    elif len(fingers_of(result)) > 1:
+        return plot_by_finger(result, _COLUMNS)
     rows = max(result.sizes["tendon"], result.sizes["joint"])
     figure = new_figure(11.0, max(6.6, 1.3 * rows))
     _tendons(figure, result)
@@ -56,6 +76,7 @@ def _joints(figure: Figure, result: xr.Dataset) -> None:
         trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=1.0)
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
+        flatten_rounding(axes)
     title(panels[0], "(b) joint torque before and after joint friction")
     legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=4)
 

@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from finger_pin.description.hand import one_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
@@ -32,6 +33,7 @@ def plot_workspace(finger: Finger | FingerDescription) -> Figure:
     """
     if isinstance(finger, FingerDescription):
         finger = Finger(finger)
+    one_finger(finger.description)
     surface, section = fingertip_surface(finger), flexion_section(finger)
     figure = new_figure(11.0, 5.2)
     _surface(figure, _MILLI * surface, _MILLI * section.poses)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import scipy.spatial
 import xarray as xr
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
@@ -27,7 +26,7 @@ from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Motion
 from finger_pin.views.viewer.drawing import tension_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
-from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY
+from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, is_mesh
 
 _BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -105,7 +104,7 @@ class _Film:
         """Set the stage: camera, legend, and what stays."""
         scene = motion.scene
         self.motion = motion
-        self.poses = scene.geometry.poses(motion.position)
+        self.poses = scene.geometry.poses(motion.position, motion.palm)
         self.solids = tuple(_solids(scene))
         self.scale = scale_above(motion.largest)
         away = np.array(_AWAY) / np.linalg.norm(_AWAY)
@@ -117,7 +116,9 @@ class _Film:
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
-        seen = np.concatenate([self.tips, *(self._outline(solid, frame) for frame in few for solid in self.solids)])
+        seen = np.concatenate(
+            [self.tips.reshape(-1, 2), *(self._outline(solid, frame) for frame in few for solid in self.solids)]
+        )
         low, high = seen.min(axis=0), seen.max(axis=0)
         # Room for the legend at the left, and for the title above.
         unit = float(np.max((high - low) / (np.array([0.76, 0.8]) * _INCHES)))
@@ -128,8 +129,8 @@ class _Film:
         self.clock = axes.text(0.975, 0.05, "", color=_INK, transform=axes.transAxes, ha="right", fontsize=13)
         self.bodies = PolyCollection([], linewidths=0.8)
         axes.add_collection(self.bodies)
-        axes.plot(*self.tips.T, color=_TRACE, linewidth=1.0, alpha=0.3)
-        self.trace = axes.plot([], [], color=_TRACE, linewidth=2.0)[0]
+        axes.plot(*np.moveaxis(self.tips, -1, 0), color=_TRACE, linewidth=1.0, alpha=0.3)
+        self.traces = [axes.plot([], [], color=_TRACE, linewidth=2.0)[0] for _ in range(self.tips.shape[1])]
         width = 2.0 * 72.0 * scene.tube_radius / unit
         self.tubes = LineCollection([], linewidths=width, capstyle="round")
         axes.add_collection(self.tubes)
@@ -151,7 +152,8 @@ class _Film:
         strands = np.concatenate([tendon["strand"][:-1] for tendon in scene.tendons])
         self.tubes.set_segments([pair for line in lines for pair in np.stack([line[:-1], line[1:]], axis=1)])
         self.tubes.set_color(tension_colours(tension, self.scale)[strands])
-        self.trace.set_data(*self.tips[: frame + 1].T)
+        for index, trace in enumerate(self.traces):
+            trace.set_data(*self.tips[: frame + 1, index].T)
         self.clock.set_text(f"{motion.time[frame]:.2f} s")
 
     def _placed(self, solid: _Solid, frame: int) -> Array:
@@ -174,10 +176,10 @@ class _Film:
 
 def _solids(scene: Scene) -> Iterator[_Solid]:
     geometry = scene.geometry
-    for visual in pin.buildGeomFromUrdfString(geometry.model, scene.urdf, pin.GeometryType.VISUAL).geometryObjects:
+    for visual in geometry.visuals:
         turned = visual.placement.rotation
-        corners = _corners(visual.geometry) @ turned.T + visual.placement.translation
-        yield _Solid(visual.parentJoint, corners, (*visual.meshColor[:3], SOLID_OPACITY * visual.meshColor[3]))
+        corners = _corners(visual.shape) @ turned.T + visual.placement.translation
+        yield _Solid(visual.link, corners, (*visual.colour[:3], SOLID_OPACITY * visual.colour[3]))
     for pulley in geometry.pulleys:
         ring = _ring(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
         yield _Solid(pulley.joint, ring + np.array([0.0, 0.0, pulley.offset]), (*GROOVE_COLOUR, SOLID_OPACITY))
@@ -188,6 +190,8 @@ def _corners(shape: Any) -> Array:
     kind = type(shape).__name__
     if kind == "Cylinder":
         return _ring(shape.radius, 2.0 * shape.halfLength)
+    if is_mesh(shape):
+        return np.asarray(shape.vertices())
     if kind == "Box":
         return np.array(list(product(*((-half, half) for half in shape.halfSide))))
     turns = np.linspace(0.0, np.pi, 13)

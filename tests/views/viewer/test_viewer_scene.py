@@ -113,7 +113,7 @@ def test_the_proximal_half_of_the_passive_tendon_has_its_own_colour(page):
 
 def test_the_trace_follows_equation_1_and_ends_at_the_present(page):
     script = """
-    const { past } = fingerPlayer.scene.trace;
+    const { past } = fingerPlayer.scene.traces[0];
     return [Array.from(past.geometry.attributes.position.array), past.geometry.drawRange.count];"""
     seek(page, 2.5)
     positions, count = page.execute_script(script)

@@ -30,7 +30,7 @@ class Player {
       while (tension > this.scale) this.scale = nextScale(this.scale);
     }
     if (this.drawnScale !== this.scale) this.drawLegend();
-    this.scene.trace.rebuild();
+    for (const trace of this.scene.traces) trace.rebuild();
     this.element.scrub.min = this.frames.start;
     this.element.scrub.max = this.frames.end;
   }
@@ -121,10 +121,10 @@ class Player {
       const slack = looseness(tensions[i], this.config.slackTension) > 0.5;
       bar.style.width = `${Math.min(100, (100 * tensions[i]) / this.scale)}%`;
       bar.style.background = css(colours[i]);
-      value.textContent = slack ? "slack" : `${tensions[i].toFixed(2)} N`;
+      value.textContent = slack ? "slack" : this.hand ? tensions[i].toFixed(1) : `${tensions[i].toFixed(2)} N`;
       value.classList.toggle("slack", slack);
     });
-    this.angles.forEach((cell, i) => { cell.textContent = `${((180 / Math.PI) * angles[i]).toFixed(1)}°`; });
+    this.angles.forEach((cell, i) => { cell.textContent = `${((180 / Math.PI) * angles[i]).toFixed(this.hand ? 0 : 1)}°`; });
   }
 
   refresh() {
@@ -140,20 +140,23 @@ class Player {
     const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
-    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title]]) {
+    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title], ["things", this.config.things?.note]]) {
       const note = document.getElementById(name);
       note.hidden = !text;
       note.lastElementChild.textContent = text;
     }
     document.querySelector(".grid-note").textContent = ` · grid ${1000 * this.config.grid} mm`;
-    this.rows = this.config.strands.map((name) => {
-      const row = document.getElementById("tensions").insertRow();
+    this.hand = this.config.joints.some((name) => name.includes("."));
+    document.getElementById("panel").classList.toggle("hand", this.hand);
+    const [tensions, joints] = ["tensions", "joints"].map((name) => document.getElementById(name));
+    this.rows = this.hand ? byFinger(tensions, this.config.strands, 1) : this.config.strands.map((name) => {
+      const row = tensions.insertRow();
       Object.assign(row.insertCell(), { className: "name", textContent: name, title: name });
       const gauge = Object.assign(row.insertCell(), { className: "gauge", innerHTML: "<div><div></div></div>" });
       return { bar: gauge.firstChild.firstChild, value: Object.assign(row.insertCell(), { className: "value" }) };
     });
-    this.angles = this.config.joints.map((name) => {
-      const row = document.getElementById("joints").insertRow();
+    this.angles = this.hand ? byFinger(joints, this.config.joints, 0).map(({ value }) => value) : this.config.joints.map((name) => {
+      const row = joints.insertRow();
       Object.assign(row.insertCell(), { className: "name", textContent: name, title: name });
       return Object.assign(row.insertCell(), { className: "value" });
     });
@@ -171,6 +174,7 @@ class Player {
       button.onclick = () => this.scene.frame(button.dataset.view);
     }
     window.addEventListener("keydown", (event) => this.key(event));
+    window.addEventListener("resize", () => this.scene.reframe());
     // A phone that is turned.
     window.matchMedia("(orientation: portrait)").addEventListener("change", () => this.scene.frame(this.scene.view));
   }
@@ -202,6 +206,26 @@ class Player {
     }));
     this.drawnScale = this.scale;
   }
+}
+
+// A column for each finger, a row for each of its own names; with bars under the values if asked.
+function byFinger(table, names, bars) {
+  const parted = names.map((name) => name.split("."));
+  const [fingers, own] = [0, 1].map((part) => [...new Set(parted.map((each) => each[part]))]);
+  const head = table.insertRow();
+  for (const name of ["", ...fingers]) Object.assign(head.insertCell(), { className: "finger", textContent: name, title: name });
+  const cells = own.map((name) => {
+    const row = table.insertRow();
+    const short = name.replace(" proximal", " prox.").replace(" distal", " dist.");
+    Object.assign(row.insertCell(), { className: "name", textContent: short, title: name });
+    return fingers.map(() => Object.assign(row.insertCell(), { className: "value" }));
+  });
+  return parted.map(([finger, name], i) => {
+    const cell = cells[own.indexOf(name)][fingers.indexOf(finger)];
+    cell.title = names[i];
+    cell.innerHTML = bars ? "<span></span><div class='gauge'><div><div></div></div></div>" : "<span></span>";
+    return { value: cell.firstChild, bar: bars ? cell.lastChild.firstChild.firstChild : null };
+  });
 }
 
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(",")})`;

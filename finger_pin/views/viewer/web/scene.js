@@ -84,22 +84,23 @@ class TendonView {
   }
 }
 
-// The path of the fingertip: what is past in full colour, what is to come faint.
+// The path of a fingertip: what is past in full colour, what is to come faint.
 class Trace {
-  constructor(viewer, config, frames) {
+  constructor(viewer, config, frames, finger) {
     this.frames = frames;
+    this.first = 3 * finger;
     const look = { color: 0x000000, emissive: 0xff86b4 };
     this.past = new Tube(TRACE_POINTS, 0.6 * config.tubeRadius, look);
     this.rest = new Tube(TRACE_POINTS, 0.3 * config.tubeRadius, { ...look, transparent: true, opacity: 0.35 });
-    viewer.set_object([ROOT, "fingertip_trace", "past"], this.past.mesh);
-    viewer.set_object([ROOT, "fingertip_trace", "rest"], this.rest.mesh);
+    viewer.set_object([ROOT, "fingertip_trace", String(finger), "past"], this.past.mesh);
+    viewer.set_object([ROOT, "fingertip_trace", String(finger), "rest"], this.rest.mesh);
   }
 
   rebuild() {
     const tips = new Float32Array(3 * TRACE_POINTS);
     for (let i = 0; i < TRACE_POINTS; i++) {
       const frame = Math.round((i * (this.frames.count - 1)) / (TRACE_POINTS - 1));
-      tips.set(this.frames.columns.tip.row(frame), 3 * i);
+      tips.set(this.frames.columns.tip.row(frame).subarray(this.first, this.first + 3), 3 * i);
     }
     this.past.shape(tips);
     this.rest.shape(tips);
@@ -108,6 +109,38 @@ class Trace {
   show(place) {
     const done = this.frames.count > 1 ? (place.low + place.weight) / (this.frames.count - 1) : 0;
     this.past.geometry.setDrawRange(0, 6 * SIDES * Math.floor(done * (TRACE_POINTS - 1)));
+  }
+}
+
+// A closed contact: an arrow for the force on the second body, which ends where bodies touch, and the friction cone
+// around the normal, in which the arrow lies as long as the contact sticks.
+class ContactView {
+  constructor(viewer, config, steepness, index) {
+    const { ArrowHelper, ConeGeometry, DoubleSide, Group, Mesh, MeshPhongMaterial, Vector3 } = MeshCat.THREE;
+    this.length = config.things.length;
+    this.group = new Group();
+    this.arrow = new ArrowHelper(new Vector3(0, 0, 1), new Vector3(), 1, 0xff5a5a);
+    // Its apex at the origin, open along -y.
+    const cone = new ConeGeometry(steepness, 1, 40, 1, true).translate(0, -0.5, 0);
+    const look = { color: 0x9ad0ff, transparent: true, opacity: 0.25, side: DoubleSide, depthWrite: false };
+    this.cone = new Mesh(cone, new MeshPhongMaterial(look));
+    this.group.add(this.arrow, this.cone);
+    viewer.set_object([ROOT, "contacts", String(index)], this.group);
+  }
+
+  show(numbers) {
+    const { Vector3 } = MeshCat.THREE;
+    const [point, force, normal] = [0, 3, 6].map((first) => new Vector3().fromArray(numbers, first));
+    const size = this.length * force.length();
+    this.group.visible = size > 1e-6 && normal.lengthSq() > 0.5;
+    if (!this.group.visible) return;
+    const along = force.clone().normalize();
+    this.arrow.position.copy(point).addScaledVector(along, -size);
+    this.arrow.setDirection(along);
+    this.arrow.setLength(size, Math.min(0.3 * size, 0.008), Math.min(0.15 * size, 0.004));
+    this.cone.position.copy(point);
+    this.cone.quaternion.setFromUnitVectors(new Vector3(0, -1, 0), normal.normalize());
+    this.cone.scale.setScalar(Math.max(-this.length * force.dot(normal), 1e-6));
   }
 }
 
@@ -123,13 +156,20 @@ class FingerScene {
     this.links = config.links.map((name) => viewer.scene_tree.find([ROOT, name]).object);
     for (const command of config.ghost?.commands ?? []) viewer.handle_command(command);
     this.ghostLinks = (config.ghost?.links ?? []).map((name) => viewer.scene_tree.find([ROOT, "ghost", name]).object);
+    for (const command of config.things?.commands ?? []) viewer.handle_command(command);
+    this.free = (config.things?.free ?? []).map((name) => viewer.scene_tree.find([ROOT, name]).object);
+    this.contacts = (config.things?.steepness ?? []).map((each, i) => new ContactView(viewer, config, each, i));
+    config.inView.push(...(config.alsoInView ?? []));
     this.tendons = config.tendons.map((tendon) => new TendonView(viewer, config, tendon));
-    this.trace = new Trace(viewer, config, frames);
+    this.traces = Array.from({ length: config.tips }, (_, i) => new Trace(viewer, config, frames, i));
     this.root = viewer.scene_tree.find([ROOT]).object;
     this.box = [Math.min, Math.max].map((pick) => [0, 1, 2].map((i) => pick(...config.inView.map((point) => point[i]))));
-    this.labels = config.tendons.map((tendon) => {
+    // In a hand a finger's name stands for its tendons.
+    const named = config.tendons.map((tendon) => tendon.name.split(".")[0]);
+    this.labels = named.map((name, i) => {
+      if (named.indexOf(name) < i) return null;
       const label = document.createElement("div");
-      label.textContent = tendon.name;
+      label.textContent = name;
       document.getElementById("labels").append(label);
       return label;
     });
@@ -164,6 +204,11 @@ class FingerScene {
   show(place, colours) {
     this.pose(this.links, "pose", place);
     if (this.config.ghost) this.pose(this.ghostLinks, "ghost", place);
+    if (this.config.things) {
+      this.pose(this.free, "object", place);
+      const numbers = this.frames.mix("contact", place);
+      this.contacts.forEach((contact, i) => contact.show(numbers.subarray(9 * i, 9 * i + 9)));
+    }
     const points = this.frames.mix("path", place).map((value) => value * this.config.quantum);
     let first = 0;
     for (const tendon of this.tendons) {
@@ -171,7 +216,7 @@ class FingerScene {
       tendon.show(points.subarray(first, first + size), colours);
       first += size;
     }
-    this.trace.show(place);
+    for (const trace of this.traces) trace.show(place);
     this.viewer.set_dirty();
   }
 
@@ -230,7 +275,13 @@ class FingerScene {
     controls.minDistance = 0.1 * distance;
     controls.maxDistance = 10 * distance;
     controls.update();
+    this.placed = camera.position.clone();
     this.viewer.set_dirty();
+  }
+
+  // A window of another size needs another place, unless the user has chosen one.
+  reframe() {
+    if (this.viewer.camera.position.distanceTo(this.placed) < 1e-9) this.frame(this.view);
   }
 
   // Names stand where the tendons begin, and make room for each other.
@@ -238,8 +289,8 @@ class FingerScene {
     const { camera } = this.viewer;
     const places = this.tendons.map((tendon, i) => {
       const at = this.root.localToWorld(new MeshCat.THREE.Vector3().fromArray(tendon.points || [0, 0, 0])).project(camera);
-      return { label: this.labels[i], x: ((at.x + 1) / 2) * window.innerWidth, y: ((1 - at.y) / 2) * window.innerHeight };
-    });
+      return this.labels[i] && { label: this.labels[i], x: ((at.x + 1) / 2) * window.innerWidth, y: ((1 - at.y) / 2) * window.innerHeight };
+    }).filter(Boolean);
     places.sort((a, b) => a.y - b.y);
     for (let pass = 0; pass < 40; pass++) {
       places.forEach((place, i) => places.slice(0, i).forEach((other) => {

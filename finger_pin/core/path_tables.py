@@ -1,0 +1,234 @@
+"""Pieces of paths through space as plain arrays, for the compiled core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
+from finger_pin.core.shape_code import OUT, SLOPES, shape_addresses
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.pieces import Leg, Piece
+
+# Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
+COLUMNS, WRENCH = 3, 12
+
+
+class Paths(NamedTuple):
+    """E pieces, and the L legs with which R rows use them.
+
+    Attributes:
+        carriers: Bodies of both points and of the frame, -1 for the base, shape (E, 3).
+        points: Both points in the frames of their bodies, shape (E, 6), m.
+        rotation: Of the piece's frame in its body's, shape (E, 3, 3).
+        origin: Of the piece's frame in its body's, shape (E, 3), m.
+        shapes: Addresses of value and slopes, shape (E, 2).
+        columns: Number of wrenches of each, shape (E,).
+        parameters: Shape (E, most parameters).
+        reach: Shape (E,), m.
+        start: Where the coordinates that move a piece begin, shape (E + 1,).
+        at: Coordinates, shape (entries,).
+        moves: One where a coordinate moves the first, the second, and the frame's body, shape (entries, 3).
+        row: First row that uses each, shape (E,).
+        carries: One where a body carries another, shape (n, n).
+        rows: Rows with paths, shape (R,).
+        leg_start: Where their legs begin, shape (R + 1,).
+        piece: Of each leg, shape (L,).
+        column: Of each leg, shape (L,).
+        follows: Of each leg, shape (L,).
+        weights: Of each leg in the arm and in the length, shape (L, 2).
+    """
+
+    carriers: IndexTable
+    points: Matrix
+    rotation: Layers
+    origin: Matrix
+    shapes: IndexTable
+    columns: Indices
+    parameters: Matrix
+    reach: Vector
+    start: Indices
+    at: Indices
+    moves: IndexTable
+    row: Indices
+    carries: IndexTable
+    rows: Indices
+    leg_start: Indices
+    piece: Indices
+    column: Indices
+    follows: Indices
+    weights: Matrix
+
+
+class PathWork(NamedTuple):
+    """Memory for pieces.
+
+    Attributes:
+        out: What the shapes say, shape (E, OUT).
+        active: Zero for gaps that are open, shape (E,).
+        frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
+        origin: Its origin, shape (E, 3), m.
+        ends: Both points, base frame, shape (E, 6), m.
+        wrench: Unit wrenches on the first and on the second body, shape (E, COLUMNS, WRENCH).
+        push: Force of a contact on the first body, shape (E, 3), N.
+        length: Of every row, shape (K,).
+        turn: Of every row, shape (K,).
+        y: Points in a piece's frame, shape (6,).
+        gather: Shape (N,).
+        slopes: Of a shape, shape (SLOPES,).
+        wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, COLUMNS, WRENCH).
+    """
+
+    out: Matrix
+    active: Indices
+    frame: Layers
+    origin: Matrix
+    ends: Matrix
+    wrench: Layers
+    push: Matrix
+    length: Vector
+    turn: Vector
+    y: Vector
+    gather: Vector
+    slopes: Vector
+    turn_slope: Vector
+    wrench_slope: Layers
+
+
+def read_paths(
+    paths: Sequence[Sequence[Leg]], parents: NDArray[np.int64], last: Sequence[int], turns: Sequence[Array]
+) -> Paths:
+    """Return the arrays of the paths of all rows.
+
+    Args:
+        paths: Of every row, empty for none.
+        parents: Of the core's bodies.
+        last: The core's body of every joint of the model, the base first.
+        turns: Rotation of that body's frame in the joint's.
+    """
+    pieces: list[Piece] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
+    number = {piece: e for e, piece in enumerate(pieces)}
+    first_row = {leg.piece: k for k, each in reversed(list(enumerate(paths))) for leg in each}
+    legs = [leg for each in paths for leg in each]
+    carriers = np.array([[last[p.ends[0].joint], last[p.ends[1].joint], last[p.joint]] for p in pieces], dtype=np.int64)
+    carriers = carriers.reshape(-1, 3)
+    entries = [_movers(row, parents) for row in carriers]
+    parameters = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
+    for row, piece in zip(parameters, pieces, strict=True):
+        row[: len(piece.parameters)] = piece.parameters
+    points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
+    rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
+    carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
+    for body, parent in enumerate(parents):
+        if parent >= 0:
+            carries[:, body] = carries[:, parent]
+            carries[parent, body] = 1
+    return Paths(
+        carriers=carriers,
+        points=np.array(points).reshape(-1, 6),
+        rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
+        origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
+        shapes=np.array([shape_addresses(p.shape) for p in pieces], dtype=np.int64).reshape(-1, 2),
+        columns=np.array([p.shape.columns for p in pieces], dtype=np.int64),
+        parameters=parameters,
+        reach=np.array([p.reach for p in pieces], dtype=float),
+        start=np.cumsum([0, *(len(at) for at, _ in entries)]),
+        at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
+        moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
+        row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
+        carries=carries,
+        rows=rows,
+        leg_start=np.cumsum([0, *(len(each) for each in paths if each)]),
+        piece=np.array([number[leg.piece] for leg in legs], dtype=np.int64),
+        column=np.array([leg.column for leg in legs], dtype=np.int64),
+        follows=np.array([leg.follows for leg in legs], dtype=np.int64),
+        weights=np.array([(leg.arm, leg.length_weight) for leg in legs], dtype=float).reshape(-1, 2),
+    )
+
+
+def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
+    """Return which coordinates the paths of every row depend on, shape (K, N)."""
+    found = np.zeros((count, width), dtype=bool)
+    for k, begin, end in zip(paths.rows, paths.leg_start[:-1], paths.leg_start[1:], strict=True):
+        for e in paths.piece[begin:end]:
+            found[k, paths.at[paths.start[e] : paths.start[e + 1]]] = True
+    return found
+
+
+def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the coordinates that move three bodies, and which of the three each moves."""
+    moves = np.zeros((len(parents), 3), dtype=np.int64)
+    for which, body in enumerate(carriers):
+        at = int(body)
+        while at >= 0:
+            moves[at, which] = 1
+            at = int(parents[at])
+    moved = np.flatnonzero(moves.any(axis=1))
+    return moved, np.ascontiguousarray(moves[moved])
+
+
+def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
+    """Allocate the memory for the pieces of K rows."""
+    pieces, entries = len(paths.columns), len(paths.at)
+    return PathWork(
+        out=np.zeros((pieces, OUT)),
+        active=np.ones(pieces, dtype=np.int64),
+        frame=np.zeros((pieces, 3, 3)),
+        origin=np.zeros((pieces, 3)),
+        ends=np.zeros((pieces, 6)),
+        wrench=np.zeros((pieces, COLUMNS, WRENCH)),
+        push=np.zeros((pieces, 3)),
+        length=np.zeros(count),
+        turn=np.zeros(count),
+        y=np.zeros(6),
+        gather=np.zeros(width),
+        slopes=np.zeros(SLOPES),
+        turn_slope=np.zeros(entries),
+        wrench_slope=np.zeros((entries, COLUMNS, WRENCH)),
+    )
+
+
+def select_paths(
+    paths: Paths,
+    rows: NDArray[np.int64],
+    bodies: NDArray[np.int64],
+    body: Callable[[Any], NDArray[np.int64]],
+    entries: Callable[..., tuple[NDArray[np.int64], NDArray[np.int64]]],
+) -> Paths:
+    """Return the paths of some rows.
+
+    Args:
+        paths: Of all.
+        rows: Indices of those that are kept, in order.
+        bodies: Those that are kept, in order.
+        body: Gives bodies, which are the first coordinates, their new indices.
+        entries: (start, kept) -> where the entries of those kept begin, and which they are.
+    """
+    kept = np.flatnonzero(np.isin(paths.rows, rows))
+    leg_start, legs = entries(paths.leg_start, kept)
+    pieces = np.unique(paths.piece[legs])
+    start, at = entries(paths.start, pieces)
+    return Paths(
+        carriers=body(paths.carriers[pieces].ravel()).reshape(-1, 3),
+        points=paths.points[pieces],
+        rotation=paths.rotation[pieces],
+        origin=paths.origin[pieces],
+        shapes=paths.shapes[pieces],
+        columns=paths.columns[pieces],
+        parameters=paths.parameters[pieces],
+        reach=paths.reach[pieces],
+        start=start,
+        at=body(paths.at[at]),
+        moves=paths.moves[at],
+        row=np.searchsorted(rows, paths.row[pieces]),
+        carries=np.ascontiguousarray(paths.carries[np.ix_(bodies, bodies)]),
+        rows=np.searchsorted(rows, paths.rows[kept]),
+        leg_start=leg_start,
+        piece=np.searchsorted(pieces, paths.piece[legs]),
+        column=paths.column[legs],
+        follows=paths.follows[legs],
+        weights=paths.weights[legs],
+    )

@@ -1,0 +1,355 @@
+"""Paths through space, compiled: `pieces.reach`, one posture at a time, and its exact derivatives.
+
+The wrenches of a piece turn with the body that carries its frame, and change with the points as that frame sees them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.compilation import compiled
+from finger_pin.core.law_code import FORCE, LOAD, SIDE
+from finger_pin.core.path_tables import WRENCH
+from finger_pin.core.rigid_body import AXIS
+from finger_pin.core.shape_code import call_shape
+from finger_pin.core.spatial import add_force_cross, dot, motion_cross
+
+
+@compiled
+def _add_moment(point: Any, force: Any, out: Any) -> None:
+    out[0] += point[1] * force[2] - point[2] * force[1]
+    out[1] += point[2] * force[0] - point[0] * force[2]
+    out[2] += point[0] * force[1] - point[1] * force[0]
+
+
+@compiled
+def _frame(paths: Any, e: int, work: Any) -> None:
+    """Place a piece's frame, its points, and its points as the frame sees them."""
+    own = work.paths
+    rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
+    body = paths.carriers[e, 2]
+    for r in range(3):
+        origin[r] = paths.origin[e, r]
+        for c in range(3):
+            rotation[r, c] = paths.rotation[e, r, c]
+    if body >= 0:
+        above = work.rotation[body]
+        for r in range(3):
+            origin[r] = work.origin[body, r]
+            for i in range(3):
+                origin[r] += above[r, i] * paths.origin[e, i]
+            for c in range(3):
+                rotation[r, c] = 0.0
+                for i in range(3):
+                    rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
+    for p in range(2):
+        body = paths.carriers[e, p]
+        for r in range(3):
+            ends[3 * p + r] = paths.points[e, 3 * p + r]
+        if body >= 0:
+            for r in range(3):
+                ends[3 * p + r] = work.origin[body, r]
+                for i in range(3):
+                    ends[3 * p + r] += work.rotation[body, r, i] * paths.points[e, 3 * p + i]
+        for c in range(3):
+            own.y[3 * p + c] = 0.0
+            for r in range(3):
+                own.y[3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
+
+
+@compiled
+def _turned(rotation: Any, out: Any, first: int, vector: Any) -> None:
+    """Fill three numbers of a wrench with a vector that a frame sees."""
+    for r in range(3):
+        vector[r] = rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
+
+
+@compiled
+def _measure(paths: Any, e: int, work: Any) -> None:
+    """Fill what a piece says, and its wrenches."""
+    own = work.paths
+    _frame(paths, e, work)
+    out, y, columns = own.out[e], own.y, paths.columns[e]
+    beyond = 0.0
+    for c in range(3):
+        middle = 0.5 * (y[c] + y[3 + c])
+        beyond += middle * middle
+    beyond = np.sqrt(beyond) - paths.reach[e]
+    if beyond > 0.0:
+        out[0] = beyond
+    else:
+        call_shape(paths.shapes[e, 0], y, paths.parameters[e], out)
+    own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[SIDE, paths.row[e]] > 0.0 else 0
+    rotation, ends, point = own.frame[e], own.ends[e], work.centre
+    for m in range(columns):
+        for i in range(WRENCH):
+            own.wrench[e, m, i] = 0.0
+    if own.active[e] == 0:
+        return
+    if columns == 1:
+        wrench = own.wrench[e, 0]
+        for p in range(2):
+            _turned(rotation, out, 2 + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
+            _add_moment(ends[3 * p : 3 * p + 3], wrench[6 * p + 3 : 6 * p + 6], wrench[6 * p : 6 * p + 3])
+    else:
+        _turned(rotation, out, 4, point)
+        for r in range(3):
+            point[r] += own.origin[e, r]
+        for m in range(3):
+            wrench = own.wrench[e, m]
+            _turned(rotation, out, 1 if m == 0 else 4 + 3 * m, wrench[3:6])
+            _add_moment(point, wrench[3:6], wrench[:3])
+
+
+@compiled
+def _net(moves: Any, wrench: Any, out: Any) -> None:
+    """Fill the wrench on all of the three bodies that a coordinate moves."""
+    first, second = 1.0 * (moves[0] - moves[2]), 1.0 * (moves[1] - moves[2])
+    for i in range(6):
+        out[i] = first * wrench[i] + second * wrench[6 + i]
+
+
+@compiled
+def _angle(first: Any, second: Any) -> Any:
+    """Return cosine and sine of the angle between where a path comes in and where it goes on."""
+    cosine = -(first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
+    x = first[1] * second[2] - first[2] * second[1]
+    y = first[2] * second[0] - first[0] * second[2]
+    z = first[0] * second[1] - first[1] * second[0]
+    return cosine, np.sqrt(x * x + y * y + z * z)
+
+
+@compiled
+def measure_paths(tables: Any, work: Any) -> None:
+    """Fill lengths, turns and arms of all rows with paths, after `move`."""
+    paths, own = tables.paths, work.paths
+    for e in range(paths.columns.size):
+        _measure(paths, e, work)
+    axes, gather, net = work.spatial[AXIS], own.gather, work.vectors[0]
+    for index in range(paths.rows.size):
+        k = paths.rows[index]
+        length, turn = 0.0, 0.0
+        begin, end = tables.arm_start[k], tables.arm_start[k + 1]
+        for a in range(begin, end):
+            work.arm[a] = tables.arm[a]
+            work.gradient[a] = tables.measure[a]
+        for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
+            e, m = paths.piece[leg], paths.column[leg]
+            if m == 0:
+                length += paths.weights[leg, 1] * own.out[e, 0]
+            if own.active[e] == 0:
+                continue
+            if paths.columns[e] == 1:
+                turn += own.out[e, 1]
+            if paths.follows[leg]:
+                before = paths.piece[leg - 1]
+                cosine, sine = _angle(own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6])
+                turn += np.arctan2(sine, cosine)
+            for r in range(paths.start[e], paths.start[e + 1]):
+                _net(paths.moves[r], own.wrench[e, m], net)
+                gather[paths.at[r]] = dot(axes[paths.at[r]], net)
+            for a in range(begin, end):
+                j = tables.arm_at[a]
+                work.arm[a] += paths.weights[leg, 0] * gather[j]
+                work.gradient[a] += paths.weights[leg, 1] * gather[j]
+                gather[j] = 0.0
+        own.length[k], own.turn[k] = length, turn
+
+
+@compiled
+def push(tables: Any, work: Any) -> None:
+    """Fill the forces of all contacts, after their law."""
+    paths, own = tables.paths, work.paths
+    for e in range(paths.columns.size):
+        if paths.columns[e] > 1:
+            for r in range(3):
+                own.push[e, r] = 0.0
+                for m in range(3):
+                    own.push[e, r] += work.rows[FORCE, paths.row[e] + m] * own.wrench[e, m, 3 + r]
+
+
+@compiled
+def passes(paths: Any, e: int, body: int) -> float:
+    """Return how often the force of a contact, and its reaction, pass the pin of a body."""
+    first, second = paths.carriers[e, 0], paths.carriers[e, 2]
+    beyond = 0.0
+    if first >= 0 and (first == body or paths.carries[body, first]):
+        beyond += 1.0
+    if second >= 0 and (second == body or paths.carries[body, second]):
+        beyond -= 1.0
+    return beyond if paths.columns[e] > 1 else 0.0
+
+
+@compiled
+def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) -> None:
+    """Fill a frame's view of a point's velocity, for a unit rate of a coordinate."""
+    x = weight * (axis[3] + axis[1] * point[2] - axis[2] * point[1])
+    y = weight * (axis[4] + axis[2] * point[0] - axis[0] * point[2])
+    z = weight * (axis[5] + axis[0] * point[1] - axis[1] * point[0])
+    for c in range(3):
+        out[c] = rotation[0, c] * x + rotation[1, c] * y + rotation[2, c] * z
+
+
+@compiled
+def _changed(slopes: Any, first: int, dy: Any, rotation: Any, out: Any) -> None:
+    """Fill a vector's change as the base sees it, from the three rows of slopes that begin somewhere."""
+    for r in range(3):
+        out[r] = 0.0
+    for i in range(3):
+        change = 0.0
+        for c in range(6):
+            change += slopes[first + 6 * i + c] * dy[c]
+        for r in range(3):
+            out[r] += rotation[r, i] * change
+
+
+@compiled
+def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
+    """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
+    own = work.paths
+    rotation, ends, columns, slopes = own.frame[e], own.ends[e], paths.columns[e], own.slopes
+    y, dy = own.y, work.vectors[0]
+    # The points as the frame sees them are another piece's by now.
+    for p in range(2):
+        for c in range(3):
+            y[3 * p + c] = 0.0
+            for r in range(3):
+                y[3 * p + c] += rotation[r, c] * (ends[3 * p + r] - own.origin[e, r])
+    call_shape(paths.shapes[e, 1], y, paths.parameters[e], slopes)
+    moved, point = work.vectors[1], work.centre
+    _turned(rotation, own.out[e], 4, point)
+    for r in range(3):
+        point[r] += own.origin[e, r]
+    for s in range(paths.start[e], paths.start[e + 1]):
+        axis, moves = work.spatial[AXIS, paths.at[s]], paths.moves[s]
+        for p in range(2):
+            weight = 1.0 * (moves[p] - moves[2])
+            _seen_from(axis, rotation, ends[3 * p : 3 * p + 3], weight, dy[3 * p : 3 * p + 3])
+        for m in range(columns):
+            wrench, out = own.wrench[e, m], own.wrench_slope[s, m]
+            for i in range(WRENCH):
+                out[i] = 0.0
+            if columns == 1:
+                turn = 0.0
+                for c in range(6):
+                    turn += slopes[c] * dy[c]
+                own.turn_slope[s] = turn
+                for p in range(2):
+                    force = out[6 * p + 3 : 6 * p + 6]
+                    _changed(slopes, 6 + 18 * p, dy, rotation, force)
+                    _add_moment(ends[3 * p : 3 * p + 3], force, out[6 * p : 6 * p + 3])
+                    _turned(rotation, dy, 3 * p, moved)
+                    _add_moment(moved, wrench[6 * p + 3 : 6 * p + 6], out[6 * p : 6 * p + 3])
+            else:
+                force = out[3:6]
+                _changed(slopes, 0 if m == 0 else 18 + 18 * m, dy, rotation, force)
+                _add_moment(point, force, out[:3])
+                _changed(slopes, 18, dy, rotation, moved)
+                _add_moment(moved, wrench[3:6], out[:3])
+            if moves[2]:
+                for p in range(2):
+                    add_force_cross(axis, wrench[6 * p : 6 * p + 6], out[6 * p : 6 * p + 6])
+
+
+@compiled
+def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
+    """Add the derivatives of the angle by which a row's path turns."""
+    paths, own = tables.paths, work.paths
+    k, gather = paths.rows[index], own.gather
+    for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
+        e = paths.piece[leg]
+        if paths.columns[e] > 1:
+            continue
+        for s in range(paths.start[e], paths.start[e + 1]):
+            gather[paths.at[s]] += own.turn_slope[s]
+        if not paths.follows[leg]:
+            continue
+        before = paths.piece[leg - 1]
+        incoming, outgoing = own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6]
+        _, sine = _angle(incoming, outgoing)
+        # A straight corner is a kink, as |q| is at 0.
+        inverse = 1.0 / sine if sine > 1e-12 else 0.0
+        for s in range(paths.start[e], paths.start[e + 1]):
+            change = own.wrench_slope[s, 0]
+            for r in range(3):
+                gather[paths.at[s]] += inverse * incoming[r] * change[3 + r]
+        for s in range(paths.start[before], paths.start[before + 1]):
+            change = own.wrench_slope[s, 0]
+            for r in range(3):
+                gather[paths.at[s]] += inverse * change[9 + r] * outgoing[r]
+    for b in range(tables.bend_start[k], tables.bend_start[k + 1]):
+        linear.bend[b] += gather[tables.bend_at[b]]
+    for j in range(gather.size):
+        gather[j] = 0.0
+
+
+@compiled
+def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
+    """Fill the derivatives of arms and turns after `measure_paths`; subtract those of A^T phi from by_position."""
+    paths, own = tables.paths, work.paths
+    for e in range(paths.columns.size):
+        if own.active[e]:
+            _slopes_of_piece(paths, e, work)
+    axes, gather, net, crossed = work.spatial[AXIS], own.gather, work.vectors[0], work.vectors[1]
+    for index in range(paths.rows.size):
+        k = paths.rows[index]
+        _add_turns(tables, work, linear, index)
+        for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
+            e, m = paths.piece[leg], paths.column[leg]
+            if own.active[e] == 0:
+                continue
+            weight = paths.weights[leg, 0]
+            force = weight * work.rows[FORCE, k]
+            begin, end = paths.start[e], paths.start[e + 1]
+            for r in range(begin, end):
+                i, turning = paths.at[r], 0.0
+                for s in range(begin, end):
+                    j = paths.at[s]
+                    _net(paths.moves[s], own.wrench_slope[r, m], net)
+                    slope = dot(axes[j], net)
+                    if paths.carries[i, j]:
+                        # A joint nearer to the base turns the axes of those that it carries.
+                        motion_cross(axes[i], axes[j], crossed)
+                        _net(paths.moves[s], own.wrench[e, m], net)
+                        slope += dot(crossed, net)
+                    linear.by_position[j, i] -= force * slope
+                    turning += slope * velocity[j]
+                gather[i] += weight * turning
+        for a in range(tables.arm_start[k], tables.arm_start[k + 1]):
+            linear.arm[a], linear.measure[a] = work.arm[a], work.gradient[a]
+            linear.turning[a] = gather[tables.arm_at[a]]
+            gather[tables.arm_at[a]] = 0.0
+
+
+@compiled
+def turn_pushes(tables: Any, work: Any, k: int, size: float, by_position: Any) -> None:
+    """Add to a pin's load what contacts do that turn with the posture at constant forces; ``size`` is the load."""
+    paths, own = tables.paths, work.paths
+    for e in range(paths.columns.size):
+        share = passes(paths, e, tables.pins[k]) / size
+        if share == 0.0 or own.active[e] == 0:
+            continue
+        for s in range(paths.start[e], paths.start[e + 1]):
+            for m in range(3):
+                force = share * work.rows[FORCE, paths.row[e] + m]
+                for r in range(3):
+                    by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
+
+
+@compiled
+def add_pushes(tables: Any, work: Any, k: int, gain: Any, load: Any) -> None:
+    """Add to the change of a pin's load that of the forces of contacts; ``gain`` is theirs."""
+    paths, own = tables.paths, work.paths
+    for e in range(paths.columns.size):
+        passing = passes(paths, e, tables.pins[k])
+        if passing == 0.0 or own.active[e] == 0:
+            continue
+        size = max(work.rows[LOAD, k], 1e-100)
+        for m in range(3):
+            share = 0.0
+            for r in range(3):
+                share += passing * work.pull[k, r] * own.wrench[e, m, 3 + r] / size
+            for c in range(load.size):
+                load[c] += share * gain[paths.row[e] + m, c]

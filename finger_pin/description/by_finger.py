@@ -1,0 +1,67 @@
+"""Tables of a hand: by joint or tendon, whose names begin with that of their finger and a dot, and by finger."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from finger_pin.description.validation import Description
+
+_Settings = TypeVar("_Settings", bound=Description)
+
+
+def flat(table: Any) -> Any:
+    """Return ``{index = {medial = {...}}}`` as ``{index.medial = {...}}``: tables of tables lose a level."""
+    return _flat(table, lambda value: all(isinstance(each, dict | Description) for each in value.values()))
+
+
+def flat_numbers(table: Any) -> Any:
+    """Return ``{index = {medial = 0.4}}`` as ``{index.medial = 0.4}``."""
+    return _flat(table, lambda value: True)
+
+
+def nested(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
+    """Serialise ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it."""
+    if table is None:
+        return None
+    found: dict[str, Any] = {}
+    for name, value in handler(table).items():
+        finger, dot, own = name.partition(".")
+        if dot:
+            found.setdefault(finger, {})[own] = value
+        else:
+            found[name] = value
+    return found
+
+
+def given(table: Mapping[str, Description] | None) -> Any:
+    """Serialise tables by finger with the entries that they were given, and no others."""
+    if table is None:
+        return None
+    return {name: settings.model_dump(exclude_unset=True, exclude_none=True) for name, settings in table.items()}
+
+
+def of_finger(settings: _Settings, name: str) -> _Settings:
+    """Return settings for all fingers with what the table ``fingers`` of them has for one on top.
+
+    A table of another ``kind`` replaces, rather than completes.
+    """
+    whole = settings.model_copy(update={"fingers": None})
+    own: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
+    if own is None:
+        return whole
+    if getattr(own, "kind", None) != getattr(whole, "kind", None) and "kind" in own.model_fields_set:
+        return own
+    return whole.model_copy(update={entry: getattr(own, entry) for entry in own.model_fields_set})
+
+
+def _flat(table: Any, holds_tables: Callable[[dict[str, Any]], bool]) -> Any:
+    if not isinstance(table, dict):
+        return table
+    found = {}
+    for name, value in table.items():
+        if isinstance(value, dict) and value and holds_tables(value):
+            found.update({f"{name}.{own}": each for own, each in value.items()})
+        else:
+            found[name] = value
+    return found

@@ -1,0 +1,65 @@
+"""A scenario for a hand that is given as a tree: every actuator to and fro, one after the other."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.tree import Actuator
+
+# Of the motion, Hz, and of the tensions of tendons that only pull, N.
+_FREQUENCY = 0.5
+_TENSION = 2.0
+# Shares of an input's range: that a servo moves through, and that a motor exerts.
+_SERVO, _MOTOR = 0.8, 0.1
+
+
+def exercise(description: FingerDescription, duration: float = 4.0) -> dict[str, Any]:
+    """Return the table of a scenario that moves a tree through its joints' ranges, for `read_scenario`.
+
+    Servos go to and fro through most of their inputs' range, motors exert a small part of theirs. Phases differ from
+    one actuator to the next, as in a wave.
+
+    Args:
+        description: With a tree.
+        duration: s.
+    """
+    tree = description.tree
+    assert tree is not None
+    count = len(tree.actuators) + len(description.actuated_names)
+    phases = iter(range(count))
+
+    def swing(middle: float, half: float) -> dict[str, float]:
+        phase = 2.0 * math.pi * next(phases) / count
+        return {"offset": middle, "amplitude": half, "frequency": _FREQUENCY, "phase": phase}
+
+    position = {}
+    for name, joint in description.joints.items():
+        lower, upper = joint.range
+        position[name] = min(max(tree.joints[name].reference, lower), upper)
+    return {
+        "name": description.name,
+        "title": f"{description.name}: every actuator to and fro",
+        "finger": description.model_dump(mode="python", exclude_none=True),
+        "controller": {
+            "kind": "tensions",
+            "tensions": {name: swing(_TENSION, 0.5 * _TENSION) for name in description.actuated_names},
+            "inputs": {name: swing(*_range(description, each)) for name, each in tree.actuators.items()},
+        },
+        "simulation": {"duration": duration, "initial": {"position": position}},
+    }
+
+
+def _range(description: FingerDescription, actuator: Actuator) -> tuple[float, float]:
+    """Return middle and half of the swing of an actuator's input."""
+    servo = actuator.by_length * actuator.gain < 0.0
+    lower, upper = actuator.input_range or (0.0, 0.0)
+    if actuator.input_range is None and servo and actuator.joint is not None:
+        # Where it rests at both ends of its joint's range.
+        ratio = -actuator.by_length / actuator.gain * actuator.gear
+        ends = [ratio * q for q in description.joints[actuator.joint].range]
+        lower, upper = min(ends), max(ends)
+    share = _SERVO if servo else _MOTOR
+    middle = 0.5 * (lower + upper) if servo else 0.5 * share * (lower + upper)
+    return middle, 0.5 * share * (upper - lower)

@@ -1,0 +1,271 @@
+"""A hand as data: fingers placed on a palm, each with a description of its own, and all of them as one finger.
+
+Names of a hand's joints and tendons begin with that of their finger and a dot: ``index.medial``, ``thumb.T3``.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import reduce
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from finger_pin.description.parameters import (
+    FingerDescription,
+    JointFriction,
+    PassiveTendon,
+    StrokeLimiter,
+    TendonFriction,
+)
+from finger_pin.description.routing import Array
+from finger_pin.description.signals import SignalSettings
+from finger_pin.description.validation import (
+    IN_RADIANS,
+    Description,
+    Name,
+    expand,
+    nearest,
+    problem,
+    quantity,
+    real,
+    series,
+    vector,
+)
+from finger_pin.exceptions import InputError
+
+_MILLIMETRES = " m (is it in millimetres?)"
+_PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
+
+
+#: The coordinates of a palm's path: place, m, and roll, pitch and yaw, rad, in the world.
+PATH = ("x", "y", "z", "roll", "pitch", "yaw")
+_COORDINATE = real(-12.5, 12.5)
+
+
+class PathSignal(SignalSettings):
+    """A coordinate of the palm over time: m for x, y, z, rad for roll, pitch, yaw."""
+
+    offset: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _COORDINATE] | None = quantity(None, unit="m or rad", source="chosen", doc="Of none.")
+    values: Annotated[tuple[float, ...], series(-12.5, 12.5)] | None = quantity(
+        None, unit="m or rad", source="chosen", doc="At the points or samples."
+    )
+
+    @model_validator(mode="after")
+    def _accelerates(self) -> Self:
+        if self.kind in ("step", "ramp"):
+            raise problem("kind", "must be one of sine, points, samples: a palm has an acceleration", self.kind)
+        return self
+
+
+class Palm(Description):
+    """What the fingers stand on: the base frame of the hand, at rest or moved along a path."""
+
+    size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Sides of the box that is drawn; zero for none."
+    )
+    centre: Annotated[tuple[float, float, float], _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the box, in the palm's frame."
+    )
+    path: dict[Name, PathSignal] | None = Field(
+        None, description="Where the palm is in the world over time, by x, y, z, roll, pitch and yaw; at rest without."
+    )
+
+    @field_validator("path")
+    @classmethod
+    def _coordinates(cls, value: dict[str, PathSignal] | None) -> dict[str, PathSignal] | None:
+        for name in value or {}:
+            if name not in PATH:
+                near = nearest(name, PATH)
+                hint = f"; did you mean {near}?" if near else ""
+                raise problem(name, f"no such coordinate; there are {', '.join(PATH)}{hint}")
+        return value
+
+    def on_path(self, name: str) -> PathSignal:
+        """Return a coordinate of the path; zero where it is left out."""
+        return (self.path or {}).get(name, PathSignal())
+
+
+class PlacedFinger(Description):
+    """A finger and where its base frame stands on the palm."""
+
+    finger: FingerDescription
+
+    @field_validator("finger")
+    @classmethod
+    def _made_of_links(cls, value: FingerDescription) -> FingerDescription:
+        if value.tree is not None:
+            raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
+        return value
+
+    position: Annotated[tuple[float, float, float], _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its base frame, in the palm's frame."
+    )
+    orientation: Annotated[tuple[float, float, float], vector(3, -2.0 * math.pi, 2.0 * math.pi, IN_RADIANS)] = quantity(
+        (0.0, 0.0, 0.0), unit="rad", source="design", doc="Roll, pitch and yaw of its base frame, as in a URDF."
+    )
+    scale: Annotated[float, real(0.1, 10.0)] = quantity(
+        1.0, unit="1", source="design", doc="All lengths times this, masses times its third power."
+    )
+
+    @field_validator("finger")
+    @classmethod
+    def _of_links(cls, value: FingerDescription) -> FingerDescription:
+        if value.tree is not None:
+            raise problem("tree", "a tree is a hand by itself, and cannot be a finger of one")
+        return value
+
+    @property
+    def rotation(self) -> Array:
+        """From the finger's base frame to the palm's, shape (3, 3)."""
+        return rotation(*self.orientation)
+
+
+class HandDescription(Description):
+    """A hand. Its gravity, in the world's frame, replaces that of the fingers; a palm at rest has that frame."""
+
+    file_keys = ("base",)
+
+    name: Name = Field(description="Of the hand.")
+    title: str = Field("", strict=True, max_length=200, description="One line for listings.")
+    gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
+        (0.0, 0.0, -9.81), unit="m/s2", source="palm down", doc="In the world's frame."
+    )
+    palm: Palm = Palm()
+    fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="By name.")
+
+    @field_validator("fingers")
+    @classmethod
+    def _distinct(cls, value: dict[str, PlacedFinger]) -> dict[str, PlacedFinger]:
+        folded: dict[str, str] = {}
+        for name in value:
+            if name.casefold() in folded:
+                raise problem(name, f"another finger is called {folded[name.casefold()]}; names must differ in letters")
+            folded[name.casefold()] = name
+        return value
+
+    def parts(self) -> dict[str, HandDescription]:
+        """Return hands of one finger each, by name."""
+        return {
+            name: self.model_copy(update={"fingers": {name: placed}, "name": name})
+            for name, placed in self.fingers.items()
+        }
+
+    def built(self) -> dict[str, FingerDescription]:
+        """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
+        return {name: self._built(name, placed) for name, placed in self.fingers.items()}
+
+    def joined(self) -> FingerDescription:
+        """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
+        parts = self.built()
+        tendons = {f"{name}.{own}": tendon for name, part in parts.items() for own, tendon in part.tendons.items()}
+        joined = FingerDescription.model_construct(
+            name=self.name,
+            title=self.title,
+            gravity=self.gravity,
+            joints={f"{name}.{own}": joint for name, part in parts.items() for own, joint in part.joints.items()},
+            tendons={
+                name: tendon.model_copy(
+                    update={"crossings": {f"{name.split('.')[0]}.{j}": each for j, each in tendon.crossings.items()}}
+                )
+                for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
+            },
+            tendon_friction=TendonFriction.model_construct(**_lists(parts, "tendon_friction")),
+            joint_friction=JointFriction.model_construct(**_lists(parts, "joint_friction")),
+            passive_tendon=PassiveTendon.model_construct(**_lists(parts, "passive_tendon")),
+            stroke_limiter=StrokeLimiter.model_construct(**_lists(parts, "stroke_limiter")),
+            actuators={
+                f"{name}.{own}": actuator.model_copy(
+                    update={"tendons": tuple(f"{name}.{tendon}" for tendon in actuator.tendons)}
+                )
+                for name, part in parts.items()
+                for own, actuator in part.actuators.items()
+            },
+        )
+        joined._hand = self
+        return joined
+
+    def _built(self, name: str, placed: PlacedFinger) -> FingerDescription:
+        own = placed.rotation.T @ np.array(self.gravity)
+        finger = scaled(placed.finger, placed.scale)
+        return finger.model_copy(update={"name": name, "gravity": tuple(own.tolist())})
+
+
+def one_finger(description: FingerDescription) -> None:
+    """Raise where something is asked of a hand that only a finger has.
+
+    Raises:
+        InputError: If it is a hand of several fingers.
+    """
+    hand = description.hand
+    if hand is not None and len(hand.fingers) > 1:
+        allowed = f"is a hand; take one of its fingers: scenario.parts()[NAME] with {', '.join(hand.fingers)}"
+        raise InputError("finger", allowed, hand.name)
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation of fixed angles, about x, then y, then z, shape (3, 3)."""
+    (a, b, c), (d, e, f) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    about = ([[1, 0, 0], [0, a, -d], [0, d, a]], [[b, 0, e], [0, 1, 0], [-e, 0, b]], [[c, -f, 0], [f, c, 0], [0, 0, 1]])
+    turned: Array = reduce(lambda first, then: np.array(then) @ first, about, np.eye(3))
+    return turned
+
+
+def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
+    """Return a finger of the same shape and material in another size.
+
+    Lengths and radii go with the scale, masses with its third power and moments of inertia with its fifth; so do the
+    friction coefficients of joints, which are lengths (coefficient times pin radius). Springs, tendons, actuators and
+    limiters stay as they are.
+    """
+    if scale == 1.0:
+        return finger
+    powers = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
+    powers |= {"transverse_inertia": 5, "axial_inertia": 5}
+    joints = {
+        name: joint.model_copy(
+            update={
+                "link": joint.link
+                and joint.link.model_copy(
+                    update={key: getattr(joint.link, key) * scale**power for key, power in powers.items()}
+                )
+            }
+        )
+        for name, joint in finger.joints.items()
+    }
+    tendons = {
+        name: tendon.model_copy(
+            update={
+                "crossings": {
+                    joint: crossing.model_copy(update={"radius": crossing.radius * scale})
+                    for joint, crossing in tendon.crossings.items()
+                }
+            }
+        )
+        for name, tendon in finger.tendons.items()
+    }
+    friction = finger.joint_friction
+    lengths = {
+        key: tuple((scale * expand(getattr(friction, key), len(joints))).tolist()) for key in ("coulomb", "stiction")
+    }
+    update = {"joints": joints, "tendons": tendons, "joint_friction": friction.model_copy(update=lengths)}
+    return finger.model_copy(update=update)
+
+
+def _lists(parts: dict[str, FingerDescription], group: str) -> dict[str, Any]:
+    """Return the numbers of a table of all fingers, one list for each of its entries, in the order of the whole."""
+    values: dict[str, list[tuple[str, float]]] = {}
+    for part in parts.values():
+        # Actuated tendons of all come before passive ones; joints are in order.
+        kinds: list[str] = [""] * len(part.passive_names if group == "passive_tendon" else part.joints)
+        if group == "tendon_friction":
+            kinds = [tendon.kind for tendon in part.tendons.values()]
+        for entry, value in getattr(part, group):
+            numbers = expand(value, len(kinds)).tolist()
+            values.setdefault(entry, []).extend(zip(kinds, numbers, strict=True))
+    return {
+        entry: tuple(number for _, number in sorted(pairs, key=lambda pair: pair[0])) for entry, pairs in values.items()
+    }

@@ -1,0 +1,148 @@
+"""Objects that a finger may touch, fixed or free, and the surfaces with which they touch."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import Description, choice, problem, quantity, real, vector
+
+#: The sizes of each shape. Solids are about their origin, cylinder and capsule along z; a half-space is z < 0.
+SIZES: dict[str, tuple[str, ...]] = {
+    "half_space": (),
+    "sphere": ("radius",),
+    "box": ("sides",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+}
+_MILLIMETRES = " m (is it in millimetres?)"
+
+
+class Surface(Description):
+    """Contact of a surface: Hunt-Crossley along the normal, bristles with Coulomb friction along the tangents.
+
+    Where two objects meet that both have one, the smaller of their numbers count.
+    """
+
+    stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
+        1e4, unit="N/m^exponent", source="a soft fingertip", doc="k of f_n = k d^p (1 + c d')."
+    )
+    damping: Annotated[float, real(0.0, 1e4)] = quantity(
+        2.0, unit="s/m", source="estimate", doc="c; slow impacts come back with 1 - 2 c v / 3 of their speed v."
+    )
+    exponent: Annotated[float, real(1.0, 1.5)] = quantity(
+        1.0, unit="1", source="Hunt and Crossley 1975", doc="p: 1, or 1.5 for a sphere of linear material (Hertz)."
+    )
+    friction: Annotated[float, real(0.0, 10.0)] = quantity(
+        0.7, unit="1", source="rubber on plastic", doc="mu_k, the coefficient of sliding friction."
+    )
+    stiction_ratio: Annotated[float, real(1.0, 100.0)] = quantity(
+        1.0, unit="1", source="chosen", doc="mu_s / mu_k: sliding begins at mu_s f_n."
+    )
+    tangential_stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
+        7e3, unit="N/m", source="two thirds of k (Mindlin 1949, incompressible)", doc="k_t of the bristles."
+    )
+    lag: Annotated[float, real(0.0, 1.0, above=True)] = quantity(
+        1e-3, unit="s", source="estimate", doc="T; k_t T is the bristles' damping, T how fast they forget."
+    )
+    stribeck_velocity: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        0.01, unit="m/s", source="estimate", doc="omega, at which mu has fallen by 63 % from mu_s to mu_k."
+    )
+    floor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        1e-4, unit="N", source="keeps slopes finite at f_n = 0", doc="Friction below which sticking is gradual."
+    )
+
+
+class Object(Description):
+    """A rigid body of the environment: fixed, or free if it has a mass."""
+
+    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
+        ..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule."
+    )
+    radius: Annotated[float, real(0.0, 10.0, above=True, hint=_MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
+    )
+    length: Annotated[float, real(0.0, 10.0, above=True, hint=_MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of a cylinder; of a capsule without its round ends."
+    )
+    sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, _MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of a box, along x, y and z."
+    )
+    position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its origin, base frame; of a free object at t = 0."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1e3, 1e3)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Quaternion x, y, z, w of any length; likewise."
+    )
+    mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] | None = quantity(
+        None, unit="kg", source="design", doc="Of a solid of even density that is free to move; fixed without one."
+    )
+    velocity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
+        (0.0, 0.0, 0.0), unit="m/s", source="chosen", doc="Of a free object at t = 0, base frame."
+    )
+    angular_velocity: Annotated[tuple[float, float, float], vector(3, -1e4, 1e4)] = quantity(
+        (0.0, 0.0, 0.0), unit="rad/s", source="chosen", doc="Of a free object at t = 0, its own frame."
+    )
+    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
+
+    @field_validator("shape", mode="before")
+    @classmethod
+    def _no_mesh(cls, value: object) -> object:
+        if value == "mesh":
+            raise problem("", f"meshes are not supported; put together what is needed of {', '.join(SIZES)}", value)
+        return value
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        for entry in ("radius", "length", "sides"):
+            given, needed = getattr(self, entry), entry in SIZES[self.shape]
+            if given is None and needed:
+                raise problem(entry, f'is missing: shape = "{self.shape}" needs {", ".join(SIZES[self.shape])}')
+            if given is not None and not needed:
+                shapes = ", ".join(shape for shape, entries in SIZES.items() if entry in entries)
+                raise problem(entry, f'is for {shapes}, not for shape = "{self.shape}"', given)
+        if math.hypot(*self.orientation) < 1e-6:
+            raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
+        if self.shape == "half_space" and self.mass is not None:
+            raise problem("mass", "a half-space is fixed; leave it out", self.mass)
+        if self.mass is None and (any(self.velocity) or any(self.angular_velocity)):
+            entry = "velocity" if any(self.velocity) else "angular_velocity"
+            raise problem(entry, "is for objects with a mass, which are free to move", getattr(self, entry))
+        return self
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """The numbers of `SIZES`, m."""
+        if self.sides is not None:
+            return self.sides
+        return tuple(getattr(self, name) for name in SIZES[self.shape])
+
+    @property
+    def quaternion(self) -> Array:
+        """Its orientation as a unit quaternion, shape (4,)."""
+        found = np.array(self.orientation)
+        return np.asarray(found / np.linalg.norm(found))
+
+    @property
+    def inertia(self) -> tuple[float, float, float]:
+        """Moments of inertia of a free object about x, y and z of its frame, kg m2; zero for a fixed one."""
+        mass = self.mass
+        if mass is None:
+            return 0.0, 0.0, 0.0
+        if self.sides is not None:
+            x, y, z = (side * side for side in self.sides)
+            return mass * (y + z) / 12.0, mass * (z + x) / 12.0, mass * (x + y) / 12.0
+        radius, length = self.radius or 0.0, self.length or 0.0
+        if self.shape == "cylinder":
+            across = mass * (3.0 * radius**2 + length**2) / 12.0
+            return across, across, mass * radius**2 / 2.0
+        # A capsule: a cylinder, and two halves of a ball whose centres of mass are 3/8 of the radius from its ends.
+        ball = mass * 4.0 * radius / (4.0 * radius + 3.0 * length)
+        middle = mass - ball
+        across = middle * (3.0 * radius**2 + length**2) / 12.0
+        across += ball * (0.4 * radius**2 + length**2 / 4.0 + 3.0 * length * radius / 8.0)
+        return across, across, middle * radius**2 / 2.0 + ball * 0.4 * radius**2

@@ -1,0 +1,294 @@
+"""A hand as a tree of bodies, with tendons, couplings and actuators, such as a MuJoCo model has.
+
+It stands beside the joints and tendons of a `FingerDescription`, which keep the joints' ranges and springs. Units are
+SI: of a joint that slides, angles are lengths in m and torques are forces in N. Frames and signs are MuJoCo's: a body's
+frame is where its placement says while its joints are at their references, and the length of a tendon grows where its
+joints' coefficients are positive. Quaternions are x, y, z, w.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from finger_pin.description.validation import (
+    MOST_ANGLE,
+    Description,
+    Name,
+    choice,
+    nearest,
+    problem,
+    quantity,
+    real,
+    vector,
+)
+
+_MILLIMETRES = " m (is it in millimetres?)"
+_PLACE = vector(3, -10.0, 10.0, _MILLIMETRES)
+_LARGE = 1e9
+Triple = tuple[float, float, float]
+Pair = tuple[float, float]
+
+
+class Solid(Description):
+    """What is seen of a body."""
+
+    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")]
+    radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of all but a box."
+    )
+    length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
+    )
+    sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
+    )
+    position: Annotated[Triple, _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
+    )
+
+
+class Body(Description):
+    """A rigid body, placed on another one or on the base."""
+
+    parent: Name | None = Field(None, description="The body that carries it; the base if left out.")
+    position: Annotated[Triple, _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its frame, in the parent's."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
+    )
+    mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass.")
+    centre: Annotated[Triple, _PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre.")
+    inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
+        (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
+    )
+    solids: dict[Name, Solid] = Field({}, description="What is seen of it, by name.")
+
+    @field_validator("orientation")
+    @classmethod
+    def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        norm = sum(each * each for each in value) ** 0.5
+        if abs(norm - 1.0) > 1e-6:
+            raise problem("", "must be a quaternion x, y, z, w of length 1", list(value))
+        return value
+
+
+class TreeJoint(Description):
+    """How a body moves on its parent; a body with several joints has them one after the other."""
+
+    body: Name = Field(description="The body that moves.")
+    kind: Annotated[Literal["hinge", "slide"], choice("hinge", "slide")] = quantity(
+        "hinge", unit="1", source="design", doc="It turns about its axis, or slides along it."
+    )
+    axis: Annotated[Triple, vector(3, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 1.0), unit="1", source="design", doc="Unit vector in the body's frame."
+    )
+    anchor: Annotated[Triple, _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="A point of the axis, in the body's frame."
+    )
+    reference: Annotated[float, real(-MOST_ANGLE, MOST_ANGLE)] = quantity(
+        0.0, unit="rad", source="design", doc="Position at which the body is where its placement says."
+    )
+    armature: Annotated[float, real(0.0, 1e4)] = quantity(
+        0.0, unit="kg m2", source="design", doc="Inertia of what turns with the joint alone, such as a rotor."
+    )
+
+    @field_validator("axis")
+    @classmethod
+    def _unit(cls, value: Triple) -> Triple:
+        if abs(sum(each * each for each in value) ** 0.5 - 1.0) > 1e-6:
+            raise problem("", "must be a unit vector", list(value))
+        return value
+
+
+class Waypoint(Description):
+    """A piece of a tendon's path: a point, a cylinder or sphere that it may wrap, or a pulley that divides it."""
+
+    kind: Annotated[Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")]
+    body: Name | None = Field(None, description="What carries it; the base if left out.")
+    position: Annotated[Triple, _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
+    )
+    radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of a wrap."
+    )
+    side: Annotated[Triple, _PLACE] | None = quantity(
+        None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."
+    )
+    divisor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        1.0, unit="1", source="design", doc="Of a pulley: what follows counts as this much less."
+    )
+
+
+class TreeTendon(Description):
+    """A tendon: a sum of joint positions, or a path through space; and what acts along it."""
+
+    joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = Field(
+        None, description="Length gained per joint position, m/rad."
+    )
+    path: dict[Name, Waypoint] | None = Field(None, description="By name, in order.")
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="Of its spring.")
+    rest: Annotated[Pair, vector(2, -1e3, 1e3)] = quantity(
+        (0.0, 0.0), unit="m", source="design", doc="Lengths between which its spring is relaxed."
+    )
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="Damping.")
+    range: Annotated[Pair, vector(2, -1e3, 1e3)] | None = quantity(
+        None, unit="m", source="design", doc="Least and largest length, guarded as (2) guards a joint."
+    )
+    limit_stiffness: Annotated[float, real(0.0, 1e12)] = quantity(
+        1e5, unit="N/m", source="estimate", doc="Of what guards the range."
+    )
+    limit_damping: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.5, unit="s/m", source="estimate", doc="Of what guards the range, as c of (2)."
+    )
+    friction: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="N", source="design", doc="Coulomb friction that does not depend on load."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.joints is None) == (self.path is None):
+            raise problem("", "needs joints or a path, and not both")
+        if self.range is not None and self.range[0] >= self.range[1]:
+            raise problem("range", "the least length must be below the largest", list(self.range))
+        if self.rest[0] > self.rest[1]:
+            raise problem("rest", "the first length must not be above the second", list(self.rest))
+        _check_path(self.path or {})
+        return self
+
+
+class Coupling(Description):
+    """A joint that follows another: q = offset + ratio q_other, held by a stiff spring."""
+
+    joint: Name = Field(description="The joint that follows.")
+    other: Name | None = Field(None, description="The joint that it follows; none: it is held.")
+    ratio: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="1", source="design", doc="ratio.")
+    offset: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="design", doc="offset.")
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(100.0, unit="N m/rad", source="estimate", doc="k.")
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.1, unit="N m s/rad", source="estimate", doc="c.")
+
+
+class Actuator(Description):
+    """What drives a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length."""
+
+    joint: Name | None = Field(None, description="The joint that it drives.")
+    tendon: Name | None = Field(None, description="The tendon that it drives.")
+    gear: Annotated[float, real(-1e6, 1e6)] = quantity(1.0, unit="1", source="design", doc="gear.")
+    gain: Annotated[float, real(-_LARGE, _LARGE)] = quantity(1.0, unit="N per input", source="design", doc="gain.")
+    offset: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N", source="design", doc="b_0.")
+    by_length: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="b_1.")
+    by_speed: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="b_2.")
+    input_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="1", source="design", doc="Between which u is held."
+    )
+    force_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="N", source="design", doc="Between which the force is held."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.joint is None) == (self.tendon is None):
+            raise problem("", "drives a joint or a tendon, and not both")
+        for entry in ("input_range", "force_range"):
+            given = getattr(self, entry)
+            if given is not None and given[0] > given[1]:
+                raise problem(entry, "the lower limit must not be above the upper one", list(given))
+        return self
+
+
+class Tip(Description):
+    """The point whose motion is recorded, and where the fingertip force acts."""
+
+    body: Name | None = Field(None, description="What carries it; the base if left out.")
+    position: Annotated[Triple, _PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
+
+
+class Tree(Description):
+    """Bodies and what moves them. Parents come before their children; joints in the order of the bodies."""
+
+    bodies: dict[Name, Body] = Field(min_length=1, description="By name, parents first.")
+    joints: dict[Name, TreeJoint] = Field(min_length=1, description="By name, those of parents first.")
+    tendons: dict[Name, TreeTendon] = Field({}, description="By name.")
+    couplings: dict[Name, Coupling] = Field({}, description="By name.")
+    actuators: dict[Name, Actuator] = Field({}, description="By name.")
+    tip: Tip = Tip()
+    left_out: tuple[str, ...] = Field((), description="What the model had that is not here.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        known: list[str] = []
+        for name, body in self.bodies.items():
+            _check(f"bodies.{name}.parent", body.parent, known, "body before it")
+            known.append(name)
+        for name, joint in self.joints.items():
+            _check(f"joints.{name}.body", joint.body, self.bodies, "body")
+        order = [known.index(joint.body) for joint in self.joints.values()]
+        if order != sorted(order):
+            raise problem("joints", "must follow the order of their bodies", list(self.joints))
+        for name, tendon in self.tendons.items():
+            for joint_name in tendon.joints or {}:
+                _check(f"tendons.{name}.joints.{joint_name}", joint_name, self.joints, "joint")
+            for point, place in (tendon.path or {}).items():
+                _check(f"tendons.{name}.path.{point}.body", place.body, self.bodies, "body")
+        for name, coupling in self.couplings.items():
+            _check(f"couplings.{name}.joint", coupling.joint, self.joints, "joint")
+            _check(f"couplings.{name}.other", coupling.other, self.joints, "joint")
+        for name, actuator in self.actuators.items():
+            _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
+            _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
+        _check("tip.body", self.tip.body, self.bodies, "body")
+        return self
+
+    def crossed(self, tendon: str) -> frozenset[str]:
+        """Return the joints that a tendon crosses: those that move one piece of its path and not the next."""
+        described, found = self.tendons[tendon], set[str]()
+        before: set[str] | None = None
+        for each in (described.path or {}).values():
+            if each.kind == "pulley":
+                before = None
+                continue
+            movers = self._movers(each.body)
+            found |= movers ^ before if before is not None else set()
+            before = movers
+        return frozenset(found or {name for name, coefficient in (described.joints or {}).items() if coefficient})
+
+    def _movers(self, body: str | None) -> set[str]:
+        """Return the joints that move a body."""
+        found = set[str]()
+        while body is not None:
+            found |= {name for name, joint in self.joints.items() if joint.body == body}
+            body = self.bodies[body].parent
+        return found
+
+
+def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:
+    known = list(names)
+    if name is not None and name not in known:
+        near = nearest(name, known)
+        hint = f"; did you mean {near}?" if near else ""
+        raise problem(entry, f"no such {what}; there are {', '.join(known) or 'none'}{hint}", name)
+
+
+def _check_path(path: dict[str, Waypoint]) -> None:
+    """Raise where a path does not begin, end and go on with points, pulleys apart."""
+    before: str | None = None
+    for name, each in path.items():
+        wraps = each.kind in ("cylinder", "sphere")
+        if wraps and before != "point":
+            raise problem(f"path.{name}", "a wrap stands between two points")
+        if each.kind == "pulley" and before not in (None, "point"):
+            raise problem(f"path.{name}", "a pulley follows a point")
+        if wraps and each.radius <= 0.0:
+            raise problem(f"path.{name}.radius", "must be above 0", each.radius)
+        before = each.kind
+    if path and before != "point":
+        raise problem("path", "must end with a point")

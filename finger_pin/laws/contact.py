@@ -1,0 +1,162 @@
+"""Contact: a Hunt-Crossley normal force, and friction that sticks where it does not slide.
+
+Normal, d = -gap: f_n = max(0, k d^p (1 + c d')) (Hunt and Crossley, J. Applied Mechanics 42, 1975).
+
+Tangential: a bristle with spring and damper carries a tip that rubs with Coulomb friction. With z the bend of the
+bristle, u the speed at which the tip slides, and v = z' + u,
+
+    F = k_t (z + T z'),     |F| <= mu f_n,     u along F, and zero unless |F| = mu f_n.
+
+Solved for F: w = z + T v is the bend that the bristle would take up if the tip stuck, and F = k_t s w with s = 1
+where k_t |w| <= mu f_n, else the length that brings k_t w back to the cone; z' = (s w - z) / T. This is
+the element of which the friction model of Xiong, Kikuuwe and Yamamoto (Tribology Letters 51, 2013) consists, here for
+two tangents and a load that varies.
+
+What follows, whatever the normal force does meanwhile:
+
+- |F| <= mu_s f_n, with the magnitude of both components.
+- While the tip sticks, v = z': no creep at constant load, and no drift under vibration of either force.
+- F v is k_t z z' (stored) plus k_t T z'^2 plus |F| u (lost): no cycle yields energy.
+- With f_n = 0, s = 0: no force, and z is forgotten with the time constant T.
+
+mu falls from mu_s to mu_k by exp(-(x / omega)^2), where x = (|w| - mu_s f_n / k_t) / T is the speed at which the tip
+would slide if mu stayed at mu_s. So only sliding lowers mu, vibration of a tip that sticks does not. In steady sliding,
+v = x + (mu_s - mu) f_n / (k_t T). A floor, a least level of friction below which the tip gives way gradually, keeps
+slopes finite at f_n = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.laws.law import ContactLaw, Touch
+
+
+def _normal(touch: Touch, p: Any) -> Any:
+    """Return d where surfaces touch, else 0; spring force, damping factor, and whether the contact is not pulling."""
+    stiffness, damping, exponent = p[:3]
+    depth = -touch.gap * ((touch.gap < 0.0) | (touch.side > 0.0))
+    factor = 1.0 - damping * touch.speed
+    held = 1.0 * (factor * (touch.side == 0.0) + touch.side > 0.0)
+    return depth, stiffness * np.abs(depth) ** (exponent - 1.0) * depth, factor, held
+
+
+def _cone(touch: Touch, pressing: Any, p: Any) -> Any:
+    """Return w, |w|, the sliding speed x that lowers mu, mu, and by how much it has fallen, mu - mu_k."""
+    _, _, _, static, kinetic, stiffness, lag, stribeck, _ = p
+    bend_1, bend_2 = touch.state_1 + lag * touch.slip_1, touch.state_2 + lag * touch.slip_2
+    bend = np.sqrt(bend_1 * bend_1 + bend_2 * bend_2)
+    sliding = np.maximum(bend - static * pressing / stiffness, 0.0) / lag
+    excess = (static - kinetic) * np.exp(-(sliding / stribeck) * (sliding / stribeck))
+    return bend_1, bend_2, bend, sliding, kinetic + excess, excess
+
+
+def _value(touch: Touch, p: Any) -> Any:
+    _, _, _, _, _, stiffness, lag, _, floor = p
+    _, spring, factor, held = _normal(touch, p)
+    normal = spring * factor * held
+    pressing = np.maximum(normal, 0.0)
+    bend_1, bend_2, bend, _, friction, _ = _cone(touch, pressing, p)
+    level = friction * pressing
+    share = level / np.maximum(np.maximum(stiffness * bend, level), floor)
+    tip_1, tip_2 = share * bend_1, share * bend_2
+    # The force bends sharply where the surfaces meet, and where the contact would begin to pull.
+    grip = np.minimum(-touch.gap, factor)
+    return (
+        normal,
+        -stiffness * tip_1,
+        -stiffness * tip_2,
+        (tip_1 - touch.state_1) / lag,
+        (tip_2 - touch.state_2) / lag,
+        level,
+        (1.0 - share) * bend / lag,
+        grip,
+    )
+
+
+def _slopes(touch: Touch, p: Any, signals: Any) -> Any:
+    kn, damping, exponent, static, _, stiffness, lag, stribeck, floor = p
+    depth, spring, factor, held = _normal(touch, p)
+    touching = 1.0 * ((touch.gap < 0.0) | (touch.side > 0.0))
+    normal = spring * factor * held
+    by_gap = -kn * exponent * np.abs(depth) ** (exponent - 1.0) * factor * held * touching
+    by_speed = -damping * spring * held
+    pressing, pressed = np.maximum(normal, 0.0), 1.0 * (normal > 0.0)
+    bend_1, bend_2, bend, sliding, friction, excess = _cone(touch, pressing, p)
+    level = friction * pressing
+    reach = np.maximum(np.maximum(stiffness * bend, level), floor)
+    share = level / reach
+    # Of mu by |w|, then of the level and of the share by f_n and by |w|.
+    falling = -2.0 * excess * sliding / (stribeck * stribeck * lag)
+    level_n = (friction - pressing * falling * static / stiffness) * pressed
+    level_b = pressing * falling
+    outside = 1.0 * ((stiffness * bend >= level) & (stiffness * bend >= floor))
+    inside = 1.0 * ((level > stiffness * bend) & (level >= floor))
+    share_n = level_n * (1.0 - inside * share) / reach
+    share_b = (level_b * (1.0 - inside * share) - outside * share * stiffness) / reach
+    # |w| by its components; at w = 0 it has no slope, and needs none.
+    along_1, along_2 = bend_1 / np.maximum(bend, 1e-300), bend_2 / np.maximum(bend, 1e-300)
+    # The tip's bend s w by f_n and by w.
+    n_1, n_2 = share_n * bend_1, share_n * bend_2
+    b_11, b_22 = share + share_b * along_1 * bend_1, share + share_b * along_2 * bend_2
+    b_12 = share_b * along_1 * bend_2
+    return (
+        (by_gap, by_speed, 0.0, 0.0, 0.0, 0.0),
+        (
+            -stiffness * n_1 * by_gap,
+            -stiffness * n_1 * by_speed,
+            -stiffness * lag * b_11,
+            -stiffness * lag * b_12,
+            -stiffness * b_11,
+            -stiffness * b_12,
+        ),
+        (
+            -stiffness * n_2 * by_gap,
+            -stiffness * n_2 * by_speed,
+            -stiffness * lag * b_12,
+            -stiffness * lag * b_22,
+            -stiffness * b_12,
+            -stiffness * b_22,
+        ),
+        (n_1 * by_gap / lag, n_1 * by_speed / lag, b_11, b_12, (b_11 - 1.0) / lag, b_12 / lag),
+        (n_2 * by_gap / lag, n_2 * by_speed / lag, b_12, b_22, b_12 / lag, (b_22 - 1.0) / lag),
+    )
+
+
+def _account(touch: Touch, p: Any, forces: Any, rates: Any, signals: Any) -> Any:
+    _, _, exponent, _, _, stiffness, lag, _, _ = p
+    depth, spring, _, _ = _normal(touch, p)
+    bent = touch.state_1 * touch.state_1 + touch.state_2 * touch.state_2
+    rubbing = np.sqrt(forces[1] * forces[1] + forces[2] * forces[2])
+    return (
+        spring * depth / (exponent + 1.0) + 0.5 * stiffness * bent,
+        (spring - forces[0]) * touch.speed,
+        rubbing * signals[1],
+        stiffness * lag * (rates[0] * rates[0] + rates[1] * rates[1]),
+    )
+
+
+#: Contact of two surfaces.
+CONTACT = ContactLaw(
+    name="contact",
+    parameters=(
+        "stiffness",
+        "damping",
+        "exponent",
+        "static",
+        "kinetic",
+        "tangential_stiffness",
+        "lag",
+        "stribeck_velocity",
+        "floor",
+    ),
+    value=_value,
+    slopes=_slopes,
+    account=_account,
+    signals=("level", "sliding_speed", "grip"),
+    losses=("impact", "sliding", "micro_damping"),
+    scale=1e-5,
+    kink="grip",
+)

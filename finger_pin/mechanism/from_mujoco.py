@@ -1,0 +1,349 @@
+"""A MuJoCo model as a description: bodies, joints, tendons, couplings and actuators; what else it has is listed.
+
+MuJoCo resolves defaults, classes and includes; what is read here is its compiled model (`mujoco.MjModel`).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import MOST_ANGLE, validate
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mujoco_rest import Rest
+from finger_pin.mechanism.routes import rotation
+
+Table = dict[str, Any]
+# Stiffness with which a tendon's range stops a joint, N m/rad, as the stroke limiters do.
+_STOP = 50.0
+# The same for joints that slide, N/m.
+_STOP_SLIDING = 1e4
+_LEAST_FRICTION = 1e-7
+# Time constant with which a coupled joint follows, critically damped, s.
+_COUPLED = 0.005
+
+
+def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
+    """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
+
+    Motors that can only pull a tendon through space become tendons of the hand, with friction along their path and
+    slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons and joints,
+    which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the model's. Ranges
+    are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of (9). What is
+    not carried over stands in ``tree.left_out``.
+
+    Args:
+        model: A `mujoco.MjModel`, or the path of an XML file.
+        name: Of the hand.
+
+    Raises:
+        InputError: If it is neither, MuJoCo refuses the file, the model has no tendons, or it has muscles or ball
+            joints.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("model", "needs MuJoCo: pip install 'finger-pin[mujoco]'") from None
+    if isinstance(model, str | Path):
+        try:
+            model = mujoco.MjModel.from_xml_path(str(model))
+        except ValueError as error:
+            raise InputError(f"model {model}", " ".join(str(error).split())) from None
+    if not isinstance(model, mujoco.MjModel):
+        raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
+    return validate(FingerDescription, _Reader(mujoco, model).table(name), ("finger",))
+
+
+class _Reader:
+    """Reads a model, element by element."""
+
+    def __init__(self, mujoco: Any, model: Any) -> None:
+        self.mujoco, self.model = mujoco, model
+        if model.ntendon == 0:
+            raise InputError("model", "has no tendons")
+        self.rest = Rest(mujoco, model)
+        self.bodies = _names("body", [model.body(i).name for i in range(model.nbody)])
+        self.joints = _names("joint", [model.joint(i).name for i in range(model.njnt)])
+        self.tendons = _names("tendon", [model.tendon(i).name for i in range(model.ntendon)])
+        self.sites = _names("site", [model.site(i).name for i in range(model.nsite)])
+        self.geoms = _names("geom", [model.geom(i).name for i in range(model.ngeom)])
+        kinds = mujoco.mjtJoint
+        for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
+            raise InputError(f"joint {self.joints[i]}", "is a ball joint; joints have to turn or slide about one axis")
+        self.affine = self.rest.affine_actuators()
+        self.pulling = [i for i in self.affine if self._pulls(i)]
+        self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
+
+    def table(self, name: str) -> Table:
+        """Return the description as a table."""
+        model, flags = self.model, self.mujoco.mjtDisableBit
+        if not self.kept_joints:
+            raise InputError("model", "has no joints that turn or slide")
+        weightless = model.opt.disableflags & int(flags.mjDSBL_GRAVITY)
+        dofs = model.jnt_dofadr[self.kept_joints]
+        sliding = model.jnt_type[self.kept_joints] == self.mujoco.mjtJoint.mjJNT_SLIDE
+        tendons = {self.tendons[i]: self._tendon(i) for i in range(model.ntendon)}
+        bodies = self._bodies()
+        return {
+            "name": _name(name),
+            "gravity": [0.0, 0.0, 0.0] if weightless else model.opt.gravity.tolist(),
+            "joints": {self.joints[i]: self._joint(i) for i in self.kept_joints},
+            "tendons": self._pulled(),
+            "joint_friction": {
+                "viscous": 0.0,
+                "floor": np.maximum(model.dof_frictionloss[dofs], _LEAST_FRICTION).tolist(),
+            },
+            "stroke_limiter": {"stiffness": np.where(sliding, _STOP_SLIDING, _STOP).tolist()},
+            "tree": {
+                "bodies": {self.bodies[i]: self._body(i) for i in bodies},
+                "joints": {self.joints[i]: self._moving(i) for i in self.kept_joints},
+                "tendons": tendons,
+                "couplings": self._couplings(),
+                "actuators": self._actuators(),
+                "tip": self._tip(),
+                "left_out": self.rest.listed(),
+            },
+        }
+
+    def _bodies(self) -> list[int]:
+        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+        model, types = self.model, self.mujoco.mjtWrap
+        sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE]
+        wraps = model.wrap_objid[(model.wrap_type == types.mjWRAP_SPHERE) | (model.wrap_type == types.mjWRAP_CYLINDER)]
+        needed = {int(each) for each in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
+        needed |= {self._tip_body()[0]}
+        moved: set[int] = set()
+        for i in range(1, model.nbody):
+            own = any(model.jnt_bodyid[j] == i for j in self.kept_joints)
+            if own or int(model.body_parentid[i]) in moved:
+                moved.add(i)
+        needed |= moved
+        for i in range(model.nbody - 1, 0, -1):
+            if i in needed:
+                needed.add(int(model.body_parentid[i]))
+        return sorted(needed - {0})
+
+    def _body(self, i: int) -> Table:
+        model = self.model
+        turned = rotation(_quaternion(model.body_iquat[i]))
+        moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
+        return {
+            **self._carrier(int(model.body_parentid[i]), "parent"),
+            "position": model.body_pos[i].tolist(),
+            "orientation": _quaternion(model.body_quat[i]),
+            "mass": float(model.body_mass[i]),
+            "centre": model.body_ipos[i].tolist(),
+            "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "solids": self._solids(i),
+        }
+
+    def _solids(self, body: int) -> Table:
+        """Return what is seen of a body: its primitives, or boxes around its meshes if it moves and has none."""
+        model, kinds = self.model, self.mujoco.mjtGeom
+        primitives, boxes = {}, {}
+        for i in np.flatnonzero(model.geom_bodyid == body):
+            kind, size = model.geom_type[i], model.geom_size[i]
+            place = {"position": model.geom_pos[i].tolist(), "orientation": _quaternion(model.geom_quat[i])}
+            radius, length = float(size[0]), 2.0 * float(size[1])
+            if kind == kinds.mjGEOM_SPHERE:
+                primitives[self.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+            elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
+                name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
+                primitives[self.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+            elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
+                primitives[self.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+            elif kind == kinds.mjGEOM_MESH:
+                middle, half = np.split(model.geom_aabb[i], 2)
+                place["position"] = (model.geom_pos[i] + rotation(place["orientation"]) @ middle).tolist()
+                boxes[self.geoms[i]] = {"kind": "box", "sides": (2.0 * half).tolist(), **place}
+        # What stands still is only in the way.
+        return primitives or (boxes if model.body_weldid[body] else {})
+
+    def _joint(self, i: int) -> Table:
+        model, dof = self.model, int(self.model.jnt_dofadr[i])
+        spring = {
+            "stiffness": float(model.jnt_stiffness[i]),
+            "rest": float(model.qpos_spring[model.jnt_qposadr[i]]),
+            "damping": float(model.dof_damping[dof]),
+        }
+        limited = bool(model.jnt_limited[i])
+        return {
+            "range": model.jnt_range[i].tolist() if limited else [-MOST_ANGLE, MOST_ANGLE],
+            **({"spring": spring} if spring["stiffness"] or spring["damping"] else {}),
+        }
+
+    def _moving(self, i: int) -> Table:
+        model = self.model
+        hinge = model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
+        return {
+            "body": self.bodies[model.jnt_bodyid[i]],
+            "kind": "hinge" if hinge else "slide",
+            "axis": model.jnt_axis[i].tolist(),
+            "anchor": model.jnt_pos[i].tolist(),
+            "reference": float(model.qpos0[model.jnt_qposadr[i]]),
+            "armature": float(model.dof_armature[model.jnt_dofadr[i]]),
+        }
+
+    def _tendon(self, i: int) -> Table:
+        model, types = self.model, self.mujoco.mjtWrap
+        pieces = range(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))
+        found: Table = {
+            "stiffness": float(model.tendon_stiffness[i]),
+            "rest": model.tendon_lengthspring[i].tolist(),
+            "damping": float(model.tendon_damping[i]),
+            "friction": float(model.tendon_frictionloss[i]),
+        }
+        if model.wrap_type[pieces[0]] == types.mjWRAP_JOINT:
+            found["joints"] = {self.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
+            share = sum(coefficient**2 for coefficient in found["joints"].values())
+            found["limit_stiffness"] = _STOP / share if share else 0.0
+        else:
+            names = _names("pulley", [self._piece_name(k) for k in pieces])
+            found["path"] = {name: self._piece(k) for name, k in zip(names, pieces, strict=True)}
+        if model.tendon_limited[i]:
+            found["range"] = model.tendon_range[i].tolist()
+        return found
+
+    def _piece_name(self, k: int) -> str:
+        kind, at, types = self.model.wrap_type[k], self.model.wrap_objid[k], self.mujoco.mjtWrap
+        if kind == types.mjWRAP_PULLEY:
+            return ""
+        return (self.sites if kind == types.mjWRAP_SITE else self.geoms)[int(at)]
+
+    def _piece(self, k: int) -> Table:
+        """Return a piece of a spatial tendon's path."""
+        model, types, kind = self.model, self.mujoco.mjtWrap, self.model.wrap_type[k]
+        at = int(model.wrap_objid[k])
+        if kind == types.mjWRAP_PULLEY:
+            return {"kind": "pulley", "divisor": float(model.wrap_prm[k])}
+        if kind == types.mjWRAP_SITE:
+            place = {"kind": "point", "position": model.site_pos[at].tolist()}
+            return place | self._carrier(int(model.site_bodyid[at]), "body")
+        wrap = {
+            "kind": "cylinder" if kind == types.mjWRAP_CYLINDER else "sphere",
+            "position": model.geom_pos[at].tolist(),
+            "orientation": _quaternion(model.geom_quat[at]),
+            "radius": float(model.geom_size[at, 0]),
+            **self._carrier(int(model.geom_bodyid[at]), "body"),
+        }
+        side = int(model.wrap_prm[k])
+        if side >= 0:
+            if model.site_bodyid[side] != model.geom_bodyid[at]:
+                self.rest.add(f"side point {self.sites[side]} of {self.geoms[at]}: moves with the wrap's body")
+            wrap["side"] = self._seen_from(at, side).tolist()
+        return wrap
+
+    def _seen_from(self, geom: int, site: int) -> Array:
+        """Return a site in the frame of a geom, at the model's reference."""
+        mujoco, model = self.mujoco, self.model
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        turned = data.geom_xmat[geom].reshape(3, 3)
+        return np.asarray(turned.T @ (data.site_xpos[site] - data.geom_xpos[geom]))
+
+    def _couplings(self) -> Table:
+        model, found = self.model, {}
+        for i in self.rest.joint_equalities():
+            first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+            constant, ratio = (float(each) for each in model.eq_data[i, :2])
+            q0 = model.qpos0[model.jnt_qposadr]
+            other = {"other": self.joints[second], "ratio": ratio} if second >= 0 else {}
+            offset = q0[first] + constant - (ratio * q0[second] if second >= 0 else 0.0)
+            inertia = float(model.dof_M0[model.jnt_dofadr[first]])
+            found[model.equality(i).name or f"equality_{i}"] = {
+                "joint": self.joints[first],
+                "offset": float(offset),
+                "stiffness": inertia / _COUPLED**2,
+                "damping": 2.0 * inertia / _COUPLED,
+                **other,
+            }
+        return dict(zip(_names("equality", list(found)), found.values(), strict=True))
+
+    def _actuators(self) -> Table:
+        model, found = self.model, {}
+        for i in self.affine:
+            if i in self.pulling:
+                continue
+            kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
+            of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
+            affine = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_AFFINE
+            offset, by_length, by_speed = model.actuator_biasprm[i, :3].tolist() if affine else (0.0, 0.0, 0.0)
+            found[i] = {
+                **({"tendon": self.tendons[at]} if of_tendon else {"joint": self.joints[at]}),
+                "gear": float(model.actuator_gear[i, 0]),
+                "gain": float(model.actuator_gainprm[i, 0]),
+                "offset": offset,
+                "by_length": by_length,
+                "by_speed": by_speed,
+            }
+            if model.actuator_ctrllimited[i]:
+                found[i]["input_range"] = model.actuator_ctrlrange[i].tolist()
+            if model.actuator_forcelimited[i]:
+                found[i]["force_range"] = model.actuator_forcerange[i].tolist()
+        names = _names("actuator", [model.actuator(i).name for i in found])
+        return dict(zip(names, found.values(), strict=True))
+
+    def _pulls(self, i: int) -> bool:
+        """Return whether an actuator is a motor that can only pull a tendon through space."""
+        model, types = self.model, self.mujoco
+        at = int(model.actuator_trnid[i, 0])
+        if (
+            model.actuator_trntype[i] != types.mjtTrn.mjTRN_TENDON
+            or model.actuator_biastype[i] != types.mjtBias.mjBIAS_NONE
+            or not model.actuator_ctrllimited[i]
+            or model.actuator_forcelimited[i]
+            or model.wrap_type[model.tendon_adr[at]] == types.mjtWrap.mjWRAP_JOINT
+        ):
+            return False
+        exerted = model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[i]
+        return bool(np.all(exerted <= 0.0) and np.any(exerted))
+
+    def _pulled(self) -> Table:
+        """Return the tendons that motors pull, by the names of these."""
+        model = self.model
+        names = _names("actuator", [model.actuator(i).name for i in self.pulling])
+        along = [self.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
+        return {name: {"along": path} for name, path in zip(names, along, strict=True)}
+
+    def _tip_body(self) -> tuple[int, Array]:
+        """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""
+        model = self.model
+        for i in range(model.nsite):
+            if "tip" in model.site(i).name.lower() and model.body_weldid[model.site_bodyid[i]]:
+                return int(model.site_bodyid[i]), model.site_pos[i]
+        return int(model.jnt_bodyid[self.kept_joints[-1]]), np.zeros(3)
+
+    def _tip(self) -> Table:
+        body, position = self._tip_body()
+        return {**self._carrier(body, "body"), "position": position.tolist()}
+
+    def _carrier(self, body: int, entry: str) -> Table:
+        return {entry: self.bodies[body]} if body else {}
+
+
+def _quaternion(real_first: Array) -> tuple[float, float, float, float]:
+    """Return a quaternion x, y, z, w of one w, x, y, z."""
+    w, x, y, z = real_first.tolist()
+    return x, y, z, w
+
+
+def _name(text: str) -> str:
+    """Return a name of letters, digits and underscores."""
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[:60]
+    return name if re.match(r"[A-Za-z]", name) else f"n{name}"
+
+
+def _names(what: str, given: list[str]) -> list[str]:
+    """Return names for elements, all different; those without one are numbered."""
+    found: list[str] = []
+    for index, each in enumerate(given):
+        name = _name(each) if each else f"{what}_{index}"
+        while name in found:
+            name = f"{name[:56]}_{index}"
+        found.append(name)
+    return found

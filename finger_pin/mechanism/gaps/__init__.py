@@ -1,0 +1,6 @@
+"""Gaps: signed distances of two bodies' surfaces, with normals, contact points, and all slopes in closed form."""
+
+from finger_pin.mechanism.gaps.gap import Gap
+from finger_pin.mechanism.gaps.prism import PRISM, prism_parameters
+
+__all__ = ["PRISM", "Gap", "prism_parameters"]

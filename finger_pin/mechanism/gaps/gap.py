@@ -1,0 +1,34 @@
+"""What a gap is: how far a capsule or a sphere of one body is from the shape of another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+#: Columns of what ``value`` fills: distance, normal, point, two tangents.
+DISTANCE, NORMAL, POINT, TANGENT_1, TANGENT_2, FOUND = 0, 1, 4, 7, 10, 13
+#: Where in what ``slopes`` fills the slopes of the distance stand, and how many numbers there are.
+BY_DISTANCE, SLOPES = 72, 78
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The distance between body A, a segment with a radius, and the shape of body W, in the frame of that shape.
+
+    Attributes:
+        name: For messages.
+        parameters: Names of its numbers, the radius of A first; ``p`` holds them in this order.
+        value: (y, p, out). y has both ends of A's segment, twice the same point for a sphere, shape (6,), m. Fills
+            out[0] with the signed distance, negative for penetration, m; out[1:4] with the unit normal from W towards
+            A; out[4:7] with the contact point, midway between the surfaces, m; out[7:10] and out[10:13] with two
+            tangents, right-handed with the normal.
+        slopes: (y, p, out). Fills out[:72] with d(out[1:13])/dy, 12 x 6 row by row, and out[72:78] with
+            d(distance)/dy.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    value: Callable[..., Any]
+    slopes: Callable[..., Any]
+    columns: ClassVar[int] = 3

@@ -1,0 +1,190 @@
+"""Pieces of paths through space: lengths, arms and turns that depend on the posture.
+
+A piece is a function of two points that bodies carry, seen from a frame that a third body carries: a straight stretch
+of a tendon, a wrap about a cylinder, the gap between two surfaces. Its columns are wrenches (moment about the base's
+origin, force) on the three bodies, which sum up to nothing; the arm of a row is the power that they take at unit
+velocity of every coordinate, and for a length it is the length's gradient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.rigid_body import RigidBody
+
+
+class Shape(Protocol):
+    """What a piece is, seen from its own frame: a span of a tendon, or a gap between surfaces.
+
+    Attributes:
+        name: For messages.
+        parameters: Names of its numbers.
+        value: (y, p, out) fills what the points y, six numbers, give; see `spans` and `gaps`.
+        slopes: (y, p, out) fills its derivatives by y.
+        columns: How many wrenches it has: one along a span; normal and two tangents of a gap.
+    """
+
+    columns: ClassVar[int]
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def value(self) -> Callable[..., None]: ...  # noqa: D102
+
+    @property
+    def slopes(self) -> Callable[..., None]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point that a body carries.
+
+    Attributes:
+        joint: Index of the body's joint in Pinocchio's model, 0 for the base.
+        point: In the frame of the joint, shape (3,), m.
+    """
+
+    joint: int
+    point: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A shape between bodies.
+
+    Attributes:
+        shape: The function.
+        parameters: Its numbers.
+        ends: The two points.
+        joint: Of the body that carries the frame, 0 for the base.
+        frame: Placement of the frame in that joint's.
+        reach: Where the middle of both points is further from the frame's origin, a gap is open and not asked, m.
+    """
+
+    shape: Shape
+    parameters: Array
+    ends: tuple[Place, Place]
+    joint: int = 0
+    frame: pin.SE3 = field(default_factory=pin.SE3.Identity)
+    reach: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """What a piece adds to a row.
+
+    Attributes:
+        piece: The piece.
+        column: Which of its wrenches.
+        arm: Weight in the row's arm.
+        measure: Weight in the row's length; by default the arm's.
+        follows: Whether it begins where the row's leg before it ends: there the path turns.
+    """
+
+    piece: Piece
+    column: int = 0
+    arm: float = 1.0
+    measure: float | None = None
+    follows: bool = False
+
+    @property
+    def length_weight(self) -> float:
+        """Weight in the row's length."""
+        return self.arm if self.measure is None else self.measure
+
+
+#: Of every row of a table, the legs of its path.
+Paths = Sequence[Sequence[Leg]]
+
+
+def moved(paths: Paths, shift: int) -> tuple[tuple[Leg, ...], ...]:
+    """Return paths in a model where all joints but the base have moved on by some."""
+
+    @cache
+    def piece_there(piece: Piece) -> Piece:
+        first, second = (replace(end, joint=end.joint and end.joint + shift) for end in piece.ends)
+        return replace(piece, ends=(first, second), joint=piece.joint and piece.joint + shift)
+
+    return tuple(tuple(replace(leg, piece=piece_there(leg.piece)) for leg in legs) for legs in paths)
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """What paths add to the rows of a table at one posture; k rows, N coordinates.
+
+    Attributes:
+        length: Shape (k,).
+        arm: Shape (k, N).
+        turn: Angle by which the paths turn, shape (k,), rad.
+        force: Unit wrench's force on the first body of each row's first leg, base frame, shape (k, 3).
+    """
+
+    length: Array
+    arm: Array
+    turn: Array
+    force: Array
+
+
+def reach(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> Reach:
+    """Return what paths add to their rows at q, shape (nq,): lengths, arms and turns."""
+    width = int(body.model.nv)
+    placements, twists = body.placements(q)
+
+    found = Reach(
+        np.zeros(len(paths)), np.zeros((len(paths), coordinates)), np.zeros(len(paths)), np.zeros((len(paths), 3))
+    )
+    for k, legs in enumerate(paths):
+        before = np.zeros(3)
+        for number, leg in enumerate(legs):
+            piece = leg.piece
+            points = [placements[end.joint].act(np.asarray(end.point, dtype=float)) for end in piece.ends]
+            frame = placements[piece.joint] * piece.frame
+            out = _value(piece, frame, points)
+            rotation = frame.rotation
+            if piece.shape.columns == 1:
+                length, turn = out[0], out[1]
+                loads = [(rotation @ out[2:5], points[0]), (rotation @ out[5:8], points[1])]
+            else:
+                length, turn = (out[0] if leg.column == 0 else 0.0), 0.0
+                axis = (1, 7, 10)[leg.column]
+                loads = [(rotation @ out[axis : axis + 3], frame.act(out[4:7]))] if out[0] < 0.0 else []
+            arm = np.zeros(width)
+            for (force, point), end in zip(loads, piece.ends, strict=False):
+                wrench = np.concatenate([force, pin.skew(point) @ force])
+                arm += wrench @ (twists[end.joint] - twists[piece.joint])
+            found.length[k] += leg.length_weight * length
+            found.arm[k, :width] += leg.arm * arm
+            found.turn[k] += turn
+            if leg.follows:
+                found.turn[k] += _angle(before, -loads[0][0])
+            if number == 0 and loads:
+                found.force[k] = loads[0][0]
+            before = loads[-1][0] if loads else before
+    return found
+
+
+def _value(piece: Piece, frame: pin.SE3, points: Sequence[Array]) -> Array:
+    """Return what the shape says; out of reach, a gap that is open."""
+    y = np.concatenate([frame.actInv(point) for point in points])
+    out = np.zeros(16)
+    beyond = np.linalg.norm(0.5 * (y[:3] + y[3:])) - piece.reach
+    if beyond > 0.0:
+        out[0] = beyond
+    else:
+        piece.shape.value(y, piece.parameters, out)
+    return out
+
+
+def _angle(first: Array, second: Array) -> Any:
+    return np.arctan2(np.linalg.norm(pin.skew(first) @ second), first @ second)

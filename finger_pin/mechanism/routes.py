@@ -1,0 +1,140 @@
+"""The tendons of a tree as functions of the posture: sums of joint positions, or paths through space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.routing import Array
+from finger_pin.description.tree import Tree, Waypoint
+from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Where a body stands.
+
+    Attributes:
+        joint: Index of the joint that carries it in Pinocchio's model, 0 for the base.
+        frame: Its placement in that joint's frame.
+    """
+
+    joint: int
+    frame: pin.SE3
+
+    def place(self, position: tuple[float, float, float]) -> Place:
+        """Return a point of the body."""
+        return Place(self.joint, np.array(self.frame.act(np.array(position))))
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """What a tendon's length is made of; L = coefficients q + the lengths of its legs.
+
+    Attributes:
+        coefficients: Shape (n,).
+        legs: Of its path.
+    """
+
+    coefficients: Array
+    legs: tuple[Leg, ...]
+
+    def times(self, factor: float) -> Route:
+        """Return the same with its length multiplied."""
+        legs = tuple(replace(leg, arm=factor * leg.arm) for leg in self.legs)
+        return Route(factor * self.coefficients, legs)
+
+
+@dataclass(frozen=True, eq=False)
+class Routes:
+    """All tendons of a tree; t tendons, n joints.
+
+    Attributes:
+        body: The rigid body.
+        routes: By name.
+        placed: Where the bodies of the tree stand, by name.
+    """
+
+    body: RigidBody
+    routes: Mapping[str, Route]
+    placed: Mapping[str | None, Placed]
+
+    @classmethod
+    def of(cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed]) -> Routes:
+        """Read the tendons of a tree whose bodies are placed."""
+        routes, joints = {}, list(tree.joints)
+        for name, tendon in tree.tendons.items():
+            coefficients = np.zeros(len(joints))
+            for joint, coefficient in (tendon.joints or {}).items():
+                coefficients[joints.index(joint)] = coefficient
+            routes[name] = Route(coefficients, _legs(tendon.path or {}, placed))
+        return cls(body, routes, placed)
+
+    @property
+    def fixed(self) -> Array:
+        """What of dL/dq does not depend on the posture, shape (t, n)."""
+        rows = [route.coefficients for route in self.routes.values()]
+        return np.array(rows).reshape(-1, int(self.body.model.nv))
+
+    def length(self, q: Array) -> Array:
+        """Return the lengths at q, shape (..., n), as MuJoCo's ``ten_length``: shape (..., t), m."""
+        return self._reached(q)[0]
+
+    def arms(self, q: Array) -> Array:
+        """Return dL/dq at q, shape (..., n), as MuJoCo's ``ten_J``: shape (..., t, n), m."""
+        return self._reached(q)[1]
+
+    def turn(self, q: Array) -> Array:
+        """Return the angle by which each path turns at q, shape (..., n), at points and along wraps: (..., t), rad."""
+        return self._reached(q)[2]
+
+    def _reached(self, q: Array) -> tuple[Array, Array, Array]:
+        q = np.asarray(q, dtype=float)
+        if q.ndim > 1:
+            each = [self._reached(one) for one in q]
+            length, arms, turn = (np.array(part) for part in zip(*each, strict=True))
+            return length, arms, turn
+        found = reach(self.body, q, [route.legs for route in self.routes.values()], len(q))
+        return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
+
+
+def _legs(path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> tuple[Leg, ...]:
+    """Return the legs between the points of a path."""
+    legs: list[Leg] = []
+    before: Place | None = None
+    wrap: Waypoint | None = None
+    divisor, follows = 1.0, False
+    for each in path.values():
+        if each.kind == "pulley":
+            divisor, before, follows = each.divisor, None, False
+        elif each.kind == "point":
+            here = placed[each.body].place(each.position)
+            if before is not None:
+                legs.append(Leg(_piece(before, here, wrap, placed), arm=1.0 / divisor, follows=follows))
+                follows = True
+            before, wrap = here, None
+        else:
+            wrap = each
+    return tuple(legs)
+
+
+def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[str | None, Placed]) -> Piece:
+    if wrap is None:
+        return Piece(STRAIGHT, np.zeros(0), (first, second))
+    body = placed[wrap.body]
+    frame = body.frame * pin.SE3(rotation(wrap.orientation), np.array(wrap.position))
+    side = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side
+    inside = wrap.side is not None and float(np.linalg.norm(side)) < wrap.radius
+    numbers = np.array([wrap.radius, *side, wrap.side is not None, inside], dtype=float)
+    return Piece(CYLINDER if wrap.kind == "cylinder" else SPHERE, numbers, (first, second), body.joint, frame)
+
+
+def rotation(quaternion: tuple[float, float, float, float]) -> Array:
+    """Return the rotation of a unit quaternion x, y, z, w, shape (3, 3)."""
+    matrix: Array = pin.Quaternion(np.array(quaternion)).normalized().matrix()
+    return matrix

@@ -1,0 +1,130 @@
+"""What a simulator was told, step by step: little to keep, and enough to repeat its run and record it."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.control.closed_loop import ClosedLoop, Samples
+from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.reference import Reference, SignalReference
+from finger_pin.control.signal import Signal
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.stepper import Stepper
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import validate
+from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.accuracy import check_memory, open_account
+from finger_pin.simulation.recording import record
+
+# A sample this close to the end of a step, s, is taken there.
+_SAME = 1e-9
+
+
+class Told:
+    """The steps of a simulator since a start, in the order in which they were made.
+
+    Attributes:
+        start: A copy of the stepper then.
+    """
+
+    def __init__(self, start: Stepper) -> None:
+        """Begin with no steps."""
+        self.start = start
+        self._numbers = array("d")
+
+    def add(self, end: float, tension: Array, force: Array) -> None:
+        """Keep a step: when it ended, s, and what was held during it, N: shapes (a,), and (3,) or (f, 3)."""
+        self._numbers.extend((end, *tension, *force.ravel()))
+
+    def copy(self) -> Told:
+        """Return the same steps, to go on from independently."""
+        twin = Told(self.start)
+        twin._numbers = self._numbers[:]
+        return twin
+
+    def result(self, finger: Finger, settings: dict[str, Any], reference: Reference | Samples | None) -> xr.Dataset:
+        """Repeat the steps bit by bit, and return their signals.
+
+        Args:
+            finger: The finger.
+            settings: As in ``simulation`` of a scenario, without the duration.
+            reference: As for `simulate`; by default the posture at the start.
+
+        Raises:
+            InputError: If there are no steps yet, or a setting or the reference is wrong.
+            IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
+        """
+        if not self._numbers:
+            raise InputError("result", "is of steps, and there are none yet: call step")
+        tips = finger.mechanism.body.tips
+        steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
+        knots, joints = np.append(self.start.time, steps[:, 0]), len(finger.routing.joints)
+        tension, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
+        description = finger.description
+        table = {
+            "name": description.name,
+            "title": f"{description.name} in a loop of one's own",
+            "finger": description,
+            "controller": {"kind": "tensions"},
+            "simulation": {"duration": float(knots[-1] - knots[0]), **settings},
+        }
+        scenario = validate(Scenario, table, ())
+        check_memory(scenario)
+        if reference is None:
+            posture = finger.layout.unpack(self.start.x).position
+            resting = Signal.held(knots[[0, -1]], posture[None])
+            reference = SignalReference(resting, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
+        loop = replace(
+            ClosedLoop.from_scenario(scenario, reference=reference, finger=finger),
+            controller=OpenLoopTensions(Signal.held(knots, tension), finger.routing),
+            fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
+            varying_force=Signal.held(knots, force),
+            dynamics=CompiledFinger(finger),
+        )
+        stepper = self.start.copy()
+        again = _Repeated(stepper, knots, tension, force)
+        trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, held=again)
+        # Rounding must not take a sample to the other side of a step's end, where other tensions act.
+        times = knots[0] + scenario.sample_times()
+        near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
+        times = np.where(np.abs(near - times) < _SAME, near, times)
+        result = record(scenario, loop, trajectory, str(settings["method"]), times)
+        result.attrs["own"] = "loop"
+        if trajectory.failure:
+            raise IntegrationError(float(trajectory.breakpoints[-1]), trajectory.failure, "fewer steps", result)
+        gap = open_account(result)
+        if gap:
+            result.attrs["account"] = gap
+        return result
+
+
+class _Repeated:
+    """Holds again what was held.
+
+    Attributes:
+        instant: When the next step begins, s.
+    """
+
+    def __init__(self, stepper: Stepper, knots: Array, tension: Array, force: Array) -> None:
+        self._stepper, self._knots, self._tension, self._force = stepper, knots, tension, force
+        self._step = 0
+
+    @property
+    def instant(self) -> float:
+        return float(self._knots[self._step])
+
+    def act(self, x: Array) -> Array:
+        """Begin a step: load it with its force, and return its tensions, shape (a,)."""
+        step, self._step = self._step, self._step + 1
+        self._stepper.load(self._force[step].reshape(-1, 3))
+        tension: Array = self._tension[step]
+        return tension

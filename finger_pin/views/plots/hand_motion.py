@@ -1,0 +1,55 @@
+"""The motion of a hand that is given as a tree: its joints, and the forces that drive it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from finger_pin.views.plots.lines import names, series, trace
+from finger_pin.views.plots.panels import stack, title
+from finger_pin.views.plots.style import new_figure, styled
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
+
+# Lines in a panel that can still be told apart.
+_MOST = 5
+
+
+@styled
+def plot_hand_motion(result: xr.Dataset) -> Figure:
+    """Draw positions of all joints, rad or m, tensions of tendons and forces of actuators, N or N m.
+
+    Args:
+        result: Dataset of `simulate`, of a hand with a tree.
+    """
+    moved = _panels(names(result, "joint"), result["joint_position"].transpose("time", "joint").values)
+    driven = _panels(names(result, "tendon"), result["tendon_tension"].transpose("time", "tendon").values)
+    if "actuator_force" in result:
+        driven += _panels(names(result, "actuator"), result["actuator_force"].transpose("time", "actuator").values)
+    figure = new_figure(11.0, 1.2 + 1.5 * max(len(moved), len(driven), 2))
+    for left, right, panels, label, text in (
+        (0.0, 4.3, moved, "position", "(a) joints, rad or m"),
+        (5.5, 9.8, driven, "force", "(b) tendons and actuators, N or N m"),
+    ):
+        if panels:
+            axes = stack(figure, left, right, [label] * len(panels), bottom=0.6)
+            title(axes[0], text)
+            for each, panel in zip(axes, panels, strict=True):
+                _draw(each, result["time"].values, panel)
+    return figure
+
+
+def _panels(labels: list[str], values: Array) -> list[dict[str, Array]]:
+    """Return lines by their labels, a few for each panel."""
+    lines = list(zip(labels, values.T, strict=True))
+    return [dict(lines[first : first + _MOST]) for first in range(0, len(lines), _MOST)]
+
+
+def _draw(axes: Axes, time: Array, lines: dict[str, Array]) -> None:
+    for index, (label, values) in enumerate(lines.items()):
+        trace(axes, time, values, label=label, **series(index))
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)

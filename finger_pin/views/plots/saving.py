@@ -1,0 +1,58 @@
+"""Figures as files: all those of a result, or one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from finger_pin.files import replacing
+from finger_pin.views.plots.contact import plot_contact
+from finger_pin.views.plots.convergence import plot_convergence
+from finger_pin.views.plots.energy import plot_energy
+from finger_pin.views.plots.fig6 import plot_fig6
+from finger_pin.views.plots.hand_motion import plot_hand_motion
+from finger_pin.views.plots.losses import plot_losses
+from finger_pin.views.plots.servo import plot_servo
+from finger_pin.views.trees import is_tree
+
+#: What is drawn of every result of a finger, and of a hand.
+FIGURES = {"fig6": plot_fig6, "losses": plot_losses, "energy": plot_energy}
+FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
+
+
+def figures_of(result: xr.Dataset) -> dict[str, Callable[[xr.Dataset], Figure]]:
+    """Return the figures that are drawn of a result, by name."""
+    figures: dict[str, Callable[[xr.Dataset], Figure]] = dict(FIGURES_OF_TREES if is_tree(result) else FIGURES)
+    if "convergence_difference" in result:
+        figures["convergence"] = plot_convergence
+    if "contact_force" in result:
+        figures["contact"] = plot_contact
+    if "motor_current" in result:
+        figures["servo"] = plot_servo
+    return figures
+
+
+def draw_all(result: xr.Dataset, folder: str | Path, names: Iterable[str] | None = None) -> list[Path]:
+    """Draw the figures of a result into a folder, made if need be, and return the paths of the PNG files.
+
+    Args:
+        result: Dataset of `simulate`.
+        folder: Where to write; a file of the same name is replaced whole or not at all.
+        names: Which of `figures_of`; all by default.
+    """
+    figures = figures_of(result)
+    wanted = figures if names is None else names
+    return [save_figure(figures[name](result), Path(folder) / f"{name}.png") for name in wanted]
+
+
+def save_figure(figure: Figure, path: str | Path) -> Path:
+    """Write a figure as PNG, whole or not at all, and return its path."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(target) as temporary:
+        # Little compression: it takes a fifth of the time, and a line drawing is small anyway.
+        figure.savefig(temporary, format="png", pil_kwargs={"compress_level": 2})
+    return target

@@ -1,0 +1,71 @@
+"""A force that the fingertip is to exert, held against what pushes back."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
+
+PUSH = np.array([0.3, -0.1, -0.8])
+SMOOTH = {
+    "finger.tendon_friction.coulomb": 0.0,
+    "finger.joint_friction.coulomb": 0.0,
+    "finger.joint_friction.stiction": 0.0,
+    "controller.gravity_compensation": True,
+}
+EXERTED = {f"controller.fingertip_force.{axis}.offset": value for axis, value in zip("xyz", PUSH, strict=True)}
+
+
+def loop(*overrides):
+    merged = dict(SMOOTH)
+    for each in overrides:
+        merged |= each
+    return ClosedLoop.from_scenario(fp.load_scenario("fig6", merged))
+
+
+def test_what_pushes_back_as_hard_as_wanted_leaves_the_joints_of_a_frictionless_finger_alone(tmp_path):
+    """The torques cancel: J^T F is the work of F on the fingertip by the angle. No tendon of this finger is passive."""
+    file = tmp_path / "planar.toml"
+    file.write_text(
+        'finger = "planar"\n[reference.joints.distal]\noffset = 0.5\n[reference.joints.proximal]\noffset = 0.3\n'
+    )
+    pushing = {**EXERTED, "environment.fingertip_force": (-PUSH).tolist(), **SMOOTH}
+    loops = [ClosedLoop.from_scenario(fp.load_scenario(file, each)) for each in (pushing, SMOOTH)]
+    x = loops[0].initial_state()
+    found, alone = (each.evaluate(0.0, x) for each in loops)
+    q, tip = loops[0].reference.at(0.0).position, loops[0].finger.rigid_body.tip_position
+    work = [(tip(q + step) - tip(q - step)) @ PUSH / 2e-6 for step in 1e-6 * np.eye(len(q))]
+    assert np.abs(work).max() > 0.01
+    assert found.control.torque - alone.control.torque == pytest.approx(work, abs=1e-9)
+    net = found.finger.tendon_torque + found.finger.external_torque
+    assert net == pytest.approx(alone.finger.tendon_torque, abs=1e-12)
+
+
+def test_the_wanted_force_follows_its_signal_and_the_scenario_s_clock():
+    ramp = {"kind": "ramp", "time": 1.0, "duration": 1.0, "height": 2.0}
+    late = loop({"controller.fingertip_force.z": ramp, "simulation.start_time": 1.0})
+    assert late.controller.fingertip.wanted.at(np.array([0.0, 1.0, 5.0]))[0][:, 2] == pytest.approx([0.0, 2.0, 2.0])
+    assert {0.0, 1.0} <= set(late.knots().tolist())
+
+
+def test_tension_limits_are_kept_and_what_they_cost_is_said():
+    limit = {"controller.distribution.maximum_tension": 9.0}
+    found = loop(limit, {"controller.fingertip_force.z.offset": -20.0})
+    x = found.finger.rest_state(found.reference.at(0.0).position)
+    control = found.evaluate(0.0, x).control
+    assert control.tension.max() <= 9.0 + 1e-9 and np.abs(control.shortfall).max() > 1e-2
+    coupling = found.finger.routing.coupling
+    assert coupling.T @ control.tension == pytest.approx(control.torque - control.shortfall, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"controller.fingertip_force.w.offset": 1.0}, "the axes are x, y, z"),
+        ({"controller.fingertip_force.z.offset": "hard"}, "must be a number"),
+        ({"controller.kind": "tensions", "controller.fingertip_force.z.offset": 1.0}, "has no effect"),
+    ],
+)
+def test_a_wrong_wish_is_one_clear_line(overrides, message):
+    with pytest.raises(fp.InputError, match=message):
+        fp.load_scenario("fig6", overrides)

@@ -1,0 +1,172 @@
+"""Which bodies can touch, where their shapes are, and what is said of a start that cannot be."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import finger_pin as fp
+from finger_pin.description.objects import Object
+from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.contacts import add_free_objects, check_start, contact_rows, finger_solids, object_solids
+from finger_pin.mechanism.pieces import reach
+from finger_pin.mechanism.urdf import build_rigid_body
+
+TABLE = Object(shape="half_space", position=(0.0, 0.0, -0.1))
+BALL = Object(shape="sphere", radius=0.02, mass=0.05, position=(0.1, 0.0, -0.08))
+
+
+def scene(**objects):
+    """Return rigid body, links of the paper's finger, and the contacts of both with objects."""
+    description = fp.load_finger("ub")
+    body = add_free_objects(build_rigid_body(description), objects)
+    links = {name: joint.link for name, joint in description.joints.items()}
+    return body, links, contact_rows([*finger_solids(links, body), *object_solids(objects, body)], body.model.nv)
+
+
+def distances(contacts, body, q):
+    """Return the signed distance of every contact."""
+    return reach(body, q, contacts.paths, body.model.nv).length[::3]
+
+
+def configuration(body, joints, **poses):
+    """Return q with the joints of the finger and poses of free objects: position, and a quaternion if it turns."""
+    q = pin.neutral(body.model)
+    q[:4] = joints
+    for name, (position, *quaternion) in poses.items():
+        at = body.model.joints[body.model.getJointId(name)].idx_q
+        q[at : at + 3] = position
+        if quaternion:
+            q[at + 3 : at + 7] = quaternion[0]
+    return q
+
+
+def test_links_touch_objects_and_objects_each_other_but_neither_fixed_ones_nor_links_each_other():
+    box = Object(shape="box", sides=(0.02, 0.02, 0.02), position=(0.0, 0.1, 0.0))
+    _, links, contacts = scene(table=TABLE, ball=BALL, box=box)
+    expected = {f"{link}-{thing}" for link in links for thing in ("table", "ball", "box")}
+    assert sorted(contacts.names) == sorted(expected | {"ball-table", "ball-box"})
+
+
+def test_a_straight_finger_over_a_table_is_as_high_as_its_links_are_thick():
+    body, links, contacts = scene(table=TABLE, ball=BALL)
+    distance = dict(
+        zip(
+            contacts.names,
+            distances(contacts, body, configuration(body, np.zeros(4), ball=(BALL.position,))),
+            strict=True,
+        )
+    )
+    for name, link in links.items():
+        assert distance[f"{name}-table"] == pytest.approx(0.1 - link.width / 2.0, abs=1e-12)
+    assert distance["ball-table"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_pad_is_where_the_fingertip_is():
+    """Straight along x, the tip is a1 + a2 + a3 + a4 from the base: a wall there touches the pad."""
+    wall = Object(shape="half_space", position=(0.1169, 0.0, 0.0), orientation=(0.0, -1.0, 0.0, 1.0))
+    body, _, contacts = scene(wall=wall)
+    distance = dict(zip(contacts.names, distances(contacts, body, np.zeros(4)), strict=True))
+    assert distance["distal-wall"] == pytest.approx(0.0, abs=1e-12)
+    assert min(distance.values()) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_tilted_box_over_a_table_is_as_high_as_its_lowest_corner_and_a_cylinder_as_its_rim():
+    box = Object(shape="box", sides=(0.02, 0.03, 0.04), mass=0.1)
+    can = Object(shape="cylinder", radius=0.01, length=0.05, mass=0.1)
+    rod = Object(shape="capsule", radius=0.01, length=0.05, mass=0.1)
+    body, _, contacts = scene(table=TABLE, box=box, can=can, rod=rod)
+    turn = pin.Quaternion(pin.utils.rpyToMatrix(0.5, 0.2, 1.0))
+    pose = ((0.3, 0.0, 0.0), turn.coeffs())
+    q = configuration(body, np.zeros(4), box=pose, can=pose, rod=pose)
+    distance = distances(contacts, body, q)
+
+    def lowest(name):
+        return min(d for d, pair in zip(distance, contacts.names, strict=True) if pair.startswith(f"{name}-table"))
+
+    up = turn.matrix()[2]
+    assert lowest("box") == pytest.approx(0.1 - np.abs(up) @ [0.01, 0.015, 0.02], abs=1e-12)
+    assert lowest("rod") == pytest.approx(0.1 - 0.01 - 0.025 * abs(up[2]), abs=1e-12)
+    # Eight points of a rim stand for all: at most 1 - cos(22.5 deg) of the radius higher.
+    exact = 0.1 - 0.01 * np.hypot(*up[:2]) - 0.025 * abs(up[2])
+    assert exact - 1e-12 <= lowest("can") <= exact + 0.01 * (1.0 - np.cos(np.pi / 8.0))
+
+
+@pytest.mark.parametrize("shape", ["sphere", "box", "cylinder", "capsule"])
+def test_bodies_farther_apart_than_their_reach_do_not_touch(shape):
+    """Random poses of a free object near the finger: whatever touches is within reach."""
+    sizes = {"box": {"sides": (0.02, 0.03, 0.04)}, "sphere": {"radius": 0.02}}
+    other = Object(shape=shape, mass=0.1, **sizes.get(shape, {"radius": 0.01, "length": 0.05}))
+    body, _, contacts = scene(other=other)
+    rng, data, touched = np.random.default_rng(2), body.model.createData(), 0
+    for _ in range(60):
+        quaternion = rng.normal(size=4)
+        pose = (rng.uniform([0.0, -0.03, -0.03], [0.12, 0.03, 0.03]), quaternion / np.linalg.norm(quaternion))
+        q = configuration(body, np.zeros(4), other=pose)
+        distance = distances(contacts, body, q)
+        pin.forwardKinematics(body.model, data, q)
+        for k, d in enumerate(distance):
+            piece, out = contacts.paths[3 * k][0].piece, np.zeros(13)
+            frame = data.oMi[piece.joint] * piece.frame
+            y = np.concatenate([frame.actInv(data.oMi[end.joint].act(end.point)) for end in piece.ends])
+            piece.shape.value(y, piece.parameters, out)
+            touched += out[0] < 0.0
+            assert out[0] > 0.0 or np.linalg.norm(y[:3] + y[3:]) / 2.0 < piece.reach
+            assert d == pytest.approx(out[0], abs=1e-12) or 0.0 < d < out[0]
+    assert touched > 10
+
+
+def test_free_objects_have_the_inertia_of_solids():
+    cases = {
+        "sphere": ({"radius": 0.02}, pin.Inertia.FromSphere(0.3, 0.02)),
+        "box": ({"sides": (0.02, 0.03, 0.05)}, pin.Inertia.FromBox(0.3, 0.02, 0.03, 0.05)),
+        "cylinder": ({"radius": 0.02, "length": 0.05}, pin.Inertia.FromCylinder(0.3, 0.02, 0.05)),
+        "capsule": ({"radius": 0.02, "length": 0.05}, pin.Inertia.FromCapsule(0.3, 0.02, 0.05)),
+    }
+    for shape, (sizes, expected) in cases.items():
+        assert np.diag(Object(shape=shape, mass=0.3, **sizes).inertia) == pytest.approx(expected.inertia, rel=1e-12)
+    body, _, _ = scene(ball=BALL)
+    mass = body.mass_matrix(pin.neutral(body.model))
+    assert np.diag(mass)[-6:] == pytest.approx([0.05] * 3 + [0.4 * 0.05 * 0.02**2] * 3, rel=1e-12)
+
+
+def test_where_two_surfaces_meet_the_smaller_numbers_count():
+    rough = Object(shape="half_space", surface={"friction": 1.0, "stiffness": 1e6})
+    ice = Object(shape="sphere", radius=0.01, mass=0.1, surface={"friction": 0.1, "stiction_ratio": 1.5})
+    _, _, contacts = scene(table=rough, ball=ice)
+    at = dict(zip(CONTACT.parameters, contacts.parameters[:, contacts.names.index("ball-table")], strict=True))
+    assert (at["kinetic"], at["static"], at["stiffness"]) == pytest.approx((0.1, 0.1, 1e4))
+    at = dict(zip(CONTACT.parameters, contacts.parameters[:, contacts.names.index("distal-ball")], strict=True))
+    assert (at["kinetic"], at["static"]) == pytest.approx((0.1, 0.15))
+
+
+def test_a_start_deep_in_an_object_is_refused_and_one_that_touches_is_not():
+    body, _, contacts = scene(table=TABLE, ball=BALL)
+    check_start(contacts, body, configuration(body, np.zeros(4), ball=((0.2, 0.0, -0.0805),)))
+    with pytest.raises(
+        fp.InputError, match=r"environment\.objects: ball-table: starts 3 mm deep in each other, at most 1 mm"
+    ):
+        check_start(contacts, body, configuration(body, np.zeros(4), ball=((0.2, 0.0, -0.083),)))
+
+
+ERRORS = {
+    'shape = "mesh"': "meshes are not supported",
+    'shape = "spere"': "did you mean sphere",
+    'shape = "sphere"': "radius: is missing",
+    'shape = "sphere"\nradius = 20': "in millimetres",
+    'shape = "sphere"\nradius = 0.1\nmass = 0': "mass = 0: must be above 0",
+    'shape = "sphere"\nradius = 0.1\nlength = 0.1': "length = 0.1: is for cylinder, capsule",
+    'shape = "half_space"\nmass = 1.0': "a half-space is fixed",
+    'shape = "half_space"\norientation = [0, 0, 0, 0]': "not zero",
+    'shape = "box"\nsides = [0.1, 0.1, 0.1]\nvelocity = [1, 0, 0]': "which are free to move",
+    'shape = "half_space"\nsurface.friction = -1': "friction = -1: must be at least 0",
+    'shape = "half_space"\nsurface.fricton = 1': "did you mean environment.objects.thing.surface.friction",
+}
+
+
+@pytest.mark.parametrize("entries", ERRORS)
+def test_a_wrong_object_is_one_clear_line(entries, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(f'finger = "ub"\n[environment.objects.thing]\n{entries}\n')
+    with pytest.raises(fp.InputError, match=ERRORS[entries]) as caught:
+        fp.load_scenario(file)
+    assert str(caught.value).startswith("environment.objects.thing") and "\n" not in str(caught.value)

@@ -1,0 +1,218 @@
+"""Hands read from MuJoCo models: their geometry, their inertia and what acts on them, against MuJoCo."""
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco_models import HEAD, MODELS, ROUTED, arms, posture
+
+import finger_pin as fp
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.description.exercise import exercise
+from finger_pin.description.loading import read_scenario
+
+
+@pytest.fixture(scope="module")
+def hands():
+    """Models and the hands that are read from them, by name."""
+    models = {name: load() for name, load in MODELS.items()}
+    return {name: (model, fp.Hand(fp.from_mujoco(model))) for name, model in models.items()}
+
+
+def model_of(body, rest):
+    return mujoco.MjModel.from_xml_string(f"<mujoco>{HEAD}<worldbody>{body}</worldbody>{rest}</mujoco>")
+
+
+SMOOTH = {
+    f"finger.{table}.{entry}": 0.0
+    for table, entries in (("tendon_friction", ("coulomb", "viscous")), ("joint_friction", ("coulomb", "stiction")))
+    for entry in entries
+}
+
+
+def inputs(hand, model, control):
+    """Return the inputs of a hand for MuJoCo's: tensions of the tendons that motors pull, then those of actuators."""
+    given = {model.actuator(i).name.replace(":", "_"): control[i] for i in range(model.nu)}
+    pulled = [np.clip(given[name], 0.0, 20.0) for name in hand.description.tendons]
+    return [*pulled, *(given[name] for name in hand.further[-1].names)]
+
+
+LINK = '<body><joint name="j" axis="0 1 0"/><geom type="box" size="0.1 0.1 0.1"/><site name="s" pos="0.1 0 0"/></body>'
+FIXED = '<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>'
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_lengths_and_arms_are_mujoco_s(hands, name):
+    model, hand = hands[name]
+    data, random = mujoco.MjData(model), np.random.default_rng(0)
+    for _ in range(1000 if name == "routed" else 50):
+        data.qpos = posture(model, random)
+        mujoco.mj_fwdPosition(model, data)
+        np.testing.assert_allclose(hand.paths.length(data.qpos), data.ten_length, atol=1e-12)
+        # MuJoCo's wrap inside ends its iteration early.
+        np.testing.assert_allclose(hand.paths.arms(data.qpos), arms(model, data), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_accelerations_are_mujoco_s_without_its_constraints(name):
+    """Inertia, gravity, springs, dampers, tendons and actuators at random states, by both evaluators."""
+    model, random = MODELS[name](), np.random.default_rng(1)
+    model.tendon_limited[:] = 0
+    smooth = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH)
+    data, hand = mujoco.MjData(model), fp.Hand(smooth.finger)
+    compiled = CompiledFinger(hand)
+    for _ in range(50 if name == "routed" else 10):
+        data.qpos, data.qvel = posture(model, random), 0.3 * random.normal(size=model.nv)
+        data.ctrl = random.uniform(-2.0, 2.0, model.nu)
+        mujoco.mj_forward(model, data)
+        x = hand.rest_state(data.qpos, data.qvel)
+        for evaluator in (hand, compiled):
+            found = evaluator.evaluate(x, inputs(hand, model, data.ctrl))
+            # As close as MuJoCo's arms of wraps inside.
+            np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
+
+
+def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
+    model = MODELS["routed"]()
+    model.jnt_limited[:] = 0
+    settings = {"simulation.duration": 0.2, "simulation.rtol": 1e-9, "simulation.atol_scale": 1e-9}
+    scenario = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH | settings)
+    result = fp.simulate(scenario)
+    given = {**scenario.controller.inputs, **scenario.controller.tensions}
+    signals = [given[model.actuator(i).name] for i in range(model.nu)]
+    errors = []
+    for step in (2.5e-4, 1.25e-4):
+        data, model.opt.timestep = mujoco.MjData(model), step
+        error, every = 0.0, round(0.01 / step)
+        for count in range(1, 20 * every + 1):
+            swing = [2.0 * np.pi * each.frequency * data.time + each.phase for each in signals]
+            data.ctrl = [s.offset + s.amplitude * np.sin(angle) for s, angle in zip(signals, swing, strict=True)]
+            mujoco.mj_step(model, data)
+            if count % every == 0:
+                there = result.joint_position.values[10 * count // every]
+                error = max(error, np.abs(data.qpos - there).max())
+        errors.append(error)
+    assert errors[0] < 0.02
+    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.1)
+    assert np.abs(result.energy_residual).max() < 1e-6
+
+
+def test_a_tendon_that_a_motor_pulls_loses_tension_by_the_turn_of_its_path():
+    """The capstan law with mu_e phi, phi from the path's directions at one posture: pulled in, then let out."""
+    model = MODELS["routed"]()
+    settings = {"finger.tendon_friction.viscous": 0.0, "finger.tendon_friction.floor": 1e-6}
+    described = read_scenario(exercise(fp.from_mujoco(model)), settings).finger
+    hand, data = fp.Hand(described), mujoco.MjData(model)
+    data.qpos = [0.2, 0.4, 0.01]
+    mujoco.mj_forward(model, data)
+    first, count = data.ten_wrapadr[1], data.ten_wrapnum[1]
+    points, passed = data.wrap_xpos.reshape(-1, 3)[first : first + count], data.wrap_obj.ravel()[first : first + count]
+    turn = 0.0
+    for branch in np.split(points, np.flatnonzero(passed == -2)):
+        pieces = np.diff(branch[np.any(branch, axis=1)], axis=0)
+        pieces = pieces[np.linalg.norm(pieces, axis=1) > 0.0]
+        unit = pieces / np.linalg.norm(pieces, axis=1)[:, None]
+        turn += np.sum(np.arccos(np.clip(np.sum(unit[:-1] * unit[1:], axis=1), -1.0, 1.0)))
+    assert hand.paths.turn(data.qpos)[1] == pytest.approx(turn, abs=1e-6)
+    for speed in (1.0, -1.0):
+        x = hand.rest_state(data.qpos, [0.0, -speed / hand.paths.arms(data.qpos)[1, 1], 0.0])
+        for _ in range(200):
+            found = hand.evaluate(x, [5.0, 0.0, 0.0])
+            found.state.tendon_stiction[:] += found.tendons.stiction_rate * 2e-6
+            x = hand.layout.pack(found.state)
+        assert found.tendons.velocity[0] == pytest.approx(speed)
+        assert found.tendons.strands[0] == pytest.approx(5.0 * np.exp(-speed * 0.11 * turn), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_hand_is_the_same_when_written_and_read_again(hands, name, tmp_path):
+    description = hands[name][1].description
+    (tmp_path / "hand.toml").write_text(fp.to_toml(description))
+    assert fp.load_finger(str(tmp_path / "hand.toml")) == description
+
+
+def test_entries_of_a_tree_are_changed_by_keys(hands, tmp_path):
+    table = exercise(hands["routed"][1].description)
+    key = "finger.tree.tendons.top.path.a1.position"
+    changed = read_scenario(table, {key: [0.05, 0.0, 0.02], "controller.tensions.pull.offset": 3.0})
+    moved = fp.Hand(changed.finger).paths.length(np.zeros(3)) - hands["routed"][1].paths.length(np.zeros(3))
+    assert np.flatnonzero(moved).tolist() == [0]
+    for wrong, text in (("tendons.up.stiffness", "there are top, branched"), ("tip.bodi", "did you mean")):
+        with pytest.raises(fp.InputError, match=text):
+            read_scenario(table, {f"finger.tree.{wrong}": 1.0})
+
+
+def test_a_hand_is_stepped_as_a_finger_is(hands):
+    hand = hands["routed"][1]
+    sim = fp.Simulator(hand, position=[0.0, 0.3, 0.01])
+    for step in range(20):
+        state = sim.step([2.0, 0.01 * step, 0.5], 1e-3)
+    result = sim.result()
+    np.testing.assert_array_equal(result.joint_position[-1], state.position)
+    np.testing.assert_allclose(result.actuator_input[-1], [0.19, 0.5])
+    assert np.abs(result.energy_residual).max() < 1e-5
+    with pytest.raises(fp.InputError, match="must be 3 numbers"):
+        sim.step([2.0], 1e-3)
+    assert repr(hand) == "<Finger hand: a tree of 3 joints, 4 tendons (1 pulled), 2 actuators>"
+
+
+def test_a_coupled_joint_follows_as_mujoco_s_equality_says():
+    chain = LINK.replace("</body>", LINK.replace('"j"', '"k"').replace('"s"', '"z"') + "</body>")
+    equality = '<equality><joint joint1="k" joint2="j" polycoef="0.1 0.5 0 0 0"/></equality>'
+    motor = '<actuator><position joint="j" kp="50" ctrlrange="-1 1"/></actuator>'
+    description = fp.from_mujoco(model_of(chain, FIXED + equality + motor))
+    start = {"simulation.initial.position.k": 0.1, "simulation.duration": 1.0}
+    result = fp.simulate(read_scenario(exercise(description), start))
+    lead, follower = result.joint_position.values.T
+    assert np.ptp(lead) > 0.2
+    np.testing.assert_allclose(follower, 0.1 + 0.5 * lead, atol=5e-3)
+
+
+def test_what_is_not_carried_over_is_listed():
+    rest = f"""{FIXED}<equality><weld body1="w"/><joint joint1="j" polycoef="0 0 1 0 0"/></equality>
+    <actuator><velocity joint="j" kv="1"/><intvelocity joint="j" kp="1" actrange="-1 1"/>
+    <adhesion body="w" ctrlrange="0 1"/></actuator>"""
+    body = LINK.replace("<body>", '<body name="w" gravcomp="1">')
+    model = model_of(body + '<body name="thing"><freejoint/><geom size="0.1"/></body>', rest)
+    description = fp.from_mujoco(model)
+    assert description.tree.left_out == (
+        "free joint of thing: it stays where it is",
+        "body w: gravity compensation",
+        "contacts: 2 geoms collide in the model, none here",
+        "actuator actuator_1: it has dynamics of its own",
+        "actuator actuator_2: it drives a body",
+        "equality equality_0: of kind weld",
+        "equality equality_1: its polynomial is not linear",
+    )
+    assert list(description.tree.actuators) == ["actuator_0"]
+    assert list(description.tree.bodies) == ["w"]
+
+
+def test_muscles_ball_joints_and_models_without_tendons_are_refused_by_name():
+    muscle = f'{FIXED}<actuator><muscle name="biceps" tendon="t" lengthrange="0 1"/></actuator>'
+    ball = '<body pos="1 0 0"><joint name="shoulder" type="ball"/><geom size="0.1"/></body>'
+    for model, text in (
+        (model_of(LINK, muscle), "actuator biceps: is a muscle"),
+        (model_of(LINK + ball, FIXED), "joint shoulder: is a ball joint"),
+        (model_of(LINK, ""), "model: has no tendons"),
+    ):
+        with pytest.raises(fp.InputError, match=text):
+            fp.from_mujoco(model)
+
+
+def test_a_file_that_mujoco_refuses_is_refused_in_its_words_on_one_line(tmp_path):
+    (tmp_path / "hand.xml").write_text(ROUTED.replace('joint="j1" kp', 'joint="j9" kp'))
+    with pytest.raises(fp.InputError, match="unknown transmission target 'j9'") as refused:
+        fp.from_mujoco(tmp_path / "hand.xml")
+    assert "\n" not in str(refused.value)
+    with pytest.raises(fp.InputError, match=r"must be a mujoco\.MjModel"):
+        fp.from_mujoco(7)
+    with pytest.raises(fp.InputError, match="no_such"):
+        fp.from_mujoco(tmp_path / "no_such.xml")
+
+
+def test_a_side_point_on_another_body_is_listed_and_moves_with_the_wrap():
+    tendon = '<spatial name="t"><site site="s"/><geom geom="pin" sidesite="s"/><site site="w"/></spatial>'
+    body = '<geom name="pin" type="sphere" size="0.05" pos="0.3 0 0.3"/><site name="w" pos="0 0 1"/>' + LINK
+    description = fp.from_mujoco(model_of(body, f"<tendon>{tendon}</tendon>"))
+    assert "side point s of pin: moves with the wrap's body" in description.tree.left_out
+    assert description.tree.tendons["t"].path["pin"].side == pytest.approx((-0.2, 0.0, -0.3))
