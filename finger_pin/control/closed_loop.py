@@ -19,6 +19,7 @@ from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
@@ -123,7 +124,7 @@ class ClosedLoop:
             parts = tuple(cls.from_scenario(each) for each in scenarios.values())
             routing = Routing.from_description(scenario.finger)
             controller = joined_controller([part.controller for part in parts], routing)
-        finger = finger or Finger(scenario.finger)
+        finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),
@@ -138,7 +139,8 @@ class ClosedLoop:
             reference=_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
-            parts=parts,
+            # Fingers that may touch something are not apart.
+            parts=parts if finger.surroundings is None else (),
             palm=PalmPath.of(scenario.hand, start),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
@@ -160,9 +162,11 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
-        tension = None
-        if self.finger.actuators.names and isinstance(self.controller, _ANSWERS_ALIKE):
-            planned = self.controller.command(0.0, self.reference.at(0.0), position, velocity)
+        controller, tension = self.controller, None
+        if isinstance(controller, PassiveTensionLoop):
+            controller = controller.controller
+        if self.finger.actuators.names and isinstance(controller, _ANSWERS_ALIKE):
+            planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
 
@@ -251,9 +255,8 @@ def _controller(given: Controller | Samples | None, scenario: Scenario, finger: 
         return build_controller(scenario, finger)
     if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    if isinstance(
-        given, ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
-    ):
+    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
+    if isinstance(given, own | RoutedController):
         return given
     kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
     return kind(given, finger.routing, scenario.simulation.start_time)

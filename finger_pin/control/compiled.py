@@ -19,7 +19,7 @@ def compiled_control(loop: ClosedLoop) -> Control | None:
     """Return a loop's controller, reference and varying force as arrays, or None where the first two are Python."""
     controller, reference, mechanism = loop.controller, loop.reference, loop.finger.mechanism
     control = None
-    if len(loop.finger.actuators.positioned) == loop.finger.routing.actuated:
+    if len(loop.finger.actuators.positioned) == mechanism.channels:
         # Nothing of what the controller plans goes to the finger at once.
         control = held_control(mechanism.channels, mechanism.coordinates)
     elif isinstance(controller, OpenLoopTensions):

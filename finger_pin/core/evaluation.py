@@ -158,6 +158,10 @@ class CompiledFinger:
         """Read a finger."""
         self.finger = finger
         self._mechanism = CompiledMechanism(finger.mechanism)
+        # Fingertip and energies are those of the finger alone.
+        self._alone = self._mechanism
+        if finger.surroundings is not None:
+            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, []))
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -174,7 +178,7 @@ class CompiledFinger:
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""
-        return self._mechanism.motion(position, velocity, base)
+        return self._alone.motion(position, velocity, base)
 
 
 def _bases(base: Array | None, count: int) -> Array:

@@ -57,9 +57,9 @@ class Control(NamedTuple):
         offset: Shape (N,).
         schedule: Inputs over time, u functions.
         force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
-        palm: Path of the base: x, y, z, roll, pitch, yaw, or no functions for a base at rest.
         damping: K_D, shape (N,).
         damped: Whether it is not zero.
+        palm: Path of the base: x, y, z, roll, pitch, yaw, or no functions for a base at rest.
         desired, rate, acceleration: Memory, tau^d, then theta^d' and theta^d'', shape (N,).
         planned: Memory, f_hat, shape (T,).
         active: Memory, the tension that sets lambda, by controller.
@@ -82,9 +82,9 @@ class Control(NamedTuple):
     offset: Vector
     schedule: Signal
     force: Signal
-    palm: Signal
     damping: Vector
     damped: bool
+    palm: Signal
     desired: Vector
     rate: Vector
     acceleration: Vector
@@ -184,9 +184,9 @@ def _control(
         offset=np.array(offset, dtype=float),
         schedule=schedule,
         force=no_signal(),
-        palm=no_signal(),
         damping=np.zeros(coordinates),
         damped=False,
+        palm=no_signal(),
         desired=np.zeros(coordinates),
         rate=np.zeros(coordinates),
         acceleration=np.zeros(coordinates),

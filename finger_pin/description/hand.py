@@ -93,6 +93,14 @@ class PlacedFinger(Description):
     """A finger and where its base frame stands on the palm."""
 
     finger: FingerDescription
+
+    @field_validator("finger")
+    @classmethod
+    def _made_of_links(cls, value: FingerDescription) -> FingerDescription:
+        if value.tree is not None:
+            raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
+        return value
+
     position: Annotated[tuple[float, float, float], _PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its base frame, in the palm's frame."
     )

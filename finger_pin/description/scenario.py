@@ -209,6 +209,8 @@ class Scenario(Description):
 
     def _check_names(self) -> None:
         """Raise where a table is for a joint or a finger that is not there."""
+        if self.environment.objects and self.hand and self.hand.palm.path is not None:
+            raise problem("environment.objects", "objects need a palm at rest: leave out hand.palm.path")
         initial = self.simulation.initial or InitialSettings()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
@@ -239,7 +241,8 @@ class Scenario(Description):
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
-        if self.controller.kind == "proportional" and not closure.holds:
+        routed = any(tendon.along for tendon in self.finger.tendons.values())
+        if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
         check_sources(self.finger.actuators, self.controller.tensions or {})
         rest = expand(self.controller.minimum_tension, len(routing.tendons))

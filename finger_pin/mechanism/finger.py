@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import list_hands, load_finger, load_hand
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -24,8 +25,9 @@ from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import build_tree, tree_rows
+from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -150,6 +152,7 @@ class Finger:
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
+        surroundings: Objects and contacts; None without any.
     """
 
     def __init__(
@@ -157,6 +160,7 @@ class Finger:
         description: FingerDescription | HandDescription | str | Path,
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
+        objects: Mapping[str, Object] | None = None,
     ) -> None:
         """Build a finger.
 
@@ -166,9 +170,11 @@ class Finger:
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
+            objects: What its links may touch, by name; without any they do not touch each other either.
 
         Raises:
-            InputError: If the joints of the two differ, or one has several coordinates.
+            InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no
+                size, or an object the name of a joint.
         """
         if isinstance(description, str | Path):
             description = load_hand(description) if description in list_hands() else load_finger(description)
@@ -204,10 +210,13 @@ class Finger:
             ringing,
             self.actuators.names,
         )
+        pulling = self.tendons.rows(self.actuators)
+        if self.paths:
+            pulling = [along_paths(description, self.paths, table) for table in pulling]
         self.mechanism = Mechanism(
             self.rigid_body,
             [
-                *self.tendons.rows(self.actuators),
+                *pulling,
                 self.joint_friction.rows(joints, self.actuators.pulled, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
@@ -220,6 +229,11 @@ class Finger:
             self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
+        self.surroundings = None if objects is None else Surroundings.of(objects, description, self.mechanism)
+        if self.surroundings is not None:
+            self.mechanism = self.surroundings.around(self.mechanism)
+            free, contacts = tuple(self.surroundings.free), self.surroundings.contacts.names
+            self.layout = replace(self.layout, objects=free, contacts=contacts)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -227,6 +241,11 @@ class Finger:
         if described.hand is not None:
             sizes = f"{len(described.joints)} joints, {len(described.tendons)} tendons"
             return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
+        if described.tree is not None:
+            tree, pulled = described.tree, len(described.tendons)
+            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
+            sizes += f", {len(tree.actuators)} actuators"
+            return f"<Finger {described.name}: a tree of {sizes}>"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
         return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
 
@@ -317,6 +336,9 @@ class Finger:
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         state.motor_position[:] = self.actuators.angle(state.position, tension)
         state.motor_velocity[:] = self.actuators.rate(state.velocity)
+        if self.surroundings is not None:
+            assert state.object_pose is not None and state.object_velocity is not None
+            state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
         return x
 
     def evaluate(
@@ -335,13 +357,14 @@ class Finger:
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        joints, masses = len(self.routing.joints), len(self.routing.joints) + self.routing.passive
+        joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
-        delivered, torque, motors = driven.force, driven.force @ driven.rows.arm + halves.force @ halves.rows.arm, None
+        delivered, motors = driven.force, None
+        torque = self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
         if self.actuators.names:
             elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
             delivered = delivered + elastic.force @ self.actuators.pulled.T
-            torque = torque + elastic.force @ elastic.rows.arm
+            torque = torque + (elastic.force @ elastic.rows.arm)[..., :joints]
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
@@ -361,7 +384,7 @@ class Finger:
                 stiction_rate=both(lambda tendons: tendons.rate),
                 entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
                 strands=np.concatenate([delivered, halves.force], axis=-1),
-                passive_acceleration=found.acceleration[..., joints:masses],
+                passive_acceleration=found.acceleration[..., bodies : bodies + self.routing.passive],
             ),
             joints=JointForces(
                 reaction=pins["normal_force"],
@@ -372,13 +395,32 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=torque[..., :joints],
+            tendon_torque=torque,
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
             mechanism=found,
             motors=motors,
         )
+
+    def coupling_at(self, position: Array) -> Array:
+        """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
+        position = np.asarray(position, dtype=float)
+        coupling = np.broadcast_to(self.routing.coupling, (*position.shape[:-1], *self.routing.coupling.shape)).copy()
+        along = [tendon.along for tendon in self.description.tendons.values()]
+        routed = [k for k, name in enumerate(along) if name is not None]
+        if self.paths is not None and routed:
+            places = [list(self.paths.routes).index(str(along[k])) for k in routed]
+            coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
+        return coupling
+
+    def _driven_torque(self, x: Array, driven: RowSignals) -> Array:
+        """Return what the driven tendons exert, shape (..., n), N m."""
+        joints, actuated = len(self.routing.joints), self.routing.actuated
+        if not driven.rows.routed:
+            return (driven.force @ driven.rows.arm)[..., :joints]
+        coupling = self.coupling_at(x[..., :joints])[..., :actuated, :]
+        return np.asarray((driven.force[..., None, :] @ coupling)[..., 0, :])
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -404,6 +446,10 @@ class Finger:
         return self.mechanism.evaluate(x, command, fingertip_force).rate
 
 
+#: A hand is a finger whose joints form a tree.
+Hand = Finger
+
+
 def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:
     """Return names of a model's joints by those of a description, which have dots in a hand."""
     found: dict[str, str] = {}
@@ -422,7 +468,3 @@ def _by_finger(given: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
         if name not in given:
             raise InputError(f"{entry}.{name}", f"is missing: there must be one for each of {', '.join(fingers)}")
     return [given[name] for name in fingers]
-
-
-#: A hand is a finger whose joints form a tree.
-Hand = Finger

@@ -161,11 +161,8 @@ class Mechanism:
             for table in part.rows:
                 rows.append(
                     replace(
-                        table,
+                        table.spread(places, width),
                         group=f"{name}.{table.group}",
-                        arm=_spread(table.arm, places, width),
-                        measure=_spread(table.measure, places, width),
-                        bends=_spread(table.bends, places, width),
                         channels=np.where(table.channels >= 0, table.channels + channel, -1),
                         pins=np.where(table.pins >= 0, table.pins + joint, -1),
                         paths=moved(table.paths, joint),
@@ -279,6 +276,15 @@ class Mechanism:
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 
+    def _routed(self, table: Rows, q: Array) -> Reach:
+        """Return what paths through space add to the rows of a table, shape (..., k) and (..., k, N)."""
+        if not table.routed:
+            return Reach(*np.zeros((4, 1)))
+        if q.ndim == 1:
+            return reach(self.body, q, table.paths, self.coordinates)
+        each = [reach(self.body, one, table.paths, self.coordinates) for one in q]
+        return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
+
     def _inertial(self, q: Array, v: Array, base: Array) -> Array:
         """Return what a base that moves adds to the torques of one at rest under gravity, shape (..., n)."""
         if q.ndim > 1:
@@ -290,15 +296,6 @@ class Mechanism:
         if q.ndim > 1:
             return np.array([self._base_power(*each) for each in zip(q, v, a, base, strict=True)])
         return np.array([base[:6] @ self.body.base_dynamics(q, v, a, base)[0]])
-
-    def _routed(self, table: Rows, q: Array) -> Reach:
-        """Return what paths through space add to the rows of a table, shape (..., k) and (..., k, N)."""
-        if not table.routed:
-            return Reach(*np.zeros((4, 1)))
-        if q.ndim == 1:
-            return reach(self.body, q, table.paths, self.coordinates)
-        each = [reach(self.body, one, table.paths, self.coordinates) for one in q]
-        return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
 
     def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
         total = np.zeros((*lead, table.count))
@@ -344,10 +341,3 @@ def _touching(force: Array, directions: Array, arms: int) -> Array:
     vectors = force[..., None] * directions
     total: Array = vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2)
     return total
-
-
-def _spread(matrix: Array, places: NDArray[np.int64], width: int) -> Array:
-    """Return a matrix with its columns at some places among more."""
-    wide = np.zeros((len(matrix), width))
-    wide[:, places] = matrix
-    return wide

@@ -40,9 +40,11 @@ _NOTES = """
   - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
   - the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false", and limited="true" makes them
     MuJoCo's own soft constraints;
-  - an external force at the fingertip: apply it to the site "{tip}".
+  - an external force at the fingertip: apply it to the site "{tip}".{servos}
   Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
 """
+_SERVOS = """
+  - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
 _MASSIVE = """
   A passive tendon is a slide joint, its lumped mass, between two springs that only pull."""
 _MASSLESS = """
@@ -88,6 +90,7 @@ def to_mjcf(
         raise InputError("timestep", "must be above 0", timestep)
     root = ET.Element("mujoco", model=description.name)
     notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
+    notes["servos"] = _SERVOS if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _MASSLESS if massless else _MASSIVE
     root.append(ET.Comment(_NOTES.format(**notes).replace("--", "- -")))

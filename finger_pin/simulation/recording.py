@@ -23,6 +23,7 @@ from finger_pin.mechanism.mechanism import Evaluation
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.touching import contact_coordinates, contact_variables
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR = ("time", "motor")
@@ -35,6 +36,9 @@ _STORED = {
     "joint_springs": "elastic energy of the joints' springs",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
+    "contacts": "elastic energy of contacts",
+    "objects_kinetic": "kinetic energy of free objects",
+    "objects_gravity": "potential energy of free objects",
     "elastic_tendons": "elastic energy of the tendons on spools",
     "gearboxes": "elastic energy of the gearboxes' bristles",
     "rotors": "kinetic energy of the rotors",
@@ -43,11 +47,11 @@ _EXCHANGED = {
     "actuators": "supplied by the actuators",
     "electrical": "supplied by the motors' electronics",
     "fingertip": "supplied by the fingertip force",
-    "palm": "supplied by what moves the palm",
     "motor_heat": "lost as heat in the motors' windings",
     "gearbox_coulomb": "lost by gears sliding",
     "gearbox_viscous": "lost in the gears' viscous friction",
     "elastic_damping": "lost as tendons on spools stretch",
+    "palm": "supplied by what moves the palm",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",
@@ -56,6 +60,9 @@ _EXCHANGED = {
     "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
     "joint_springs": "lost in the joints' springs",
+    "contacts_impact": "lost in contacts along their normals",
+    "contacts_sliding": "lost in contacts sliding",
+    "contacts_micro_damping": "lost in the bristles of contacts",
     "slack": "booked where a tension is cut at zero",
 }
 
@@ -75,7 +82,8 @@ def record(
     kept = account(loop, trajectory, times, signals, motion)
     routing = loop.finger.routing
     further = loop.finger.further
-    variables = _signals(loop, times, signals, motion) | _further(further, signals.finger.mechanism) | _energies(kept)
+    variables = _signals(loop, times, signals, motion) | contact_variables(loop.finger, signals.finger)
+    variables |= _further(further, signals.finger.mechanism) | _energies(kept)
     dataset = xr.Dataset(
         {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
         coords={
@@ -87,6 +95,7 @@ def record(
         attrs=_attributes(scenario, trajectory, method),
     )
     dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
+    dataset = dataset.assign_coords(contact_coordinates(loop.finger))
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         dataset = dataset.assign_coords(finger=list(scenario.hand.fingers))
     if routing.passive > 1:

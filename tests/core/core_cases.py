@@ -107,16 +107,6 @@ def lugre():
     return fp.Scenario.model_validate(table)
 
 
-def carried():
-    """The thumb of a hand whose palm swings about and along all axes."""
-    names, rates = ("x", "y", "z", "roll", "pitch", "yaw"), (1.1, 1.7, 2.3, 1.3, 0.9, 1.9)
-    path = {
-        name: {"amplitude": 0.05 if index < 3 else 0.5, "frequency": rate, "phase": 0.3 * index}
-        for index, (name, rate) in enumerate(zip(names, rates, strict=True))
-    }
-    return fp.load_scenario("hand", {"hand.palm.path": path}).parts()["thumb"]
-
-
 def servos():
     """`fig6` with damping, two tendons on one spool in position drive, one in tension drive, and one ideal source."""
     # Soft tendons: differences of the friction of stiff ones would have to be finer than rounding allows.
@@ -139,6 +129,16 @@ class Unpowered:
 
     def planned(self, time, reference, control):
         return control
+
+
+def carried():
+    """The thumb of a hand whose palm swings about and along all axes."""
+    names, rates = ("x", "y", "z", "roll", "pitch", "yaw"), (1.1, 1.7, 2.3, 1.3, 0.9, 1.9)
+    path = {
+        name: {"amplitude": 0.05 if index < 3 else 0.5, "frequency": rate, "phase": 0.3 * index}
+        for index, (name, rate) in enumerate(zip(names, rates, strict=True))
+    }
+    return fp.load_scenario("hand", {"hand.palm.path": path}).parts()["thumb"]
 
 
 def without_abduction_link(loop):

@@ -3,6 +3,7 @@
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonGeometry, TendonPath, tendon_paths
+from finger_pin.mechanism.geometry.tree import TreeGeometry
 from finger_pin.mechanism.geometry.winding import BASE_LEAD
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "Pulley",
     "TendonGeometry",
     "TendonPath",
+    "TreeGeometry",
     "Visual",
     "tendon_paths",
 ]

@@ -63,7 +63,10 @@ class TendonGeometry:
         tips: The fingertips: index of the link, and place in its frame, shape (3,), m.
         size: How far the fingertips can be from the base, about, m.
         widths: Of the links, m.
+        first_seen: First link that the camera must have in view.
     """
+
+    first_seen = 0
 
     def __init__(
         self,

@@ -23,6 +23,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
+from finger_pin.views.viewer.things import Things
 
 Indices = NDArray[np.intp]
 
@@ -80,6 +81,12 @@ def animation_page(
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
         chunk["ghost"] = beside.chunk()
+    scene = motion.scene
+    tips = scene.tips(scene.geometry.poses(motion.position[every])).reshape(-1, 3)
+    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0))
+    if things is not None:
+        header |= things.header(scene.view())
+        chunk |= things.chunk()
     return render({**header, "chunks": [chunk]})
 
 
@@ -123,7 +130,7 @@ class Motion:
     @property
     def largest(self) -> float:
         """Largest tension of all, N."""
-        return float(self.tension.max())
+        return float(self.tension.max(initial=0.0))
 
     def ghost(self, time: Array) -> Ghost:
         """Return it as seen beside another motion, with frames at other times, shape (m,), s; it ends where it ends."""

@@ -17,7 +17,7 @@ from finger_pin.analysis import ForcePolytope
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, Visual
+from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, is_mesh, link_names, root_command, solid_commands
 
@@ -62,12 +62,15 @@ class Ghost:
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
-def shown(finger: Finger | FingerDescription) -> TendonGeometry:
+def shown(finger: Finger | FingerDescription) -> TendonGeometry | TreeGeometry:
     """Return what can be shown of a finger or hand, or of the description of one.
 
     Raises:
         InputError: If a joint of a description carries no link.
     """
+    description = finger if isinstance(finger, FingerDescription) else finger.description
+    if description.tree is not None:
+        return TreeGeometry(description)
     if isinstance(finger, FingerDescription):
         return TendonGeometry(finger, resolution=_RESOLUTION)
     foreign = finger.visuals is not None
@@ -106,6 +109,11 @@ class Scene:
         ]
         self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
+    @property
+    def size(self) -> float:
+        """Length of the finger, m."""
+        return self._size
+
     def header(
         self,
         title: str,
@@ -133,7 +141,7 @@ class Scene:
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation, self.tips(poses), *(path.points for path in paths)]
+        seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
         large = [each for each in geometry.visuals if is_mesh(each.shape) or each.name == "palm"]
         seen += [_corners(visual, poses) for visual in large]
         if shown is not None:
@@ -176,7 +184,9 @@ class Scene:
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q, palm)
-        paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
+        none = np.zeros((*q.shape[:-1], 0, 3))
+        drawn = [none, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
+        paths = np.concatenate(drawn, axis=-2)
         return {
             "time": _encode(time, "<f8"),
             "pose": _encode_poses(poses),

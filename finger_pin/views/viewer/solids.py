@@ -10,7 +10,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.geometry import TendonGeometry
+from finger_pin.mechanism.geometry import TendonGeometry, TreeGeometry
 
 ROOT = "/finger_pin"
 Command = dict[str, Any]
@@ -20,16 +20,19 @@ SOLID_OPACITY = 0.28
 GROOVE_COLOUR = (0.55, 0.62, 0.72)
 
 # Three.js runs its cylinders along y, URDF along z.
-_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-def link_names(geometry: TendonGeometry) -> list[str]:
+def link_names(geometry: TendonGeometry | TreeGeometry) -> list[str]:
     """Return the names under which the base and the links stand in the scene."""
     return ["base", *(f"{name}_link" for name in geometry.description.joints)]
 
 
 def solid_commands(
-    geometry: TendonGeometry, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
+    geometry: TendonGeometry | TreeGeometry,
+    tube_radius: float,
+    root: str = ROOT,
+    colour: tuple[float, ...] | None = None,
 ) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
@@ -48,12 +51,12 @@ def solid_commands(
         shape, turn = _primitive(visual.name, visual.shape)
         own, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
         path = f"{root}/{links[visual.link]}/{visual.name}"
-        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
+        yield mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
         path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
-        shape = _cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
+        shape = cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
+        yield mesh(path, shape, Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
@@ -64,7 +67,7 @@ def root_command(rotation: Array) -> Command:
 def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
     kind = type(shape).__name__
     if kind == "Cylinder":
-        return _cylinder(shape.radius, 2.0 * shape.halfLength), _Y_TO_Z
+        return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z
     if kind == "Sphere":
         return {"type": "SphereGeometry", "radius": shape.radius, "widthSegments": 40, "heightSegments": 28}, np.eye(3)
     if is_mesh(shape):
@@ -95,7 +98,8 @@ def _mesh_geometry(shape: Any) -> Command:
     return {"type": "BufferGeometry", "data": {"attributes": attributes}}
 
 
-def _cylinder(radius: float, height: float) -> Command:
+def cylinder(radius: float, height: float) -> Command:
+    """Return meshcat's geometry of a cylinder along y."""
     return {
         "type": "CylinderGeometry",
         "radiusTop": radius,
@@ -105,9 +109,10 @@ def _cylinder(radius: float, height: float) -> Command:
     }
 
 
-def _mesh(
+def mesh(
     path: str, shape: Command, rotation: Array, translation: Array, colour: tuple[float, ...], opacity: float
 ) -> Command:
+    """Return meshcat's ``set_object`` command for a translucent solid."""
     red, green, blue = (round(255 * float(part)) for part in colour)
     material = {
         "uuid": f"{path}:material",
@@ -118,7 +123,7 @@ def _mesh(
         "opacity": float(opacity),
         "depthWrite": False,
     }
-    mesh = {
+    solid = {
         "uuid": path,
         "type": "Mesh",
         "geometry": f"{path}:geometry",
@@ -130,9 +135,9 @@ def _mesh(
         "path": path,
         "object": {
             "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [{"uuid": mesh["geometry"], **shape}],
+            "geometries": [{"uuid": solid["geometry"], **shape}],
             "materials": [material],
-            "object": mesh,
+            "object": solid,
         },
     }
 
