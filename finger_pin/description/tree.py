@@ -35,7 +35,9 @@ Pair = tuple[float, float]
 class Solid(Description):
     """What is seen of a body."""
 
-    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")]
+    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")] = (
+        quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder or box.")
+    )
     radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of all but a box."
     )
@@ -110,7 +112,9 @@ class TreeJoint(Description):
 class Waypoint(Description):
     """A piece of a tendon's path: a point, a cylinder or sphere that it may wrap, or a pulley that divides it."""
 
-    kind: Annotated[Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")]
+    kind: Annotated[
+        Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")
+    ] = quantity(..., unit="1", source="design", doc="point, cylinder, sphere or pulley.")
     body: Name | None = Field(None, description="What carries it; the base if left out.")
     position: Annotated[Triple, _PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
@@ -132,8 +136,8 @@ class Waypoint(Description):
 class TreeTendon(Description):
     """A tendon: a sum of joint positions, or a path through space; and what acts along it."""
 
-    joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = Field(
-        None, description="Length gained per joint position, m/rad."
+    joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = quantity(
+        None, unit="m/rad", source="design", doc="Length gained per joint position."
     )
     path: dict[Name, Waypoint] | None = Field(None, description="By name, in order.")
     stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="Of its spring.")
