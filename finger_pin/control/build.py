@@ -22,7 +22,7 @@ from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
-from finger_pin.description.routing import Array
+from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.description.validation import Numbers, expand
@@ -45,19 +45,20 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
     Raises:
         InputError: If the joint friction that it is to compensate is believed to lock the finger.
     """
-    finger = finger or Finger(scenario.finger)
+    routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)
     parts = scenario.parts()
     if len(parts) > 1:
-        return joined_controller([build_controller(part) for part in parts.values()], finger.routing)
+        return joined_controller([build_controller(part) for part in parts.values()], routing)
     scenario = next(iter(parts.values()))
     settings = scenario.controller
     if settings.kind == "tensions":
-        return OpenLoopTensions.from_scenario(scenario, finger.routing)
-    if any(tendon.along for tendon in finger.description.tendons.values()):
-        return _routed(scenario, finger)
-    taut = finger.routing.force_closure().holds
+        return OpenLoopTensions.from_scenario(scenario, routing)
+    if any(tendon.along for tendon in scenario.finger.tendons.values()):
+        return _routed(scenario, finger or Finger(scenario.finger))
+    taut = routing.force_closure().holds
     if settings.is_paper and taut:
-        return ProportionalController.from_scenario(scenario, finger.routing)
+        return ProportionalController.from_scenario(scenario, routing)
+    finger = finger or Finger(scenario.finger)
     joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)
     controller = CompensatedController(
         routing=finger.routing,

@@ -68,7 +68,9 @@ def paper_control(controller: ProportionalController, reference: SignalReference
 
 
 def with_force(control: Control, loop: ClosedLoop) -> Control:
-    """Return inputs with what varies of the force at the fingertip; the constant part goes with it."""
+    """Return inputs with the path of the palm and what varies of the force at the fingertip, with its constant part."""
+    if loop.palm is not None:
+        control = control._replace(palm=_arrays(loop.palm.signal))
     if loop.varying_force is None:
         return control
     force = _arrays(loop.varying_force)

@@ -6,7 +6,7 @@ import math
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import Description, choice, problem, quantity, real, vector
@@ -25,7 +25,7 @@ _MILLIMETRES = " m (is it in millimetres?)"
 class Surface(Description):
     """Contact of a surface: Hunt-Crossley along the normal, bristles with Coulomb friction along the tangents.
 
-    Where two objects meet, the smaller of their numbers count.
+    Where two objects meet that both have one, the smaller of their numbers count.
     """
 
     stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
@@ -87,7 +87,7 @@ class Object(Description):
     angular_velocity: Annotated[tuple[float, float, float], vector(3, -1e4, 1e4)] = quantity(
         (0.0, 0.0, 0.0), unit="rad/s", source="chosen", doc="Of a free object at t = 0, its own frame."
     )
-    surface: Surface = Surface()
+    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
 
     @field_validator("shape", mode="before")
     @classmethod

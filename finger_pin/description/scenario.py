@@ -181,6 +181,8 @@ class Scenario(Description):
         """
         if self.hand is None:
             return {"": self}
+        if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
+            return dict.fromkeys(self.hand.fingers, self)
         return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
 
     def _part(self, name: str, alone: HandDescription) -> Scenario:
@@ -207,6 +209,8 @@ class Scenario(Description):
 
     def _check_names(self) -> None:
         """Raise where a table is for a joint or a finger that is not there."""
+        if self.environment.objects and self.hand and self.hand.palm.path is not None:
+            raise problem("environment.objects", "objects need a palm at rest: leave out hand.palm.path")
         initial = self.simulation.initial or InitialSettings()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
@@ -260,8 +264,12 @@ class Scenario(Description):
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return what the passive tendons impose on the references (20)."""
+        fingers = {"": self.finger}
+        if self.hand is not None:
+            fingers = {name: placed.finger for name, placed in self.hand.fingers.items()}
         wishes = [
-            expand(part.controller.passive_tension, len(part.finger.passive_names)) for part in self.parts().values()
+            expand(of_finger(self.controller, name).passive_tension, len(finger.passive_names))
+            for name, finger in fingers.items()
         ]
         return PassiveCoupling.from_routing(
             routing, np.concatenate(wishes), expand(self.finger.passive_tendon.stiffness, routing.passive)

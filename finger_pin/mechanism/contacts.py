@@ -8,16 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from finger_pin.description.objects import Object, Surface
 from finger_pin.description.parameters import Link
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
-from finger_pin.laws.law import ContactLaw
-from finger_pin.mechanism.gaps import PRISM, Gap, prism_parameters
+from finger_pin.mechanism.gaps import PRISM, prism_parameters
+from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
 from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rows import Rows
 
 #: Points around each rim of a cylinder that stands or rolls on something flat.
 _RIM = 8
@@ -41,7 +41,7 @@ class Solid:
         radius: Of the segment, m.
         points: Where it touches what is flat: spheres in the frame of the joint, shape (m, 3), m.
         rounding: Their radius, m.
-        surface: Its surface; None for links, whose contacts have the surface of what they touch.
+        surface: Its surface; None for links and where it is left out, which touch with that of what they touch.
     """
 
     name: str
@@ -58,96 +58,57 @@ class Solid:
     surface: Surface | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Contacts:
-    """A table of contacts between a body A, a segment with a radius, and a body W with a shape; k contacts.
+def contact_rows(solids: Sequence[Solid], width: int) -> Rows:
+    """Return the contacts of all pairs that can touch: not of one group, and not both fixed.
 
-    Attributes:
-        names: ``link-object``; contacts at points of the same pair are numbered.
-        pairs: Names of both solids.
-        law: The law of all.
-        gap: The signed distance of all.
-        parameters: The law's numbers, shape (len(law.parameters), k).
-        sizes: The gap's numbers, shape (len(gap.parameters), k).
-        joint_a: Index of the joint of the Pinocchio model that carries A, 0 for the base, shape (k,).
-        ends: Of A's segment in the frame of that joint, shape (k, 2, 3), m.
-        joint_w: The same of W, shape (k,).
-        rotation: Of W's shape in the frame of its joint, shape (k, 3, 3).
-        position: Likewise, shape (k, 3), m.
-        reach: Surfaces are apart if the middle of A's segment is farther than this from ``position``, shape (k,), m;
-            infinite for a half-space.
+    Args:
+        solids: Links and objects.
+        width: Number of coordinates.
+
+    Returns:
+        A table of contacts named ``link-object``, numbered where a pair has several.
     """
+    names: list[str] = []
+    numbers: list[tuple[float, ...]] = []
+    paths: list[tuple[Leg, ...]] = []
+    for one, other in itertools.combinations(solids, 2):
+        if one.group == other.group or one.joint == other.joint == 0:
+            continue
+        found = list(_touching(one, other))
+        for index, (a, w, ends, radius) in enumerate(found):
+            half = 0.5 * float(np.linalg.norm(ends[1] - ends[0]))
+            piece = Piece(
+                PRISM,
+                np.array([radius, *w.shape]),
+                (Place(a.joint, ends[0]), Place(a.joint, ends[1])),
+                w.joint,
+                pin.SE3(w.rotation, w.position),
+                half + radius + w.reach,
+            )
+            names.append(f"{a.name}-{w.name}" + (f".{index}" if len(found) > 1 else ""))
+            numbers.append(law_numbers(a.surface, w.surface))
+            paths += [(Leg(piece, column),) for column in range(CONTACT.arms)]
+    parameters = np.array(numbers).reshape(-1, len(CONTACT.parameters)).T
+    return Rows("contacts", CONTACT, tuple(names), parameters, np.zeros((len(paths), width)), paths=tuple(paths))
 
-    names: tuple[str, ...]
-    pairs: tuple[tuple[str, str], ...]
-    law: ContactLaw
-    gap: Gap
-    parameters: Array
-    sizes: Array
-    joint_a: NDArray[np.int64]
-    ends: Array
-    joint_w: NDArray[np.int64]
-    rotation: Array
-    position: Array
-    reach: Array
 
-    @classmethod
-    def between(cls, solids: Sequence[Solid]) -> Contacts:
-        """Return the contacts of all pairs that can touch: not of one group, and not both fixed."""
-        names, pairs, rows = [], [], []
-        for one, other in itertools.combinations(solids, 2):
-            if one.group == other.group or one.joint == other.joint == 0:
-                continue
-            found = list(_touching(one, other))
-            for index, (a, w, ends, radius) in enumerate(found):
-                names.append(f"{a.name}-{w.name}" + (f".{index}" if len(found) > 1 else ""))
-                pairs.append((a.name, w.name))
-                half = 0.5 * float(np.linalg.norm(ends[1] - ends[0]))
-                rows.append((a, w, ends, (radius, *w.shape), half + radius + w.reach))
-        numbers = [law_numbers(a.surface, w.surface) for a, w, *_ in rows]
-        return cls(
-            tuple(names),
-            tuple(pairs),
-            CONTACT,
-            PRISM,
-            np.array(numbers).reshape(-1, len(CONTACT.parameters)).T,
-            np.array([sizes for *_, sizes, _ in rows]).reshape(-1, len(PRISM.parameters)).T,
-            np.array([a.joint for a, *_ in rows], dtype=np.int64),
-            np.array([ends for _, _, ends, *_ in rows]).reshape(-1, 2, 3),
-            np.array([w.joint for _, w, *_ in rows], dtype=np.int64),
-            np.array([w.rotation for _, w, *_ in rows]).reshape(-1, 3, 3),
-            np.array([w.position for _, w, *_ in rows]).reshape(-1, 3),
-            np.array([reach for *_, reach in rows]),
+def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
+    """Refuse a configuration of shape (nq,) in which bodies are deep in each other.
+
+    Raises:
+        InputError: Naming the pair and how deep it is.
+    """
+    gaps = reach(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: CONTACT.arms]
+    if gaps.size and gaps.min() < -DEEPEST_START:
+        allowed = f"starts {-1e3 * gaps.min():.3g} mm deep in each other, at most {1e3 * DEEPEST_START:g} mm"
+        pair = contacts.names[int(np.argmin(gaps))]
+        raise InputError(
+            f"environment.objects: {pair}", f"{allowed}; move the object, or let the joints start elsewhere"
         )
-
-    def distances(self, body: RigidBody, q: Array) -> Array:
-        """Return the signed distances at a configuration of the rigid body, shape (nq,); shape (k,), m."""
-        data, found, out = body.model.createData(), np.zeros(len(self.names)), np.zeros(13)
-        pin.forwardKinematics(body.model, data, q)
-        for k in range(len(self.names)):
-            a, w = data.oMi[int(self.joint_a[k])], data.oMi[int(self.joint_w[k])]
-            place = w * pin.SE3(self.rotation[k], self.position[k])
-            y = np.concatenate([place.actInv(a.act(end)) for end in self.ends[k]])
-            self.gap.value(y, self.sizes[:, k], out)
-            found[k] = out[0]
-        return found
-
-    def check_start(self, body: RigidBody, q: Array) -> None:
-        """Refuse a configuration in which bodies are deep in each other.
-
-        Raises:
-            InputError: Naming the object, what it is in and how deep.
-        """
-        found = self.distances(body, q)
-        if found.size and found.min() < -DEEPEST_START:
-            worst = int(np.argmin(found))
-            inner, outer = self.pairs[worst]
-            allowed = f"starts {-1e3 * found[worst]:.3g} mm deep in {inner}, at most {1e3 * DEEPEST_START:g} mm"
-            raise InputError(f"environment.objects.{outer}", f"{allowed}; move it, or let the joints start elsewhere")
 
 
 def law_numbers(one: Surface | None, other: Surface | None) -> tuple[float, ...]:
-    """Return the numbers of the law where two surfaces meet: of each the smaller."""
+    """Return the numbers of the law where two surfaces meet: of each the smaller; None leaves it to the other."""
     surfaces = [each for each in (one, other) if each is not None] or [Surface()]
     number = {name: min(getattr(each, name) for each in surfaces) for name in Surface.model_fields}
     kinetic = number["friction"]
@@ -202,11 +163,13 @@ def link_solid(name: str, group: str, joint: int, link: Link, last: bool) -> Sol
     )
 
 
-def finger_solids(links: Mapping[str, Link], body: RigidBody, group: str = "finger") -> list[Solid]:
-    """Return the links of a finger, given by the names of their joints, from the base to the tip."""
-    last = list(links)[-1]
+def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
+    """Return the links of a finger or a hand, given by the names of their joints, from the base to each tip."""
+    fingers = {name: name.rpartition(".")[0] for name in links}
+    last = {finger: name for name, finger in fingers.items()}
     return [
-        link_solid(name, group, int(body.model.getJointId(name)), link, name == last) for name, link in links.items()
+        link_solid(name, f"{fingers[name]}.", int(body.model.getJointId(name)), link, name == last[fingers[name]])
+        for name, link in links.items()
     ]
 
 

@@ -8,7 +8,7 @@ evaluated.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,16 @@ class Rows:
     def routed(self) -> bool:
         """Whether paths through space belong to any row."""
         return any(self.paths)
+
+    def spread(self, places: NDArray[np.int64], width: int) -> Rows:
+        """Return the same rows where their coordinates stand at some places among more."""
+
+        def wide(matrix: Array) -> Array:
+            found = np.zeros((len(matrix), width))
+            found[:, places] = matrix
+            return found
+
+        return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
     def signal(self, name: str) -> int:
         """Return the index of a signal of the law by its name."""

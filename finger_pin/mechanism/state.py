@@ -1,9 +1,10 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta | p | theta_m | theta' | p' | theta_m' | F^s of the tendons | F^s of the joints | F^s of the gearboxes |
-    |   n   | p |    m    |   n    | p  |    m     |         t          |         n         |          m           |
+    | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s of tendons | of joints | of gearboxes |
+    |   n   | 7 f | p |    m    |   n    | 6 f | p  |    m     | 2 c |       t        |     n     |      m       |
 
-n joints, t tendons, p of them passive, m motors: 19 numbers for the paper's finger, which has none.
+n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
+m motors, c contacts with bristles bent by z: 19 numbers for the paper's finger, which has neither motors nor contacts.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ class State:
         motor_position: theta_m, shape (..., m), rad.
         motor_velocity: theta_m', shape (..., m), rad/s.
         gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
+        object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
+        object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
+        contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
     """
 
     position: Array
@@ -44,6 +48,9 @@ class State:
     motor_position: Array | None = None
     motor_velocity: Array | None = None
     gearbox_stiction: Array | None = None
+    object_pose: Array | None = None
+    object_velocity: Array | None = None
+    contact_bend: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,8 @@ class Layout:
         further: Name and scale of every state of further rows, which follow.
         ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
         motors: Names of the motors.
+        objects: Names of the free objects.
+        contacts: Names of the contacts.
     """
 
     joints: tuple[str, ...]
@@ -65,18 +74,31 @@ class Layout:
     further: tuple[tuple[str, float], ...] = ()
     ringing: tuple[float, ...] = ()
     motors: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
 
     @cached_property
     def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
         """Names and the scale of every block, in order."""
         passive = self.tendons[len(self.tendons) - self.passive :]
+        poses, rates, bends = (
+            tuple(f"{name}.{part}" for name in names for part in parts.split())
+            for names, parts in (
+                (self.objects, "x y z qx qy qz qw"),
+                (self.objects, "vx vy vz wx wy wz"),
+                (self.contacts, "1 2"),
+            )
+        )
         return {
             "position": (self.joints, 1.0),
+            "object_pose": (poses, 1.0),
             "passive_position": (passive, 1e-3),
             "motor_position": (self.motors, 1.0),
             "velocity": (self.joints, 10.0),
+            "object_velocity": (rates, 10.0),
             "passive_velocity": (passive, 0.1),
             "motor_velocity": (self.motors, 10.0),
+            "contact_bend": (bends, 1e-5),
             "tendon_stiction": (self.tendons, 1.0),
             "joint_stiction": (self.joints, 1e-2),
             "gearbox_stiction": (self.motors, 1e-2),
@@ -139,4 +161,9 @@ class Layout:
         if self.ringing:
             passive = self._parts["passive_velocity"]
             scales[passive] = np.maximum(scales[passive], 1e-5 * np.array(self.ringing))
+        if self.objects:
+            # An object moves by centimetres where a joint turns by a radian.
+            poses, rates = (self._parts[kind] for kind in ("object_pose", "object_velocity"))
+            scales[poses].reshape(-1, 7)[:, :3] = 1e-2
+            scales[rates].reshape(-1, 6)[:, :3] = 0.1
         return scales

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
@@ -22,6 +23,7 @@ from finger_pin.mechanism.mechanism import Evaluation
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.touching import contact_coordinates, contact_variables
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR = ("time", "motor")
@@ -37,6 +39,9 @@ _STORED = {
     "coupling": "elastic energy of the couplings of joints",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
+    "contacts": "elastic energy of contacts",
+    "objects_kinetic": "kinetic energy of free objects",
+    "objects_gravity": "potential energy of free objects",
     "elastic_tendons": "elastic energy of the tendons on spools",
     "gearboxes": "elastic energy of the gearboxes' bristles",
     "rotors": "kinetic energy of the rotors",
@@ -49,6 +54,7 @@ _EXCHANGED = {
     "gearbox_coulomb": "lost by gears sliding",
     "gearbox_viscous": "lost in the gears' viscous friction",
     "elastic_damping": "lost as tendons on spools stretch",
+    "palm": "supplied by what moves the palm",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",
@@ -57,6 +63,9 @@ _EXCHANGED = {
     "joint_micro_damping": "lost in the joints' micro-damping",
     "limiter": "lost in the stroke limiters",
     "joint_springs": "lost in the joints' springs",
+    "contacts_impact": "lost in contacts along their normals",
+    "contacts_sliding": "lost in contacts sliding",
+    "contacts_micro_damping": "lost in the bristles of contacts",
     "slack": "booked where a tension is cut at zero",
     "tendon_spring_damping": "lost in the tendons' dampers",
     "tendon_limit_limiter": "lost where tendons are at their limits",
@@ -76,11 +85,12 @@ def record(
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
     signals = loop.evaluate(times, trajectory.interpolate(times))
     state = signals.finger.state
-    motion = loop.dynamics.motion(state.position, state.velocity)
+    motion = loop.motion(times, state)
     kept = account(loop, trajectory, times, signals, motion)
     routing = loop.finger.routing
     further = loop.finger.further
-    variables = _signals(loop, signals, motion) | _further(further, signals.finger.mechanism) | _energies(kept)
+    variables = _signals(loop, times, signals, motion) | contact_variables(loop.finger, signals.finger)
+    variables |= _further(further, signals.finger.mechanism) | _energies(kept)
     dataset = xr.Dataset(
         {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
         coords={
@@ -92,6 +102,7 @@ def record(
         attrs=_attributes(scenario, trajectory, method),
     )
     dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
+    dataset = dataset.assign_coords(contact_coordinates(loop.finger))
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         dataset = dataset.assign_coords(finger=list(scenario.hand.fingers))
     if routing.passive > 1:
@@ -130,7 +141,9 @@ def load_result(path: str | Path) -> xr.Dataset:
     return xr.load_dataset(file, engine="netcdf4")
 
 
-def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+def _signals(
+    loop: ClosedLoop, times: Array, signals: LoopSignals, motion: Motion
+) -> dict[str, tuple[Any, Array, dict[str, str]]]:
     finger, tendons, joints, state = signals.finger, signals.finger.tendons, signals.finger.joints, signals.finger.state
     actuated, passive = loop.finger.routing.actuated, loop.finger.routing.passive
     halves = tendons.strands[..., actuated:]
@@ -163,6 +176,12 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
+    if loop.palm is not None:
+        place, rotation = loop.palm.place(times)
+        quaternions = [pin.Quaternion(each).coeffs() for each in rotation]
+        table["palm_position"] = _entry(("time", "axis"), place, "m", "place of the palm in the world")
+        text = "rotation of the palm to the world, x, y, z, w"
+        table["palm_orientation"] = _entry(("time", "quaternion"), np.array(quaternions), "1", text)
     if signals.control.shortfall is not None:
         text = "desired torque that tension limits keep from being planned"
         table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)

@@ -11,6 +11,7 @@ from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import State
+from finger_pin.simulation.touching import last_touching
 
 _PARTS = {
     "position": "joint_position",
@@ -78,4 +79,5 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
             raise InputError("initial", f"has no {name}; give what simulate returned")
         else:
             parts[part] = np.zeros(0)
+    parts |= last_touching(finger, last)
     return finite_vector("initial", finger.layout.pack(State(**parts)), finger.layout.size)

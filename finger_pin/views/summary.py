@@ -23,7 +23,9 @@ from finger_pin.views.trees import is_tree
 
 _SETTLING = 1.0
 _LONG = 2.0
-_SUPPLIES = ("actuators", "electrical", "fingertip")
+# What counts as sliding, m/s.
+_CREEP = 1e-6
+_SUPPLIES = ("actuators", "electrical", "fingertip", "palm")
 
 
 def summarize(result: xr.Dataset) -> str:
@@ -35,7 +37,16 @@ def summarize(result: xr.Dataset) -> str:
     head = [*_head(result), *_own(result), *_warnings(result)]
     motion = [_joints(result), *_actuators(result)] if is_tree(result) else [_tracking(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
-    blocks = [head, *motion, *pulled, *_motors(result), _energy(result), *_convergence(result), _cost(result)]
+    blocks = [
+        head,
+        *motion,
+        *pulled,
+        *_motors(result),
+        *_contacts(result),
+        _energy(result),
+        *_convergence(result),
+        _cost(result),
+    ]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
@@ -123,6 +134,24 @@ def _tracking(result: xr.Dataset) -> list[str]:
     return [f"Tracking error, deg ({span})", *_table(("", "rms", "max"), rows)]
 
 
+def _contacts(result: xr.Dataset) -> list[list[str]]:
+    if "contact_force" not in result:
+        return []
+    most = result["contact_normal_force"].max("time")
+    closed = [str(name) for name in result["contact"].values if float(most.sel(contact=name)) > 0.0]
+    if not closed:
+        return [["Contacts: nothing touched"]]
+    rows = []
+    for name in closed:
+        contact = result.sel(contact=name)
+        touching = np.asarray(contact["contact_normal_force"]) > 0.0
+        sliding = touching & (np.asarray(contact["contact_slip"]) > _CREEP)
+        shares = (f"{100.0 * np.mean(each):.1f} %" for each in (touching, sliding))
+        greatest = (float(contact[f"contact_{force}"].max()) for force in ("normal_force", "friction"))
+        rows.append((name, *(f"{each:.3f}" for each in greatest), *shares))
+    return [["Contacts, N, and parts of the time", *_table(("", "normal", "friction", "touching", "sliding"), rows)]]
+
+
 def _joints(result: xr.Dataset) -> list[str]:
     position = result["joint_position"]
     rows = [_range(str(name), np.asarray(position.sel(joint=name))) for name in result["joint"].values]
@@ -199,8 +228,10 @@ def _energy(result: xr.Dataset) -> list[str]:
         for name in map(str, result)
         if name.startswith("energy_") and name.removeprefix("energy_exchanged_") == name and name != "energy_residual"
     )
-    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in _SUPPLIES if name in exchanged]
-    came_in = sum(max(value, 0.0) for value in (*(value for _, value in entries), -stored))
+    supplied = [name for name in _SUPPLIES if name in exchanged]
+    supplies = [_final(exchanged[name]) for name in supplied]
+    came_in = sum(max(value, 0.0) for value in (*supplies, -stored))
+    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in supplied]
     entries += [(_label(values), _final(values)) for name, values in exchanged.items() if name not in _SUPPLIES]
     entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
     rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]

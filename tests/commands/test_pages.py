@@ -59,7 +59,7 @@ def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     (folder / "urdf").symlink_to(ROOT / "urdf")
     shipped = folder / "shipped"
-    for kind in ("fingers", "scenarios", "motors"):
+    for kind in ("fingers", "hands", "scenarios", "motors"):
         shutil.copytree(Path(loading.__file__).parent / kind, shipped / kind)
     for path in (shipped / "scenarios").iterdir():
         path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")
@@ -76,6 +76,10 @@ def shown(tmp_path_factory):
         patch.setattr(meshcat, "Visualizer", partial(meshcat.Visualizer, window=silent))
         patch.setattr(webbrowser, "open", lambda url, new: True)
         yield SimpleNamespace(folder=folder, done=set())
+
+
+def not_moved(result, path, finger=None):
+    Path(path).write_text("moves")
 
 
 def run_command(line, shown):
@@ -107,7 +111,7 @@ def run_scenario(text, name):
 @pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop is deprecated:DeprecationWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
-    monkeypatch.setattr("finger_pin.views.viewer.write_animation", lambda result, path: Path(path).write_text("moves"))
+    monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)
     monkeypatch.setattr("finger_pin.commands.simulate.Drawing", lambda: nullcontext(Quick()))
     text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
     for found in SHOWN.finditer(text):

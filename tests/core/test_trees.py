@@ -21,7 +21,7 @@ TIGHT = 1e-10
 def motion(mechanism, x, times, force=None, method="Rodas5P", tolerance=TIGHT):
     """Return states at times, shape (m, size), of a mechanism without inputs."""
     control = held_control(mechanism.channels, mechanism.coordinates)
-    atol = np.full(2 * mechanism.coordinates + mechanism.state_count, tolerance)
+    atol = np.full(mechanism.size, tolerance)
     stepper = Stepper(mechanism, control, x, TABLEAUS[method](), tolerance, atol, force)
     names = tuple(str(index) for index in range(mechanism.size))
     trajectory = integrate_compiled(stepper, float(times[-1]), names)

@@ -1,7 +1,8 @@
 """Where the tendons run: lanes beside each other, winding around the joints, and paths in space."""
 
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
-from finger_pin.mechanism.geometry.paths import LinkPoses, Pulley, TendonGeometry, TendonPath, Visual, tendon_paths
+from finger_pin.mechanism.geometry.fingers import Pulley, Visual
+from finger_pin.mechanism.geometry.paths import LinkPoses, TendonGeometry, TendonPath, tendon_paths
 from finger_pin.mechanism.geometry.tree import TreeGeometry
 from finger_pin.mechanism.geometry.winding import BASE_LEAD
 

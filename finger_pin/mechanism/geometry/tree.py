@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.tree import Solid
+from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.lanes import Lanes
-from finger_pin.mechanism.geometry.paths import LinkPoses, Pulley, TendonPath, Visual
+from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath
 from finger_pin.mechanism.pieces import Leg, Piece
 from finger_pin.mechanism.routes import rotation
 from finger_pin.mechanism.shapes import MATERIALS
@@ -70,11 +71,12 @@ class TreeGeometry:
         self.widths: tuple[float, ...] = (_WIDTH * extent,)
         gravity = np.array(description.gravity)
         along = np.abs(still.rotation[1:, :, 2] @ gravity)
-        self.lanes = Lanes({}, _SPACING * extent, ((1 + int(np.argmin(along)),),))
+        self.lanes = Lanes({}, _SPACING * extent, ((1 + int(np.argmin(along)),),), _WIDTH * extent)
         self.pulleys: tuple[Pulley, ...] = ()
 
-    def poses(self, joint_position: ArrayLike) -> LinkPoses:
-        """Return where what every joint carries is at theta, shape (..., n), rad."""
+    def poses(self, joint_position: ArrayLike, palm: LinkPoses | None = None) -> LinkPoses:
+        """Return where what every joint carries is at theta, shape (..., n), rad; a tree has no ``palm`` that moves."""
+        assert palm is None
         q = np.asarray(joint_position, dtype=float)
         data, found = self.model.createData(), []
         for position in np.ascontiguousarray(q.reshape(-1, self.model.nq)):

@@ -1,4 +1,5 @@
 from .comparing import compare as compare
+from .contact import plot_contact as plot_contact
 from .convergence import plot_convergence as plot_convergence
 from .energy import plot_energy as plot_energy
 from .fig6 import plot_fig6 as plot_fig6

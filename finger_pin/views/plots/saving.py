@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.files import replacing
+from finger_pin.views.plots.contact import plot_contact
 from finger_pin.views.plots.convergence import plot_convergence
 from finger_pin.views.plots.energy import plot_energy
 from finger_pin.views.plots.fig6 import plot_fig6
@@ -27,6 +28,8 @@ def figures_of(result: xr.Dataset) -> dict[str, Callable[[xr.Dataset], Figure]]:
     figures: dict[str, Callable[[xr.Dataset], Figure]] = dict(FIGURES_OF_TREES if is_tree(result) else FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
+    if "contact_force" in result:
+        figures["contact"] = plot_contact
     if "motor_current" in result:
         figures["servo"] = plot_servo
     return figures

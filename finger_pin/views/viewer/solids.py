@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import coal
 import numpy as np
 
 from finger_pin.description.routing import Array
@@ -19,7 +20,7 @@ SOLID_OPACITY = 0.28
 GROOVE_COLOUR = (0.55, 0.62, 0.72)
 
 # Three.js runs its cylinders along y, URDF along z.
-_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def link_names(geometry: TendonGeometry | TreeGeometry) -> list[str]:
@@ -42,7 +43,7 @@ def solid_commands(
         colour: Of all solids, red, green and blue; by default each has its own.
 
     Raises:
-        InputError: If a visual is no box, cylinder or sphere.
+        InputError: If a visual is no box, cylinder, sphere or mesh.
     """
     links = link_names(geometry)
     for visual in geometry.visuals:
@@ -50,12 +51,12 @@ def solid_commands(
         shape, turn = _primitive(visual.name, visual.shape)
         own, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
         path = f"{root}/{links[visual.link]}/{visual.name}"
-        yield _mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
+        yield mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
     thickness = 0.8 * geometry.lanes.spacing
     for pulley in geometry.pulleys:
         path = f"{root}/{links[pulley.joint]}/groove_{pulley.tendon}"
-        shape = _cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
-        yield _mesh(path, shape, _Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
+        shape = cylinder(max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), thickness)
+        yield mesh(path, shape, Y_TO_Z, np.array([0.0, 0.0, pulley.offset]), colour or GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
@@ -66,16 +67,39 @@ def root_command(rotation: Array) -> Command:
 def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
     kind = type(shape).__name__
     if kind == "Cylinder":
-        return _cylinder(shape.radius, 2.0 * shape.halfLength), _Y_TO_Z
+        return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z
     if kind == "Sphere":
         return {"type": "SphereGeometry", "radius": shape.radius, "widthSegments": 40, "heightSegments": 28}, np.eye(3)
+    if is_mesh(shape):
+        return _mesh_geometry(shape), np.eye(3)
     if kind == "Box":
         width, height, depth = (2.0 * float(half) for half in shape.halfSide)
         return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, np.eye(3)
-    raise InputError(f"visual {name}", "must be a box, a cylinder or a sphere", kind)
+    raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere or a mesh", kind)
 
 
-def _cylinder(radius: float, height: float) -> Command:
+def is_mesh(shape: Any) -> bool:
+    """Return whether a geometry of Pinocchio is a mesh."""
+    return isinstance(shape, coal.BVHModelBase)
+
+
+def _mesh_geometry(shape: Any) -> Command:
+    """Return a mesh with a normal for each face, so that its edges show."""
+    corners = np.asarray(shape.vertices())
+    faces = np.array([[triangle[i] for i in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))])
+    points = corners[faces]
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    buffers = {"position": np.round(points.reshape(-1, 3), 5), "normal": np.round(np.repeat(normals, 3, axis=0), 2)}
+    attributes = {
+        name: {"itemSize": 3, "type": "Float32Array", "array": values.ravel().tolist()}
+        for name, values in buffers.items()
+    }
+    return {"type": "BufferGeometry", "data": {"attributes": attributes}}
+
+
+def cylinder(radius: float, height: float) -> Command:
+    """Return meshcat's geometry of a cylinder along y."""
     return {
         "type": "CylinderGeometry",
         "radiusTop": radius,
@@ -85,9 +109,10 @@ def _cylinder(radius: float, height: float) -> Command:
     }
 
 
-def _mesh(
+def mesh(
     path: str, shape: Command, rotation: Array, translation: Array, colour: tuple[float, ...], opacity: float
 ) -> Command:
+    """Return meshcat's ``set_object`` command for a translucent solid."""
     red, green, blue = (round(255 * float(part)) for part in colour)
     material = {
         "uuid": f"{path}:material",
@@ -98,7 +123,7 @@ def _mesh(
         "opacity": float(opacity),
         "depthWrite": False,
     }
-    mesh = {
+    solid = {
         "uuid": path,
         "type": "Mesh",
         "geometry": f"{path}:geometry",
@@ -110,9 +135,9 @@ def _mesh(
         "path": path,
         "object": {
             "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [{"uuid": mesh["geometry"], **shape}],
+            "geometries": [{"uuid": solid["geometry"], **shape}],
             "materials": [material],
-            "object": mesh,
+            "object": solid,
         },
     }
 

@@ -140,7 +140,7 @@ class Player {
     const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
-    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title]]) {
+    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title], ["things", this.config.things?.note]]) {
       const note = document.getElementById(name);
       note.hidden = !text;
       note.lastElementChild.textContent = text;
@@ -174,6 +174,7 @@ class Player {
       button.onclick = () => this.scene.frame(button.dataset.view);
     }
     window.addEventListener("keydown", (event) => this.key(event));
+    window.addEventListener("resize", () => this.scene.reframe());
     // A phone that is turned.
     window.matchMedia("(orientation: portrait)").addEventListener("change", () => this.scene.frame(this.scene.view));
   }

@@ -112,6 +112,38 @@ class Trace {
   }
 }
 
+// A closed contact: an arrow for the force on the second body, which ends where bodies touch, and the friction cone
+// around the normal, in which the arrow lies as long as the contact sticks.
+class ContactView {
+  constructor(viewer, config, steepness, index) {
+    const { ArrowHelper, ConeGeometry, DoubleSide, Group, Mesh, MeshPhongMaterial, Vector3 } = MeshCat.THREE;
+    this.length = config.things.length;
+    this.group = new Group();
+    this.arrow = new ArrowHelper(new Vector3(0, 0, 1), new Vector3(), 1, 0xff5a5a);
+    // Its apex at the origin, open along -y.
+    const cone = new ConeGeometry(steepness, 1, 40, 1, true).translate(0, -0.5, 0);
+    const look = { color: 0x9ad0ff, transparent: true, opacity: 0.25, side: DoubleSide, depthWrite: false };
+    this.cone = new Mesh(cone, new MeshPhongMaterial(look));
+    this.group.add(this.arrow, this.cone);
+    viewer.set_object([ROOT, "contacts", String(index)], this.group);
+  }
+
+  show(numbers) {
+    const { Vector3 } = MeshCat.THREE;
+    const [point, force, normal] = [0, 3, 6].map((first) => new Vector3().fromArray(numbers, first));
+    const size = this.length * force.length();
+    this.group.visible = size > 1e-6 && normal.lengthSq() > 0.5;
+    if (!this.group.visible) return;
+    const along = force.clone().normalize();
+    this.arrow.position.copy(point).addScaledVector(along, -size);
+    this.arrow.setDirection(along);
+    this.arrow.setLength(size, Math.min(0.3 * size, 0.008), Math.min(0.15 * size, 0.004));
+    this.cone.position.copy(point);
+    this.cone.quaternion.setFromUnitVectors(new Vector3(0, -1, 0), normal.normalize());
+    this.cone.scale.setScalar(Math.max(-this.length * force.dot(normal), 1e-6));
+  }
+}
+
 const ROOT = "finger_pin";
 const TRACE_POINTS = 800;
 
@@ -124,6 +156,10 @@ class FingerScene {
     this.links = config.links.map((name) => viewer.scene_tree.find([ROOT, name]).object);
     for (const command of config.ghost?.commands ?? []) viewer.handle_command(command);
     this.ghostLinks = (config.ghost?.links ?? []).map((name) => viewer.scene_tree.find([ROOT, "ghost", name]).object);
+    for (const command of config.things?.commands ?? []) viewer.handle_command(command);
+    this.free = (config.things?.free ?? []).map((name) => viewer.scene_tree.find([ROOT, name]).object);
+    this.contacts = (config.things?.steepness ?? []).map((each, i) => new ContactView(viewer, config, each, i));
+    config.inView.push(...(config.alsoInView ?? []));
     this.tendons = config.tendons.map((tendon) => new TendonView(viewer, config, tendon));
     this.traces = Array.from({ length: config.tips }, (_, i) => new Trace(viewer, config, frames, i));
     this.root = viewer.scene_tree.find([ROOT]).object;
@@ -168,6 +204,11 @@ class FingerScene {
   show(place, colours) {
     this.pose(this.links, "pose", place);
     if (this.config.ghost) this.pose(this.ghostLinks, "ghost", place);
+    if (this.config.things) {
+      this.pose(this.free, "object", place);
+      const numbers = this.frames.mix("contact", place);
+      this.contacts.forEach((contact, i) => contact.show(numbers.subarray(9 * i, 9 * i + 9)));
+    }
     const points = this.frames.mix("path", place).map((value) => value * this.config.quantum);
     let first = 0;
     for (const tendon of this.tendons) {
@@ -234,7 +275,13 @@ class FingerScene {
     controls.minDistance = 0.1 * distance;
     controls.maxDistance = 10 * distance;
     controls.update();
+    this.placed = camera.position.clone();
     this.viewer.set_dirty();
+  }
+
+  // A window of another size needs another place, unless the user has chosen one.
+  reframe() {
+    if (this.viewer.camera.position.distanceTo(this.placed) < 1e-9) this.frame(this.view);
   }
 
   // Names stand where the tendons begin, and make room for each other.

@@ -1,0 +1,140 @@
+"""What stands around a finger: objects, free ones as further bodies, and all contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.objects import Object
+from finger_pin.description.parameters import FingerDescription, Link
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.contacts import add_free_objects, check_start, contact_rows, finger_solids, object_solids
+from finger_pin.mechanism.gaps import PRISM
+from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rows import Rows
+
+#: Numbers of a free object's pose (position, quaternion), and of its velocity.
+POSE, VELOCITY = 7, 6
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """What contacts do in space, base frame; zero where they are open. Shapes (m, c, 3).
+
+    Attributes:
+        force: On the second body of the pair, N.
+        point: Midway between the surfaces, m.
+        normal: Unit vector from the second body towards the first.
+    """
+
+    force: Array
+    point: Array
+    normal: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Objects around a finger.
+
+    Attributes:
+        objects: By name.
+        free: Those with a mass.
+        body: The finger's rigid body, and the free objects after its joints.
+        contacts: Between links and objects, links of different fingers, and objects.
+    """
+
+    objects: Mapping[str, Object]
+    free: Mapping[str, Object]
+    body: RigidBody
+    contacts: Rows
+
+    @classmethod
+    def of(cls, objects: Mapping[str, Object], description: FingerDescription, mechanism: Mechanism) -> Surroundings:
+        """Put objects around a finger.
+
+        Args:
+            objects: By name.
+            description: The finger.
+            mechanism: The finger alone.
+
+        Raises:
+            InputError: If an object has the name of a joint, or a link has no size.
+        """
+        links: dict[str, Link] = {}
+        for name, joint in description.joints.items():
+            if joint.link is None:
+                raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
+            links[name] = joint.link
+        for name in objects:
+            if name in links:
+                raise InputError(f"environment.objects.{name}", "a joint has this name; choose another")
+        extended = add_free_objects(mechanism.body, objects)
+        solids = [*finger_solids(links, extended), *object_solids(objects, extended)]
+        free = {name: each for name, each in objects.items() if each.mass is not None}
+        width = int(extended.model.nv) + len(mechanism.lumps)
+        return cls(objects, free, extended, contact_rows(solids, width))
+
+    def around(self, mechanism: Mechanism) -> Mechanism:
+        """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.
+
+        What contacts exert loads the pins of joints, so they are evaluated first.
+        """
+        joints, bodies, lumps = int(mechanism.body.model.nv), int(self.body.model.nv), len(mechanism.lumps)
+        places = np.append(np.arange(joints), bodies + np.arange(lumps))
+        rows = [table.spread(places, bodies + lumps) for table in mechanism.rows]
+        return Mechanism(self.body, [self.contacts, *rows], mechanism.lumps, mechanism.inertia)
+
+    def start(self) -> tuple[Array, Array]:
+        """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""
+        poses = [np.append(each.position, each.quaternion) for each in self.free.values()]
+        rates = [np.append(each.velocity, each.angular_velocity) for each in self.free.values()]
+        return np.array(poses).reshape(-1), np.array(rates).reshape(-1)
+
+    def check(self, position: Array, pose: Array) -> None:
+        """Refuse joints at a position, shape (n,), and objects at poses that are deep in each other.
+
+        Raises:
+            InputError: Naming the pair.
+        """
+        check_start(self.contacts, self.body, np.concatenate([position, pose]))
+
+    def energies(self, pose: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return kinetic and potential energy of the free objects, shape (...,), J."""
+        lead = pose.shape[:-1]
+        places = pose.reshape(*lead, -1, POSE)[..., :3]
+        rates = velocity.reshape(*lead, -1, VELOCITY)
+        mass = np.array([each.mass or 0.0 for each in self.free.values()])
+        inertia = np.array([each.inertia for each in self.free.values()]).reshape(-1, 3)
+        kinetic = 0.5 * (np.sum(rates[..., :3] ** 2, axis=-1) @ mass + np.sum(inertia * rates[..., 3:] ** 2, (-2, -1)))
+        return kinetic, -(places @ self.body.model.gravity.linear) @ mass
+
+    def touching(self, position: Array, pose: Array, force: Array) -> Touching:
+        """Return what contacts do in space.
+
+        Args:
+            position: theta, shape (m, n), rad.
+            pose: Of the free objects, shape (m, 7 f).
+            force: Along the contacts' three arms, shape (m, 3 c), N.
+        """
+        body, data = self.body, self.body.model.createData()
+        pieces = [legs[0].piece for legs in self.contacts.paths[:: CONTACT.arms]]
+        along = force.reshape(len(force), len(pieces), CONTACT.arms)
+        found, out = Touching(*(np.zeros((len(force), len(pieces), 3)) for _ in range(3))), np.zeros(16)
+        for m in np.flatnonzero(np.any(along[..., 0], axis=1)):
+            pin.forwardKinematics(body.model, data, np.concatenate([position[m], pose[m]]))
+            for c in np.flatnonzero(along[m, :, 0]):
+                piece = pieces[c]
+                frame = data.oMi[piece.joint] * piece.frame
+                y = np.concatenate([frame.actInv(data.oMi[end.joint].act(end.point)) for end in piece.ends])
+                PRISM.value(y, piece.parameters, out)
+                axes = frame.rotation @ out[[1, 2, 3, 7, 8, 9, 10, 11, 12]].reshape(3, 3).T
+                found.force[m, c] = -axes @ along[m, c]
+                found.normal[m, c] = axes[:, 0]
+                found.point[m, c] = frame.act(out[4:7])
+        return found

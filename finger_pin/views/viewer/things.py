@@ -1,0 +1,135 @@
+"""What a finger touches, for the page: objects, and of every closed contact its force and its friction cone."""
+
+from __future__ import annotations
+
+import base64
+import math
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import xarray as xr
+
+from finger_pin.description.objects import Object
+from finger_pin.description.routing import Array
+from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command, cylinder, mesh
+
+_FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
+#: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
+_THICK, _WIDE = 0.015, 0.35
+#: Length of the longest arrow, in parts of the finger's length.
+_ARROW = 0.22
+
+
+@dataclass(frozen=True, eq=False)
+class Things:
+    """Objects around a finger, and contacts, in the frames of a page.
+
+    Attributes:
+        objects: By name.
+        free: Poses of the free ones, x, y, z and quaternion x, y, z, w, shape (m, f, 7).
+        contacts: Point, m, force on the second body, N, and normal of every contact, shape (m, c, 9).
+        steepness: mu of every contact, shape (c,): the most friction over the normal force that there was.
+        size: Length of the finger, m.
+        middle: Where the finger is, shape (3,), m.
+    """
+
+    objects: dict[str, Object]
+    free: Array
+    contacts: Array
+    steepness: Array
+    size: float
+    middle: Array
+
+    @classmethod
+    def of(cls, result: xr.Dataset, time: Array, size: float, middle: Array) -> Things | None:
+        """Read a result at the times of the frames, which are among its samples; None if it has no contacts."""
+        if "contact_force" not in result:
+            return None
+        described = tomllib.loads(result.attrs["scenario"]).get("environment", {}).get("objects", {})
+        objects = {name: Object.model_validate(each) for name, each in described.items()}
+        level, normal = result["contact_level"].values, result["contact_normal_force"].values
+        steepness = np.max(np.divide(level, normal, out=np.zeros_like(level), where=normal > 1e-6), axis=0)
+        at = result.isel(time=np.searchsorted(result["time"].values, time))
+        closed = at.isel(contact=np.flatnonzero(steepness > 0.0))
+        parts = [closed[f"contact_{name}"].values for name in ("point", "force", "normal")]
+        free = np.zeros((len(time), 0, 7))
+        if "object_position" in at:
+            free = np.concatenate([at["object_position"].values, at["object_orientation"].values], axis=-1)
+        return cls(objects, free, np.concatenate(parts, axis=-1), steepness[steepness > 0.0], size, middle)
+
+    def header(self, turn: Array) -> dict[str, Any]:
+        """Return what the page needs before the first frame; ``turn`` is the rotation of the scene."""
+        moved = [name for name, each in self.objects.items() if each.mass is not None]
+        strongest = float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
+        length = _length(_ARROW * self.size, strongest)
+        return {
+            "things": {
+                "commands": list(self._commands()),
+                "free": [f"object_{name}" for name in moved],
+                "steepness": np.round(self.steepness, 4).tolist(),
+                "length": length,
+                "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
+            },
+            "alsoInView": np.round(self._seen() @ turn.T, 5).tolist(),
+        }
+
+    def chunk(self) -> dict[str, str]:
+        """Return the frames for the page."""
+        return {name: _encode(values) for name, values in (("object", self.free), ("contact", self.contacts))}
+
+    def _seen(self) -> Array:
+        """Return where free objects are and where bodies touch, as far as that is near the finger, shape (m, 3)."""
+        places = self.free[..., :3].reshape(-1, 3)
+        points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
+        found = np.concatenate([places, points])
+        return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size][::10])
+
+    def _commands(self) -> Iterator[Command]:
+        for name, each in self.objects.items():
+            path, sizes = f"{ROOT}/object_{name}", each.sizes
+            colour = _FIXED if each.mass is None else _FREE
+            rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
+            place = np.array(each.position)
+            if each.shape == "half_space":
+                # The part of it that is nearest to the finger.
+                normal = rotation[:, 2]
+                place = self.middle - ((self.middle - place) @ normal) * normal - 0.5 * _THICK * self.size * normal
+                side = 2.0 * _WIDE * self.size
+                parts = [(_box(side, side, _THICK * self.size), np.eye(3), np.zeros(3))]
+            elif each.shape == "box":
+                parts = [(_box(*sizes), np.eye(3), np.zeros(3))]
+            elif each.shape == "sphere":
+                parts = [(_ball(sizes[0]), np.eye(3), np.zeros(3))]
+            else:
+                parts = [(cylinder(*sizes), Y_TO_Z, np.zeros(3))]
+                if each.shape == "capsule":
+                    ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
+                    parts += [(_ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
+            for index, (shape, turned, offset) in enumerate(parts):
+                yield mesh(f"{path}/part{index}", shape, turned, offset, colour, 1.6 * SOLID_OPACITY)
+            matrix = pin.SE3(rotation, place).homogeneous
+            yield {"type": "set_transform", "path": path, "matrix": [float(entry) for entry in matrix.T.ravel()]}
+
+
+def _length(longest: float, strongest: float) -> float:
+    """Return the length that stands for a newton, m: 1, 2 or 5 times a power of ten, and no arrow too long."""
+    if strongest <= 0.0:
+        return longest
+    decade = 10.0 ** math.floor(math.log10(longest / strongest))
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= longest / strongest * (1.0 + 1e-9))
+
+
+def _box(x: float, y: float, z: float) -> Command:
+    return {"type": "BoxGeometry", "width": x, "height": y, "depth": z}
+
+
+def _ball(radius: float) -> Command:
+    return {"type": "SphereGeometry", "radius": radius, "widthSegments": 32, "heightSegments": 24}
+
+
+def _encode(values: Array) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")

@@ -1,0 +1,55 @@
+"""Objects and contacts on the page, read back from what it plays."""
+
+import base64
+import json
+import re
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.views.viewer.animation import animation_page
+
+
+def played(result):
+    """Return what the page of a result plays, and a function that decodes a column of its frames."""
+    text = animation_page(result)
+    found = json.loads(re.search(r'<script type="application/json" id="animation">\n(.*?)\n</script>', text, re.S)[1])
+
+    def column(name, kind="<f4"):
+        return np.frombuffer(base64.b64decode(found["chunks"][0][name]), dtype=kind)
+
+    return found, column
+
+
+@pytest.fixture(scope="module")
+def pinched():
+    return fp.simulate(fp.load_scenario("pinch", {"simulation.duration": 0.5}))
+
+
+def test_every_object_stands_where_it_is_and_moves_as_in_the_result(pinched):
+    found, column = played(pinched)
+    things = found["things"]
+    assert things["free"] == ["object_ball"]
+    drawn = {each["path"] for each in things["commands"]}
+    assert {"/finger_pin/object_ball/part0", "/finger_pin/object_floor/part0"} <= drawn
+    time, poses = column("time", "<f8"), column("object").reshape(-1, 7)
+    at = pinched.sel(time=time)
+    assert poses[:, :3] == pytest.approx(at.object_position.values[:, 0], abs=1e-6)
+    assert poses[:, 3:] == pytest.approx(at.object_orientation.values[:, 0], abs=1e-6)
+
+
+def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_friction(pinched):
+    found, column = played(pinched)
+    assert found["things"]["steepness"] == [0.7, 0.7]
+    numbers = column("contact").reshape(-1, 2, 9)
+    at = pinched.sel(time=column("time", "<f8"), contact=["left.distal-ball", "right.distal-ball"])
+    for first, name in ((0, "contact_point"), (3, "contact_force"), (6, "contact_normal")):
+        assert numbers[..., first : first + 3] == pytest.approx(at[name].values, abs=1e-5), name
+    strongest = np.linalg.norm(at.contact_force.values, axis=-1).max()
+    assert 0.02 < found["things"]["length"] * strongest < 0.06
+
+
+def test_a_result_without_objects_has_no_things():
+    found, _ = played(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1})))
+    assert "things" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
