@@ -13,6 +13,7 @@ from .description.loading import to_toml as to_toml
 from .description.parameters import FingerDescription as FingerDescription
 from .description.scenario import Scenario as Scenario
 from .exceptions import AccuracyWarning as AccuracyWarning
+from .exceptions import ClosureWarning as ClosureWarning
 from .exceptions import FingerPinError as FingerPinError
 from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError

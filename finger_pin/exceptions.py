@@ -27,6 +27,10 @@ class AccuracyWarning(ScenarioWarning):
     """The error of a result is far more than its tolerances suggest."""
 
 
+class ClosureWarning(ScenarioWarning):
+    """A finger whose tendons run along paths loses force closure somewhere in its range."""
+
+
 class SelfLockingWarning(ScenarioWarning):
     """A scenario comes close to the joint friction at which its finger locks itself, or exceeds it."""
 

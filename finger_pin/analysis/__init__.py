@@ -5,6 +5,7 @@ It reads descriptions, fingers, scenarios and results, and nothing of the simula
 
 from __future__ import annotations
 
+from finger_pin.analysis.closure import ClosureRange, closure_over_range, locking_over_range, posed
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import (
@@ -21,6 +22,7 @@ from finger_pin.analysis.tip_force import RequiredTension, largest_force, tensio
 from finger_pin.analysis.tip_statics import Friction
 
 __all__ = [
+    "ClosureRange",
     "CriticalFriction",
     "ForcePolytope",
     "Friction",
@@ -30,6 +32,7 @@ __all__ = [
     "RequiredTension",
     "SelfLockingMap",
     "SelfLockingMargin",
+    "closure_over_range",
     "critical_friction",
     "fingertip_loads",
     "force_polytope",
@@ -37,7 +40,9 @@ __all__ = [
     "joint_reactions",
     "largest_force",
     "locking_advice",
+    "locking_over_range",
     "pin_wrench",
+    "posed",
     "self_locking_map",
     "self_locking_margin",
     "tension_for_force",

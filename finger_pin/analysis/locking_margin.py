@@ -148,11 +148,12 @@ def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
         scenario: The scenario.
         stacklevel: Of `warnings.warn`, as seen by the caller of this function.
     """
-    passive = max(len(part.finger.passive_names) for part in scenario.parts().values())
-    most = max(1, _CASES // 2**passive)
+    margin = np.inf
     # Parameters at the edge of what numbers hold have no margin: warnings of arithmetic would not help.
     with np.errstate(all="ignore"):
-        margin = self_locking_margin(scenario, most=most).margin
+        for part in scenario.parts().values():
+            most = max(1, _CASES // 2 ** len(part.finger.passive_names))
+            margin = min(margin, self_locking_margin(part, most=most).margin)
     text = locking_advice(margin)
     if text:
         warnings.warn(text, SelfLockingWarning, stacklevel=stacklevel + 1)

@@ -121,6 +121,8 @@ def force_polytope(
     statics = TipStatics.of(finger, theta, friction, (), np.zeros(len(theta)))
     left, values, _ = np.linalg.svd(statics.jacobian)
     basis = left[:, : int(np.sum(values > _RANK * np.max(values)))]
+    if not basis.shape[1]:
+        raise InputError("position", "no joint moves the fingertip there", list(position))
     extra = statics.jacobian.T @ basis
     rank = basis.shape[1]
 

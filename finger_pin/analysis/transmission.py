@@ -160,7 +160,7 @@ def transmission_in_motion(finger: Finger, result: xr.Dataset) -> TransmissionIn
     command, delivered, speed, normal, curvature = (
         np.array(result[name].transpose("time", "tendon").values)
         for name in (
-            "tendon_command",
+            "spool_tension" if "spool_tension" in result else "tendon_command",
             "tendon_tension",
             "tendon_velocity",
             "tendon_normal_force",

@@ -142,11 +142,9 @@ def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> B
     try:
         if drawing is not None:
             drawing.start(result, folder.stage / "figures")
-        from finger_pin.views.trees import is_tree
         from finger_pin.views.viewer import write_animation
 
-        if not is_tree(result):
-            write_animation(result, folder.stage / "animation.html")
+        write_animation(result, folder.stage / "animation.html")
         if drawing is not None:
             drawing.wait()
     except OSError:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from finger_pin.analysis import critical_friction
+from finger_pin.analysis import closure_over_range, critical_friction
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Distribution, PseudoInverse
 from finger_pin.control.fingertip import FingertipForce
@@ -17,14 +18,15 @@ from finger_pin.control.joint_compensation import JointCompensation
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import Controller, ProportionalController
+from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
-from finger_pin.description.routing import Array
+from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.description.validation import Numbers, expand
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import ClosureWarning, InputError
 from finger_pin.mechanism.finger import Finger
 
 
@@ -43,17 +45,20 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
     Raises:
         InputError: If the joint friction that it is to compensate is believed to lock the finger.
     """
-    finger = finger or Finger(scenario.finger)
+    routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)
     parts = scenario.parts()
     if len(parts) > 1:
-        return joined_controller([build_controller(part) for part in parts.values()], finger.routing)
+        return joined_controller([build_controller(part) for part in parts.values()], routing)
     scenario = next(iter(parts.values()))
     settings = scenario.controller
     if settings.kind == "tensions":
-        return OpenLoopTensions.from_scenario(scenario, finger.routing)
-    taut = finger.routing.force_closure().holds
+        return OpenLoopTensions.from_scenario(scenario, routing)
+    if any(tendon.along for tendon in scenario.finger.tendons.values()):
+        return _routed(scenario, finger or Finger(scenario.finger))
+    taut = routing.force_closure().holds
     if settings.is_paper and taut:
-        return ProportionalController.from_scenario(scenario, finger.routing)
+        return ProportionalController.from_scenario(scenario, routing)
+    finger = finger or Finger(scenario.finger)
     joints, tendons = len(finger.routing.joints), len(finger.routing.tendons)
     controller = CompensatedController(
         routing=finger.routing,
@@ -73,6 +78,20 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> Contro
         return controller
     wish = expand(settings.passive_tension, finger.routing.passive)
     return PassiveTensionLoop(controller, wish, loop.proportional, loop.integral, loop.limit)
+
+
+def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
+    """Return the controller of a finger whose arms depend on the posture; warn where it loses force closure."""
+    settings, size = scenario.controller, len(finger.routing.joints)
+    closure = closure_over_range(finger)
+    if not closure.holds:
+        warnings.warn(f"{closure}: tendons go slack or turn joints there", ClosureWarning, stacklevel=4)
+    law = TorqueLaw(
+        gain=expand(settings.gain, size),
+        damping=expand(settings.damping, size),
+        static=_static(finger, settings.gravity_compensation, settings.spring_compensation),
+    )
+    return RoutedController(finger, law, expand(settings.minimum_tension, len(finger.routing.tendons)))
 
 
 def _distribution(scenario: Scenario, finger: Finger) -> Distribution:

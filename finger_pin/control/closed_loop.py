@@ -14,10 +14,12 @@ from finger_pin.control.hand import HandController, joined_controller
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
+from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
@@ -26,6 +28,7 @@ from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.state import State
 
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
@@ -40,13 +43,17 @@ Samples = tuple[ArrayLike, ArrayLike]
 class Dynamics(Protocol):
     """Anything that evaluates a finger: `Finger`, or the compiled core."""
 
-    def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
-        """Return all signals at packed states under given tensions."""
+    def evaluate(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return all signals at packed states under given tensions, on a base that moves or rests."""
 
-    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+    def powers(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return powers of the rows, and J^T F."""
 
-    def motion(self, position: Array, velocity: Array) -> Motion:
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body."""
 
 
@@ -74,6 +81,7 @@ class ClosedLoop:
         drives: Of motors in position drive; None without any.
         parts: Of a hand whose controller and reference are the scenario's, the loops of its fingers, each alone on the
             palm; otherwise none.
+        palm: Along which path the palm of a hand moves; None at rest.
     """
 
     finger: Finger
@@ -85,6 +93,7 @@ class ClosedLoop:
     start: Array | None = None
     drives: PositionDrives | None = None
     parts: tuple[ClosedLoop, ...] = ()
+    palm: PalmPath | None = None
 
     @classmethod
     def from_scenario(
@@ -132,6 +141,7 @@ class ClosedLoop:
             dynamics=finger,
             # Fingers that may touch something are not apart.
             parts=parts if finger.surroundings is None else (),
+            palm=PalmPath.of(scenario.hand, start),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
@@ -152,9 +162,11 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
-        tension = None
-        if self.finger.actuators.names and isinstance(self.controller, _ANSWERS_ALIKE):
-            planned = self.controller.command(0.0, self.reference.at(0.0), position, velocity)
+        controller, tension = self.controller, None
+        if isinstance(controller, PassiveTensionLoop):
+            controller = controller.controller
+        if self.finger.actuators.names and isinstance(controller, _ANSWERS_ALIKE):
+            planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
 
@@ -186,7 +198,8 @@ class ClosedLoop:
         signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
         if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
             signals.append(self.controller.fingertip.wanted)
-        found = [each.knots for each in (*signals, self.varying_force) if each and not each.is_harmonic]
+        signals += [each for each in (self.varying_force, self.palm and self.palm.signal) if each]
+        found = [each.knots for each in signals if not each.is_harmonic]
         return np.unique(np.concatenate([np.zeros(0), *found]))
 
     def longest_step(self) -> float:
@@ -201,7 +214,25 @@ class ClosedLoop:
         command = self._command(time, control)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        return LoopSignals(reference, control, self.dynamics.evaluate(x, command, self.force(time)))
+        finger = self.dynamics.evaluate(x, command, self.force(time), self.base(time))
+        return LoopSignals(reference, control, finger)
+
+    def base(self, time: Array | float) -> Array | None:
+        """Return how the palm moves at one time, shape (27,), or at times of shape (m,), (m, 27); None at rest."""
+        return None if self.palm is None else self.palm.base(time)
+
+    def motion(self, time: Array, state: State) -> Motion:
+        """Return fingertips and energies at times (m,) and states, in the world: the base frame of a palm at rest."""
+        base, around, objects = self.base(time), self.finger.surroundings, None
+        found = self.dynamics.motion(state.position, state.velocity, base)
+        if around is not None and state.object_pose is not None and state.object_velocity is not None:
+            objects = around.energies(state.object_pose, state.object_velocity, base)
+        if self.palm is not None:
+            found = self.palm.to_world(time, found, self.finger.rigid_body.mass)
+            if around is not None and objects is not None:
+                lifted = objects[1] - np.sum(around.mass) * self.palm.place(time)[0] @ self.palm.gravity
+                objects = objects[0], lifted
+        return replace(found, objects=objects)
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:
         """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
@@ -215,7 +246,7 @@ class ClosedLoop:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
         state, reference = self.finger.layout.unpack(x), self.reference.at(time)
         control = self.controller.command(time, reference, state.position, state.velocity)
-        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time))
+        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time), self.base(time))
         joints = state.velocity.shape[-1]
         fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)
@@ -230,9 +261,8 @@ def _controller(given: Controller | Samples | None, scenario: Scenario, finger: 
         return build_controller(scenario, finger)
     if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    if isinstance(
-        given, ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
-    ):
+    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
+    if isinstance(given, own | RoutedController):
         return given
     kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
     return kind(given, finger.routing, scenario.simulation.start_time)

@@ -19,7 +19,7 @@ def compiled_control(loop: ClosedLoop) -> Control | None:
     """Return a loop's controller, reference and varying force as arrays, or None where the first two are Python."""
     controller, reference, mechanism = loop.controller, loop.reference, loop.finger.mechanism
     control = None
-    if len(loop.finger.actuators.positioned) == loop.finger.routing.actuated:
+    if len(loop.finger.actuators.positioned) == mechanism.channels:
         # Nothing of what the controller plans goes to the finger at once.
         control = held_control(mechanism.channels, mechanism.coordinates)
     elif isinstance(controller, OpenLoopTensions):
@@ -68,7 +68,9 @@ def paper_control(controller: ProportionalController, reference: SignalReference
 
 
 def with_force(control: Control, loop: ClosedLoop) -> Control:
-    """Return inputs with what varies of the force at the fingertip; the constant part goes with it."""
+    """Return inputs with the path of the palm and what varies of the force at the fingertip, with its constant part."""
+    if loop.palm is not None:
+        control = control._replace(palm=_arrays(loop.palm.signal))
     if loop.varying_force is None:
         return control
     force = _arrays(loop.varying_force)

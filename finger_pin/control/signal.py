@@ -110,6 +110,24 @@ class Signal:
         moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
         return value + quintic(since, *factors), rate + moving * quintic_rate(since, *factors[:-1])
 
+    def derivative(self, time: Array | float, order: int) -> Array:
+        """Return a time derivative of a given order at one time, shape (k,), or at times of shape (m,), (m, k)."""
+        instant = np.asarray(time, dtype=float)[..., None]
+        offset, amplitude, frequency, phase = self.harmonics.T
+        circular = 2.0 * np.pi * frequency
+        value = (offset if order == 0 else 0.0) + amplitude * circular**order * np.sin(
+            circular * instant + phase + 0.5 * np.pi * order
+        )
+        if self.is_harmonic:
+            return np.asarray(value)
+        inside = np.minimum(np.maximum(instant, self.knots[0]), self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], inside, side="right")
+        since, factors = inside - self.knots[piece], self.coefficients[:, piece[..., 0]]
+        powers = np.arange(_ORDER - 1, order - 1, -1)
+        terms = [math.perm(int(n), order) * c * since ** (n - order) for n, c in zip(powers, factors, strict=False)]
+        moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
+        return np.asarray(value + sum(terms) * (moving | (order == 0)))
+
     def later(self, start: float) -> Signal:
         """Return the signals with their time counted from a start, s."""
         harmonics = self.harmonics.copy()

@@ -90,6 +90,7 @@ def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
     for j in range(width):
         for c in range(wide):
             force[j, c] = 0.0
+        force[j, last] -= linear.bias_rate[j]
     if tables.loaded:
         for t in range(tables.tip_body.size):
             for j in range(width):

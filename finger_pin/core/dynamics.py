@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import inputs, tip_forces
+from finger_pin.core.inputs import inputs, move_base, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
 from finger_pin.core.paths import measure_paths, passes, push
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
@@ -130,6 +130,7 @@ def evaluate(tables: Any, control: Any, time: float, x: Any, work: Any, rate: An
     size, width = tables.parents.size, work.torque.size
     q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
     inputs(control, time, q, v, work.command)
+    move_base(control, time, tables, work)
     move(tables, q, v, work)
     if tables.loaded:
         tip_forces(control, time, tables)

@@ -40,10 +40,10 @@ class CompiledMechanism:
         work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
         return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work)
 
-    def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
+    def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
         mechanism, several = self.mechanism, np.ndim(x) > 1
-        packed, filled = self._filled(x, command, force, len(self._models[0].model.work.rows))
+        packed, filled = self._filled(x, command, force, base, len(self._models[0].model.work.rows))
         rates, rows, torques, externals, booked = filled
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         acceleration, rate = rates[:, width : 2 * width], rates
@@ -67,14 +67,27 @@ class CompiledMechanism:
             shown = tuple(own[SIGNALS + i, ..., ::arms] for i in range(len(table.law.signals)))
             found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE][..., stateful], shown)
             begin = end
-        return Evaluation(mechanism.books, found, torques[at], externals[at], acceleration[at], rate[at], booked[at])
+        return Evaluation(
+            mechanism.books,
+            found,
+            torques[at],
+            externals[at],
+            acceleration[at],
+            rate[at],
+            base_power=booked[at][..., -1:] if mechanism.moved else None,
+            booked=booked[at],
+        )
 
-    def powers(self, x: Array, command: Array, force: Array | None = None) -> tuple[Array, Array]:
+    def powers(
+        self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
-        _, (_, _, _, externals, booked) = self._filled(x, command, force, 0)
+        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, 0)
         return booked[:, len(self.mechanism.books.stored) :], externals
 
-    def _filled(self, x: Array, command: Array, force: Array | None, columns: int) -> tuple[Array, tuple[Array, ...]]:
+    def _filled(
+        self, x: Array, command: Array, force: Array | None, base: Array | None, columns: int
+    ) -> tuple[Array, tuple[Array, ...]]:
         """Return packed states, and what `evaluate_many` fills for them, with so many columns of the rows."""
         mechanism, tables = self.mechanism, self._models[0].model.tables
         # Compiled code checks no sizes.
@@ -87,6 +100,7 @@ class CompiledMechanism:
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
+        bases = _bases(base, count)
         states, attitudes = self._charts.to_core(packed)
         books = len(mechanism.books.stored) + len(mechanism.books.powers)
         rates, rows = np.zeros_like(states), np.zeros((count, columns, len(tables.state)))
@@ -103,6 +117,7 @@ class CompiledMechanism:
                 torques[part],
                 externals[part],
                 booked[part],
+                bases[part],
             )
 
         if len(tables.charts):
@@ -118,12 +133,16 @@ class CompiledMechanism:
             in_threads(lambda each: fill(*each), list(zip(models, (slice(half), slice(half, None)), strict=True)))
         return packed, (rates, np.moveaxis(rows, 1, 0), torques, externals, booked)
 
-    def motion(self, position: Array, velocity: Array) -> Motion:
-        """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n)."""
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
+        """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n).
+
+        With a base that moves, energies are those of the motion in the world, where the base has no height.
+        """
         tables = self._models[0].model.tables
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
-        motion_many(self._models[0].address, _rows(position, shape), _rows(velocity, shape), tips, kinetic, potential)
+        given = _rows(position, shape), _rows(velocity, shape)
+        motion_many(self._models[0].address, *given, tips, kinetic, potential, _bases(base, shape[0]))
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
 
@@ -142,20 +161,29 @@ class CompiledFinger:
         # Fingertip and energies are those of the finger alone.
         self._alone = self._mechanism
         if finger.surroundings is not None:
-            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, []))
+            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, [], moved=finger.mechanism.moved))
 
-    def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
+    def evaluate(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
-        found = self._mechanism.evaluate(x, command, fingertip_force)
+        found = self._mechanism.evaluate(x, command, fingertip_force, base)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
 
-    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+    def powers(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
-        return self._mechanism.powers(x, command, fingertip_force)
+        return self._mechanism.powers(x, command, fingertip_force, base)
 
-    def motion(self, position: Array, velocity: Array) -> Motion:
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""
-        return self._alone.motion(position, velocity)
+        return self._alone.motion(position, velocity, base)
+
+
+def _bases(base: Array | None, count: int) -> Array:
+    """Return how the base moves, shape (count, 15), or of no rows where it rests."""
+    return np.zeros((0, 15)) if base is None else _rows(base[..., :15], (count, 15))
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -13,12 +13,14 @@ from finger_pin.core.law_code import inlined
 from finger_pin.core.trigonometry import sine_cosine
 from finger_pin.description.routing import Array
 from finger_pin.laws import controller as controller_laws
+from finger_pin.laws import palm as palm_laws
 from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
 
 HELD, PLANNED, SCHEDULED = range(3)
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
+_base_motion = inlined(palm_laws.base_motion)
 _quintic = inlined(quintic)
 _quintic_rate = inlined(quintic_rate)
 _quintic_curvature = inlined(quintic_curvature)
@@ -57,6 +59,7 @@ class Control(NamedTuple):
         force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
         damping: K_D, shape (N,).
         damped: Whether it is not zero.
+        palm: Path of the base: x, y, z, roll, pitch, yaw, or no functions for a base at rest.
         desired, rate, acceleration: Memory, tau^d, then theta^d' and theta^d'', shape (N,).
         planned: Memory, f_hat, shape (T,).
         active: Memory, the tension that sets lambda, by controller.
@@ -81,6 +84,7 @@ class Control(NamedTuple):
     force: Signal
     damping: Vector
     damped: bool
+    palm: Signal
     desired: Vector
     rate: Vector
     acceleration: Vector
@@ -182,6 +186,7 @@ def _control(
         force=no_signal(),
         damping=np.zeros(coordinates),
         damped=False,
+        palm=no_signal(),
         desired=np.zeros(coordinates),
         rate=np.zeros(coordinates),
         acceleration=np.zeros(coordinates),
@@ -351,3 +356,56 @@ def tip_force_rates(control: Any, time: float, rates: Any) -> None:
     """Fill their time derivatives, shape (t, 3)."""
     if control.force.harmonics.shape[0] > 0:
         signal_rates(control.force, time, rates.reshape(-1))
+
+
+@compiled
+def _derivative(signal: Any, j: int, time: float, order: int) -> Any:
+    """Return a time derivative of function j, of order 0 to 3."""
+    table, knots = signal.harmonics, signal.knots
+    circular = 2.0 * np.pi * table[j, 2]
+    value = table[j, 1] * circular**order * np.sin(circular * time + table[j, 3] + 0.5 * np.pi * order)
+    if order == 0:
+        value += table[j, 0]
+    if knots.size > 0 and (order == 0 or knots[0] <= time < knots[knots.size - 1]):
+        piece, since = _piece(signal, time)
+        polynomial = 0.0
+        for power in range(5, order - 1, -1):
+            factor = signal.coefficients[5 - power, piece, j]
+            for n in range(order):
+                factor *= power - n
+            polynomial = polynomial * since + factor
+        value += polynomial
+    return value
+
+
+@compiled
+def _coordinates(signal: Any, time: float, order: int) -> Any:
+    return (
+        _derivative(signal, 0, time, order),
+        _derivative(signal, 1, time, order),
+        _derivative(signal, 2, time, order),
+        _derivative(signal, 3, time, order),
+        _derivative(signal, 4, time, order),
+        _derivative(signal, 5, time, order),
+    )
+
+
+@compiled
+def move_base(control: Any, time: float, tables: Any, work: Any) -> None:
+    """Fill velocity and acceleration of the base, and their rates, where it moves."""
+    if control.palm.harmonics.shape[0] == 0:
+        return
+    place = _coordinates(control.palm, time, 0)
+    turns = sine_cosine(place[3]) + sine_cosine(place[4]) + sine_cosine(place[5])
+    found = _base_motion(
+        _coordinates(control.palm, time, 1),
+        _coordinates(control.palm, time, 2),
+        _coordinates(control.palm, time, 3),
+        turns,
+        (tables.gravity[0], tables.gravity[1], tables.gravity[2]),
+    )
+    for k in range(6):
+        work.base_velocity[k] = found[k]
+        work.base_acceleration[k] = found[6 + k]
+        work.base_rate[0, k] = found[15 + k]
+        work.base_rate[1, k] = found[21 + k]

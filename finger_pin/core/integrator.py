@@ -189,7 +189,7 @@ def integrate_compiled(
         failure=reason,
         interrupted=interrupted,
         # Of a controller that acts in between, the linearised flow knows nothing.
-        estimated_error=np.nan if held is not None else stepper.estimated_error,
+        estimated_error=np.nan if held is not None or stepper.driven else stepper.estimated_error,
         islands=()
         if alone or any(len(each.attitude) for each in steps)
         else tuple(_apart(each, stepper) for each in steps),

@@ -11,7 +11,7 @@ from finger_pin.core.compilation import compiled
 from finger_pin.core.inputs import input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.paths import linearise_paths, passes, turn_pushes
-from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
+from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, bias_rate, inverse_dynamics
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.tables import END, FIRST, Tables
 
@@ -26,6 +26,7 @@ class Linear(NamedTuple):
         mass: M with the lumps, shape (N, N).
         by_position: d(M a + h - J^T F)/dq at the actual acceleration, shape (N, N).
         by_velocity: dh/dv, shape (N, N).
+        bias_rate: dh/dt by the motion of the base, shape (N,).
         arm: dl'/dv, shape (arms,).
         measure: dl/dq, shape (arms,).
         turning: dl'/dq at constant v, shape (arms,).
@@ -46,6 +47,7 @@ class Linear(NamedTuple):
     mass: Matrix
     by_position: Matrix
     by_velocity: Matrix
+    bias_rate: Vector
     arm: Vector
     measure: Vector
     turning: Vector
@@ -76,6 +78,7 @@ def build_linear(tables: Tables) -> Linear:
         mass=mass,
         by_position=np.zeros((width, width)),
         by_velocity=np.zeros((width, width)),
+        bias_rate=np.zeros(width),
         arm=tables.arm.copy(),
         measure=tables.measure.copy(),
         turning=np.zeros(len(tables.arm)),
@@ -172,6 +175,8 @@ def linearise(tables: Any, control: Any, time: float, x: Any, work: Any, linear:
             linear.mass[i, j] = work.square[MASS_MATRIX, i, j]
             linear.by_position[i, j] = work.square[BY_POSITION, i, j]
             linear.by_velocity[i, j] = work.square[BY_VELOCITY, i, j]
+    if control.palm.harmonics.shape[0] > 0:
+        bias_rate(tables, velocity, work, linear.bias_rate)
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)

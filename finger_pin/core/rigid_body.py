@@ -104,14 +104,10 @@ def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
             axis[3] = origin[1] * z - origin[2] * y
             axis[4] = origin[2] * x - origin[0] * z
             axis[5] = origin[0] * y - origin[1] * x
-        if parent < 0:
-            for k in range(6):
-                work.spatial[AXIS_RATE, i, k] = 0.0
-                work.spatial[MOTION, i, k] = axis[k] * velocity[i]
-        else:
-            motion_cross(work.spatial[MOTION, parent], axis, work.spatial[AXIS_RATE, i])
-            for k in range(6):
-                work.spatial[MOTION, i, k] = work.spatial[MOTION, parent, k] + axis[k] * velocity[i]
+        above = work.base_velocity if parent < 0 else work.spatial[MOTION, parent]
+        motion_cross(above, axis, work.spatial[AXIS_RATE, i])
+        for k in range(6):
+            work.spatial[MOTION, i, k] = above[k] + axis[k] * velocity[i]
         for k in range(10):
             work.composite[i, k] = work.inertia[i, k]
     for i in range(tables.parents.size - 1, -1, -1):
@@ -141,6 +137,44 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
     for i in range(size - 1, -1, -1):
         own = acceleration[i] if moving else 0.0
         torque[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i]) + tables.bodies[i, ARMATURE] * own
+        if tables.parents[i] >= 0:
+            for k in range(6):
+                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
+
+
+@compiled
+def base_power(tables: Any, velocity: Any, work: Any) -> Any:
+    """Return the power that a moving base supplies, W, after an evaluation: its velocity times what it exerts."""
+    inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
+    power = 0.0
+    for i in range(tables.parents.size):
+        if tables.parents[i] < 0:
+            power += dot(work.base_velocity, work.spatial[FORCE, i])
+    return power
+
+
+@compiled
+def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
+    """Fill the time derivative of inverse dynamics at a given motion where the base moves, shape (n,).
+
+    All velocities change alike, by dV; accelerations by that of the base and by dV x S v of every joint before. What
+    an evaluation has left in two layers is overwritten.
+    """
+    size, change = tables.parents.size, work.base_rate[0]
+    for i in range(size):
+        parent = tables.parents[i]
+        own, force = work.spatial[AXIS_CURVE, i], work.spatial[FORCE, i]
+        above = work.base_rate[1] if parent < 0 else work.spatial[AXIS_CURVE, parent]
+        motion_cross(change, work.spatial[AXIS, i], work.vectors[0])
+        for k in range(6):
+            own[k] = above[k] + work.vectors[0][k] * velocity[i]
+        apply_inertia(work.inertia[i], own, force)
+        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
+        add_force_cross(change, work.vectors[0], force)
+        apply_inertia(work.inertia[i], change, work.vectors[0])
+        add_force_cross(work.spatial[MOTION, i], work.vectors[0], force)
+    for i in range(size - 1, -1, -1):
+        out[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
         if tables.parents[i] >= 0:
             for k in range(6):
                 work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]

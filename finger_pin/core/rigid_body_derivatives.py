@@ -67,14 +67,12 @@ def inverse_dynamics_derivatives(tables: Any, velocity: Any, work: Any) -> None:
         parent = tables.parents[i]
         _coriolis_block(work.inertia[i], work.spatial[MOTION, i], work.coriolis[i])
         # axis_curve = a_parent x S + v_parent x (v_parent x S)
-        if parent < 0:
-            motion_cross(work.base_acceleration, work.spatial[AXIS, i], work.spatial[AXIS_CURVE, i])
-        else:
-            above = work.spatial[SPATIAL_ACCELERATION, parent]
-            motion_cross(above, work.spatial[AXIS, i], work.spatial[AXIS_CURVE, i])
-            motion_cross(work.spatial[MOTION, parent], work.spatial[AXIS_RATE, i], work.vectors[0])
-            for k in range(6):
-                work.spatial[AXIS_CURVE, i, k] += work.vectors[0][k]
+        above = work.base_acceleration if parent < 0 else work.spatial[SPATIAL_ACCELERATION, parent]
+        carried = work.base_velocity if parent < 0 else work.spatial[MOTION, parent]
+        motion_cross(above, work.spatial[AXIS, i], work.spatial[AXIS_CURVE, i])
+        motion_cross(carried, work.spatial[AXIS_RATE, i], work.vectors[0])
+        for k in range(6):
+            work.spatial[AXIS_CURVE, i, k] += work.vectors[0][k]
         for j in range(size):
             by_position[i, j] = 0.0
             by_velocity[i, j] = 0.0

@@ -8,7 +8,7 @@ from finger_pin.core.binding import bound_at, call_at
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.model import MODEL
-from finger_pin.core.rigid_body import ARMATURE, MOTION, move
+from finger_pin.core.rigid_body import ARMATURE, MOTION, base_power, move
 from finger_pin.core.tables import END, FIRST
 
 
@@ -37,6 +37,7 @@ def evaluate_many(
     torques: Any,
     externals: Any,
     booked: Any,
+    bases: Any,
 ) -> None:
     """Evaluate states of one island under given inputs; its control must hold them.
 
@@ -49,7 +50,8 @@ def evaluate_many(
         rows: Filled with the table of rows, shape (m, columns, K), or of no columns.
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
-        booked: Filled with energies and powers, shape (m, books).
+        booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
+        bases: Velocity, acceleration and gravity of the base, shape (m, 15), or (0, 15) at rest.
     """
     model = bound_at(address, MODEL)
     tables, control, work = model.tables, model.control, model.work
@@ -61,6 +63,7 @@ def evaluate_many(
                 tables.tip_force[t, r] = forces[m, t, r]
         for c in range(states.shape[1]):
             model.state[c] = states[m, c]
+        _set_base(bases, m, tables, work)
         call_at(model.evaluate, address, 0.0)
         for c in range(states.shape[1]):
             rates[m, c] = model.rate[c]
@@ -71,14 +74,34 @@ def evaluate_many(
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]
         _book(tables, work, booked[m])
+        if bases.shape[0] > 0:
+            width = torques.shape[1]
+            booked[m, booked.shape[1] - 1] = base_power(tables, model.state[width : 2 * width], work)
+
+
+@compiled
+def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
+    """Set the motion of the base to the m-th, or to rest."""
+    for k in range(6):
+        moved = bases.shape[0] > 0
+        work.base_velocity[k] = bases[m, k] if moved else 0.0
+        rest = -tables.gravity[k - 3] if k >= 3 else 0.0
+        work.base_acceleration[k] = bases[m, 6 + k] if moved else rest
 
 
 @entry
-def motion_many(address: int, positions: Any, velocities: Any, tips: Any, kinetic: Any, potential: Any) -> None:
-    """Fill positions of the tips (m, t, 3) and energies (m,) at positions and velocities of the bodies (m, n)."""
+def motion_many(
+    address: int, positions: Any, velocities: Any, tips: Any, kinetic: Any, potential: Any, bases: Any
+) -> None:
+    """Fill positions of the tips (m, t, 3) and energies (m,) at positions and velocities of the bodies (m, n).
+
+    With a base that moves, ``bases`` as for `evaluate_many`, energies are those of the motion in the world, where the
+    base has no height.
+    """
     model = bound_at(address, MODEL)
     tables, work = model.tables, model.work
     for m in range(positions.shape[0]):
+        _set_base(bases, m, tables, work)
         move(tables, positions[m], velocities[m], work)
         for t in range(tips.shape[1]):
             body = tables.tip_body[t]
@@ -101,6 +124,7 @@ def motion_many(address: int, positions: Any, velocities: Any, tips: Any, kineti
             moving += 2.0 * v[5] * (v[0] * inertia[2] - v[1] * inertia[1])
             moving += tables.bodies[i, ARMATURE] * velocities[m, i] * velocities[m, i]
             for r in range(3):
-                lifted -= tables.gravity[r] * inertia[1 + r]
+                weight = bases[m, 12 + r] if bases.shape[0] > 0 else tables.gravity[r]
+                lifted -= weight * inertia[1 + r]
         kinetic[m] = 0.5 * moving
         potential[m] = lifted

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.binding import block_for
 from finger_pin.core.charts import Charts, place_all
+from finger_pin.core.drives import Drives, advance_driven
 from finger_pin.core.inputs import Control
 from finger_pin.core.islands import Island, find_islands, select, select_control
 from finger_pin.core.model import BoundModel
@@ -69,7 +70,10 @@ class Part:
         attitude: Quaternions of its free bodies, shape (f, 4).
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters.
+        drives: Loops of motors in position drive, which sample on the way; None for none.
     """
+
+    drives: Drives | None = None
 
     def __init__(
         self,
@@ -122,7 +126,11 @@ class Part:
     def advance(self, end: float, record: Record | None = None) -> tuple[int, int]:
         """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
         into = self._nothing if record is None else record
-        status, steps = core.advance(self._block, end, into.times, into.states, into.attitudes, into.dense)
+        room = (into.times, into.states, into.attitudes, into.dense)
+        if self.drives is None:
+            status, steps = core.advance(self._block, end, *room)
+        else:
+            status, steps = advance_driven(self._block, self.drives, end, *room)
         return status, steps
 
     def restart(self, x: Array, attitude: Array) -> None:
@@ -239,6 +247,11 @@ class Stepper:
         return self._charts.packed_places(self._places(island))
 
     @property
+    def driven(self) -> bool:
+        """Whether loops of motors run."""
+        return any(part.drives is not None for part in self.parts)
+
+    @property
     def estimated_error(self) -> float:
         """Estimate of the error of the joints' angles so far, root mean square over joints and time, rad.
 
@@ -277,10 +290,18 @@ class Stepper:
         for part, free in zip(self.parts, self._free, strict=True):
             part.restart(start[self._places(part.island)], attitude[free])
 
+    def drive(self, drives: Drives) -> None:
+        """Let loops of motors run from now on, in a mechanism that is one island, as every finger is."""
+        (part,) = self.parts
+        part.drives = drives
+
     def hold(self, inputs: Array) -> None:
-        """Hold inputs from now on, shape (channels,)."""
+        """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
         for part in self.parts:
+            driven = np.zeros(0, dtype=np.int64) if part.drives is None else part.drives.channels
+            voltages = part.control.tension[driven]
             part.control.tension[:] = inputs[part.island.channels]
+            part.control.tension[driven] = voltages
 
     def load(self, force: Array) -> None:
         """Set the forces at the tips, shape (3,) or (t, 3), N, base frame."""

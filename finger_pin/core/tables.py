@@ -125,6 +125,8 @@ class Work(NamedTuple):
     """Memory of one evaluation and its linearisation; never holds anything between calls.
 
     Attributes:
+        base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
+        base_rate: Their rates, shape (2, 6).
         rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
         slopes: Derivatives of the laws, shape (SLOPES, K).
         powers: Stored energy and powers of the rows, shape (1 + powers, K).
@@ -143,7 +145,9 @@ class Work(NamedTuple):
     origin: Matrix
     frame: Matrix
     centre: Vector
+    base_velocity: Vector
     base_acceleration: Vector
+    base_rate: Matrix
     spatial: Layers
     inertia: Matrix
     composite: Matrix
@@ -340,7 +344,9 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         origin=np.zeros((size, 3)),
         frame=np.zeros((3, 3)),
         centre=np.zeros(3),
+        base_velocity=np.zeros(6),
         base_acceleration=base,
+        base_rate=np.zeros((2, 6)),
         spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
         inertia=np.zeros((size, 10)),
         composite=np.zeros((size, 10)),

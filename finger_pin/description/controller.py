@@ -202,6 +202,12 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
         raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")
 
 
+_NOT_ROUTED = (
+    "tendon_friction_feedforward",
+    "joint_friction_compensation",
+    "passive_tension_loop",
+    "distribution",
+)
 # What only the controller (19)-(22) has.
 _CLOSED_LOOP = (
     "gain",
@@ -227,6 +233,10 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
     if settings.kind == "proportional":
         if finger.tree is not None and (actuators or not finger.tendons):
             raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
+        if any(tendon.along for tendon in finger.tendons.values()):
+            for entry in _NOT_ROUTED:
+                if getattr(settings, entry) is not None:
+                    raise problem(f"controller.{entry}", "is not for tendons along paths; leave it out")
         if settings.tensions is not None:
             raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from functools import reduce
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.parameters import (
     FingerDescription,
@@ -20,15 +20,49 @@ from finger_pin.description.parameters import (
     TendonFriction,
 )
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import IN_RADIANS, Description, Name, expand, problem, quantity, real, vector
+from finger_pin.description.signals import SignalSettings
+from finger_pin.description.validation import (
+    IN_RADIANS,
+    Description,
+    Name,
+    expand,
+    nearest,
+    problem,
+    quantity,
+    real,
+    series,
+    vector,
+)
 from finger_pin.exceptions import InputError
 
 _MILLIMETRES = " m (is it in millimetres?)"
 _PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
 
 
+#: The coordinates of a palm's path: place, m, and roll, pitch and yaw, rad, in the world.
+PATH = ("x", "y", "z", "roll", "pitch", "yaw")
+_COORDINATE = real(-12.5, 12.5)
+
+
+class PathSignal(SignalSettings):
+    """A coordinate of the palm over time: m for x, y, z, rad for roll, pitch, yaw."""
+
+    offset: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Mean.")
+    amplitude: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Half the swing.")
+    height: Annotated[float, _COORDINATE] | None = quantity(None, unit="m or rad", source="chosen", doc="Of none.")
+    values: Annotated[tuple[float, ...], series(-12.5, 12.5)] | None = quantity(
+        None, unit="m or rad", source="chosen", doc="At the points or samples."
+    )
+
+    @model_validator(mode="after")
+    def _accelerates(self) -> Self:
+        if self.kind in ("step", "ramp"):
+            raise problem("kind", "must be one of sine, points, samples: a palm has an acceleration", self.kind)
+        return self
+
+
 class Palm(Description):
-    """What the fingers stand on: the base frame of the hand."""
+    """What the fingers stand on: the base frame of the hand, at rest or moved along a path."""
 
     size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, _MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Sides of the box that is drawn; zero for none."
@@ -36,12 +70,37 @@ class Palm(Description):
     centre: Annotated[tuple[float, float, float], _PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the box, in the palm's frame."
     )
+    path: dict[Name, PathSignal] | None = Field(
+        None, description="Where the palm is in the world over time, by x, y, z, roll, pitch and yaw; at rest without."
+    )
+
+    @field_validator("path")
+    @classmethod
+    def _coordinates(cls, value: dict[str, PathSignal] | None) -> dict[str, PathSignal] | None:
+        for name in value or {}:
+            if name not in PATH:
+                near = nearest(name, PATH)
+                hint = f"; did you mean {near}?" if near else ""
+                raise problem(name, f"no such coordinate; there are {', '.join(PATH)}{hint}")
+        return value
+
+    def on_path(self, name: str) -> PathSignal:
+        """Return a coordinate of the path; zero where it is left out."""
+        return (self.path or {}).get(name, PathSignal())
 
 
 class PlacedFinger(Description):
     """A finger and where its base frame stands on the palm."""
 
     finger: FingerDescription
+
+    @field_validator("finger")
+    @classmethod
+    def _made_of_links(cls, value: FingerDescription) -> FingerDescription:
+        if value.tree is not None:
+            raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
+        return value
+
     position: Annotated[tuple[float, float, float], _PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its base frame, in the palm's frame."
     )
@@ -59,14 +118,14 @@ class PlacedFinger(Description):
 
 
 class HandDescription(Description):
-    """A hand. Its gravity, in the palm's frame, replaces that of the fingers."""
+    """A hand. Its gravity, in the world's frame, replaces that of the fingers; a palm at rest has that frame."""
 
     file_keys = ("base",)
 
     name: Name = Field(description="Of the hand.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
-        (0.0, 0.0, -9.81), unit="m/s2", source="palm down", doc="In the palm's frame."
+        (0.0, 0.0, -9.81), unit="m/s2", source="palm down", doc="In the world's frame."
     )
     palm: Palm = Palm()
     fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="By name.")

@@ -138,7 +138,8 @@ class Tendon(Description):
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
         0.0, unit="rad", source="(15)", doc="phi_off, curvature of the path at theta = 0."
     )
-    crossings: dict[Name, Crossing] = Field(min_length=1, description="By joint, in order along the tendon.")
+    crossings: dict[Name, Crossing] = Field({}, description="By joint, in order along the tendon.")
+    along: Name | None = Field(None, description="In place of crossings: the tendon of the tree whose path it takes.")
     mass_after: int | None = Field(
         None,
         ge=0,
@@ -152,6 +153,14 @@ class Tendon(Description):
             raise problem("mass_after", "is for passive tendons only", self.mass_after)
         if self.mass_after is not None and self.mass_after > len(self.crossings):
             raise problem("mass_after", f"must be at most the {len(self.crossings)} crossings", self.mass_after)
+        if self.along is not None:
+            if self.crossings:
+                raise problem("along", "has no place beside crossings", self.along)
+            if self.kind == "passive":
+                raise problem("along", "is for actuated tendons only", self.along)
+            return self
+        if not self.crossings:
+            raise problem("crossings", "must have at least one entry")
         if all(crossing.radius == 0.0 for crossing in self.crossings.values()):
             raise problem("crossings", "at least one radius must differ from zero")
         return self
@@ -287,11 +296,20 @@ class FingerDescription(Description):
         if self.tree is not None and tuple(self.tree.joints) != joints:
             raise problem("tree.joints", f"must be those of the finger, in order: {', '.join(joints)}")
         for name, tendon in self.tendons.items():
+            paths = tuple(self.tree.tendons) if self.tree else ()
+            if tendon.along is not None and tendon.along not in paths:
+                allowed = f"no such tendon of the tree; there are {', '.join(paths) or 'none'}"
+                raise problem(f"tendons.{name}.along", allowed, tendon.along)
             for joint in tendon.crossings:
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
+        for name, actuator in self.actuators.items():
+            for pulled in actuator.tendons:
+                if self.tendons[pulled].along is not None:
+                    allowed = "runs along a path through space: motors pull tendons with crossings"
+                    raise problem(f"actuators.{name}.tendons", allowed, pulled)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),

@@ -60,6 +60,9 @@ class Routing:
                 radii[column[joint], order] = crossing.radius
                 bends[column[joint], order] = float(crossing.bends)
                 crossed[column[joint], order] = 1.0
+            if tendon.along is not None and description.tree is not None:
+                # Its arms depend on the posture; which joints it crosses does not.
+                crossed = np.array([[float(joint in description.tree.crossed(tendon.along))] for joint in joints])
             coupling.append(radii.sum(axis=1))
             curvature.append(bends.sum(axis=1))
             split = tendon.proximal_crossings
@@ -110,7 +113,14 @@ class Routing:
         return index if index < self.actuated else 2 * index - self.actuated + int(distal)
 
     def force_closure(self) -> ForceClosure:
-        """Report whether tensions exist that are all positive and turn no joint, finger by finger."""
+        """Report whether tensions exist that are all positive and turn no joint, finger by finger.
+
+        It does not hold where a tendon runs along a path through space: its arms depend on the posture.
+        """
+        if not np.any(self.coupling, axis=1).all():
+            return ForceClosure(
+                np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons, posed=False
+            )
         found = [
             ForceClosure.of(self.coupling[np.ix_(own, joints)], tuple(self.tendons[index] for index in own))
             for joints, own in self.fingers
@@ -149,11 +159,13 @@ class ForceClosure:
         tension: f^k, shape (t,): internal tensions with the largest entry 1 and the smallest as large as possible;
             zero where there are none.
         tendons: Names of the tendons.
+        posed: Whether arms are known; those of paths through space depend on the posture.
     """
 
     null_space: Array
     tension: Array
     tendons: tuple[str, ...]
+    posed: bool = True
 
     @classmethod
     def of(cls, coupling: Array, tendons: tuple[str, ...]) -> ForceClosure:
@@ -181,6 +193,8 @@ class ForceClosure:
         if self.holds:
             listed = ", ".join(f"{n} {f:.3g}" for n, f in zip(self.tendons, self.tension, strict=True))
             return f"force closure: internal tensions in the ratio {listed}"
+        if not self.posed:
+            return "force closure depends on the posture (fp.analysis.posed, fp.analysis.closure_over_range)"
         if self.null_space.shape[1] == 0:
             return "no force closure: no tensions balance each other at zero torque (too few tendons)"
         balance = self.tension

@@ -181,6 +181,8 @@ class Scenario(Description):
         """
         if self.hand is None:
             return {"": self}
+        if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
+            return dict.fromkeys(self.hand.fingers, self)
         return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
 
     def _part(self, name: str, alone: HandDescription) -> Scenario:
@@ -237,7 +239,8 @@ class Scenario(Description):
             followers = self.coupling(routing).followers
         except InputError as error:
             raise problem(error.entry, error.allowed) from None
-        if self.controller.kind == "proportional" and not closure.holds:
+        routed = any(tendon.along for tendon in self.finger.tendons.values())
+        if self.controller.kind == "proportional" and not closure.holds and not routed:
             self._check_taut(routing, str(closure))
         check_sources(self.finger.actuators, self.controller.tensions or {})
         rest = expand(self.controller.minimum_tension, len(routing.tendons))
@@ -259,8 +262,12 @@ class Scenario(Description):
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return what the passive tendons impose on the references (20)."""
+        fingers = {"": self.finger}
+        if self.hand is not None:
+            fingers = {name: placed.finger for name, placed in self.hand.fingers.items()}
         wishes = [
-            expand(part.controller.passive_tension, len(part.finger.passive_names)) for part in self.parts().values()
+            expand(of_finger(self.controller, name).passive_tension, len(finger.passive_names))
+            for name, finger in fingers.items()
         ]
         return PassiveCoupling.from_routing(
             routing, np.concatenate(wishes), expand(self.finger.passive_tendon.stiffness, routing.passive)

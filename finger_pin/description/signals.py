@@ -93,6 +93,12 @@ class SignalSettings(Description):
         return self.model_copy(update=update)
 
     @property
+    def greatest(self) -> float:
+        """A magnitude that the signal never exceeds."""
+        added = max(map(abs, self.values or (self.height or 0.0,)))
+        return abs(self.offset) + abs(self.amplitude) + added
+
+    @property
     def lowest(self) -> float:
         """A value that the signal is never below: the least of the sinusoid and of the rest together."""
         return self.offset - abs(self.amplitude) + min(self.values or (0.0, self.height or 0.0))

@@ -32,6 +32,27 @@ Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
+class Solid(Description):
+    """What is seen of a body."""
+
+    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")]
+    radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of all but a box."
+    )
+    length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
+    )
+    sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
+    )
+    position: Annotated[Triple, _PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
+    )
+
+
 class Body(Description):
     """A rigid body, placed on another one or on the base."""
 
@@ -47,6 +68,7 @@ class Body(Description):
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
+    solids: dict[Name, Solid] = Field({}, description="What is seen of it, by name.")
 
     @field_validator("orientation")
     @classmethod
@@ -225,6 +247,27 @@ class Tree(Description):
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
         _check("tip.body", self.tip.body, self.bodies, "body")
         return self
+
+    def crossed(self, tendon: str) -> frozenset[str]:
+        """Return the joints that a tendon crosses: those that move one piece of its path and not the next."""
+        described, found = self.tendons[tendon], set[str]()
+        before: set[str] | None = None
+        for each in (described.path or {}).values():
+            if each.kind == "pulley":
+                before = None
+                continue
+            movers = self._movers(each.body)
+            found |= movers ^ before if before is not None else set()
+            before = movers
+        return frozenset(found or {name for name, coefficient in (described.joints or {}).items() if coefficient})
+
+    def _movers(self, body: str | None) -> set[str]:
+        """Return the joints that move a body."""
+        found = set[str]()
+        while body is not None:
+            found |= {name for name, joint in self.joints.items() if joint.body == body}
+            body = self.bodies[body].parent
+        return found
 
 
 def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +27,7 @@ from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import build_tree, tree_rows
+from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -150,6 +151,7 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
+        visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         surroundings: Objects and contacts; None without any.
     """
 
@@ -198,6 +200,7 @@ class Finger:
         joints, motors = self.routing.joints, self.actuators.names
         width = len(joints) + self.routing.passive + len(motors)
         self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
+        self.visuals: pin.GeometryModel | None = None
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         self.layout = Layout(
             self.routing.joints,
@@ -207,10 +210,13 @@ class Finger:
             ringing,
             self.actuators.names,
         )
+        pulling = self.tendons.rows(self.actuators)
+        if self.paths:
+            pulling = [along_paths(description, self.paths, table) for table in pulling]
         self.mechanism = Mechanism(
             self.rigid_body,
             [
-                *self.tendons.rows(self.actuators),
+                *pulling,
                 self.joint_friction.rows(joints, self.actuators.pulled, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
@@ -221,6 +227,7 @@ class Finger:
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
             # Also where a tendon's input goes nowhere: the second one of a spool has none.
             self.routing.actuated,
+            moved=description.hand is not None and description.hand.palm.path is not None,
         )
         self.surroundings = None if objects is None else Surroundings.of(objects, description, self.mechanism)
         if self.surroundings is not None:
@@ -234,20 +241,29 @@ class Finger:
         if described.hand is not None:
             sizes = f"{len(described.joints)} joints, {len(described.tendons)} tendons"
             return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
+        if described.tree is not None:
+            tree, pulled = described.tree, len(described.tendons)
+            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
+            sizes += f", {len(tree.actuators)} actuators"
+            return f"<Finger {described.name}: a tree of {sizes}>"
         tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
         return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
 
     @classmethod
     def from_model(
         cls,
-        description: FingerDescription,
+        description: FingerDescription | HandDescription,
         model: pin.Model,
-        joints: Mapping[str, str],
-        tip_frame: str,
+        joints: Mapping[str, str] | Mapping[str, Mapping[str, str]],
+        tip_frame: str | Mapping[str, str],
         configuration: Array | None = None,
-        base_axis: Sequence[float] = (1.0, 0.0, 0.0),
+        base_axis: Sequence[float] | Mapping[str, Sequence[float]] = (1.0, 0.0, 0.0),
+        visuals: pin.GeometryModel | None = None,
     ) -> Finger:
         """Route tendons on some joints of any Pinocchio model; its other joints are locked.
+
+        Of a hand several fingers are routed at once: ``joints``, ``tip_frame`` and ``base_axis`` are then by finger.
+        The places in its description do not count.
 
         Args:
             description: Joints (no links needed), tendons and friction; its gravity replaces the model's.
@@ -256,17 +272,24 @@ class Finger:
             tip_frame: Frame of the fingertip in the model.
             configuration: Where the other joints are locked, shape (nq,); neutral by default.
             base_axis: e_1 of (17), the unit vector along which the tendons run at the base; model's base frame.
+            visuals: Solids of the model, meshes among them, for `view` and `write_animation` with ``finger=``.
 
         Raises:
             InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates,
                 or the configuration has the wrong size.
         """
-        for name in description.joints:
-            if name not in joints:
+        joined = description.joined() if isinstance(description, HandDescription) else description
+        fingers = tuple(description.fingers) if isinstance(description, HandDescription) else ("",)
+        named = _by_joint(joints)
+        tips, axes = (
+            _by_finger(each, fingers, what) for each, what in ((tip_frame, "tip_frame"), (base_axis, "base_axis"))
+        )
+        for name in joined.joints:
+            if name not in named:
                 raise InputError(f"joints.{name}", "is missing: name the model's joint")
-        chosen = [joints[name] for name in description.joints]
-        for name, wanted in joints.items():
-            if name not in description.joints or not model.existJointName(wanted):
+        chosen = [named[name] for name in joined.joints]
+        for name, wanted in named.items():
+            if name not in joined.joints or not model.existJointName(wanted):
                 raise InputError(f"joints.{name}", "no such joint in the description or the model", wanted)
         indices = [int(model.getJointId(name)) for name in chosen]
         if indices != sorted(set(indices)):
@@ -275,9 +298,17 @@ class Finger:
         posture = pin.neutral(model) if configuration is None else np.asarray(configuration, dtype=float)
         if posture.shape != (model.nq,):
             raise InputError("configuration", f"must be {model.nq} numbers, one per coordinate of the model", posture)
-        reduced = pin.buildReducedModel(model, locked, posture)
-        reduced.gravity.linear[:] = description.gravity
-        return cls(description, RigidBody(reduced, tip_frame, base_axis))
+        solids = pin.GeometryModel() if visuals is None else visuals
+        reduced, shown = pin.buildReducedModel(model, solids, locked, posture)
+        reduced.gravity.linear[:] = joined.gravity
+        body = RigidBody(reduced, tips)
+        for index, name in enumerate(joined.joints, start=1):
+            if body.carriers[index] == 0:
+                own = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
+                body.proximal_axes[index] = np.asarray(axes[own], dtype=float)
+        finger = cls(joined, body)
+        finger.visuals = shown
+        return finger
 
     @property
     def coupling(self) -> Array:
@@ -310,7 +341,9 @@ class Finger:
             state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
         return x
 
-    def evaluate(self, x: Array, command: Array, fingertip_force: Array | None = None) -> FingerSignals:
+    def evaluate(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
         """Return all signals of (18) at a packed state.
 
         Args:
@@ -318,18 +351,20 @@ class Finger:
             command: f^a, shape (a,) or (m, a), N; of a motor in position drive its voltage, V, at its first tendon.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
+            base: How the palm of a hand moves, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
         """
-        return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force))
+        return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force, base))
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
-        delivered, torque, motors = driven.force, driven.force @ driven.rows.arm + halves.force @ halves.rows.arm, None
+        delivered, motors = driven.force, None
+        torque = self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
         if self.actuators.names:
             elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
             delivered = delivered + elastic.force @ self.actuators.pulled.T
-            torque = torque + elastic.force @ elastic.rows.arm
+            torque = torque + (elastic.force @ elastic.rows.arm)[..., :joints]
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
@@ -360,7 +395,7 @@ class Finger:
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
             spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=torque[..., :joints],
+            tendon_torque=torque,
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],
             rate=found.rate,
@@ -368,18 +403,42 @@ class Finger:
             motors=motors,
         )
 
-    def powers(self, x: Array, command: Array, fingertip_force: Array | None = None) -> tuple[Array, Array]:
+    def coupling_at(self, position: Array) -> Array:
+        """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
+        position = np.asarray(position, dtype=float)
+        coupling = np.broadcast_to(self.routing.coupling, (*position.shape[:-1], *self.routing.coupling.shape)).copy()
+        along = [tendon.along for tendon in self.description.tendons.values()]
+        routed = [k for k, name in enumerate(along) if name is not None]
+        if self.paths is not None and routed:
+            places = [list(self.paths.routes).index(str(along[k])) for k in routed]
+            coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
+        return coupling
+
+    def _driven_torque(self, x: Array, driven: RowSignals) -> Array:
+        """Return what the driven tendons exert, shape (..., n), N m."""
+        joints, actuated = len(self.routing.joints), self.routing.actuated
+        if not driven.rows.routed:
+            return (driven.force @ driven.rows.arm)[..., :joints]
+        coupling = self.coupling_at(x[..., :joints])[..., :actuated, :]
+        return np.asarray((driven.force[..., None, :] @ coupling)[..., 0, :])
+
+    def powers(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
-        found = self.mechanism.evaluate(x, command, fingertip_force)
+        found = self.mechanism.evaluate(x, command, fingertip_force, base)
         return np.stack(list(found.account()[1].values()), axis=-1), found.external
 
     def static_torque(self, position: Array) -> Array:
         """Return what tendons have to exert at rest at theta, shape (n,): G and the springs' torque, N m."""
         return self.rigid_body.gravity_torque(position) + self.springs.torque(position, np.zeros_like(position))
 
-    def motion(self, position: Array, velocity: Array) -> Motion:
-        """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n)."""
-        found = self.rigid_body.kinematics(position, velocity)
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
+        """Return fingertip and energies of the rigid body at positions and velocities, shape (..., n).
+
+        With a base that moves, energies are those of the motion in the world, where the base has no height.
+        """
+        found = self.rigid_body.kinematics(position, velocity, base)
         return Motion(found.tip, found.kinetic_energy, found.potential_energy)
 
     def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
@@ -389,3 +448,23 @@ class Finger:
 
 #: A hand is a finger whose joints form a tree.
 Hand = Finger
+
+
+def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Return names of a model's joints by those of a description, which have dots in a hand."""
+    found: dict[str, str] = {}
+    for name, given in joints.items():
+        found |= {name: given} if isinstance(given, str) else {f"{name}.{own}": each for own, each in given.items()}
+    return found
+
+
+def _by_finger(given: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
+    """Return one item for each finger, of one for all or of a table by finger."""
+    if not isinstance(given, Mapping):
+        if entry == "tip_frame" and len(fingers) > 1:
+            raise InputError(entry, f"must be a table with a frame for each of {', '.join(fingers)}", given)
+        return [given] * len(fingers)
+    for name in fingers:
+        if name not in given:
+            raise InputError(f"{entry}.{name}", f"is missing: there must be one for each of {', '.join(fingers)}")
+    return [given[name] for name in fingers]

@@ -31,16 +31,19 @@ _COUPLED = 0.005
 def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
     """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
 
-    Friction of tendons and joints, which MuJoCo has not, gets this package's defaults, but for viscous friction of
-    joints, which is the model's. Ranges are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss
-    is the least level of (9). What is not carried over stands in ``tree.left_out``.
+    Motors that can only pull a tendon through space become tendons of the hand, with friction along their path and
+    slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons and joints,
+    which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the model's. Ranges
+    are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of (9). What is
+    not carried over stands in ``tree.left_out``.
 
     Args:
         model: A `mujoco.MjModel`, or the path of an XML file.
         name: Of the hand.
 
     Raises:
-        InputError: If MuJoCo refuses the file, the model has no tendons, or it has muscles or ball joints.
+        InputError: If it is neither, MuJoCo refuses the file, the model has no tendons, or it has muscles or ball
+            joints.
     """
     try:
         import mujoco
@@ -51,6 +54,8 @@ def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
             model = mujoco.MjModel.from_xml_path(str(model))
         except ValueError as error:
             raise InputError(f"model {model}", " ".join(str(error).split())) from None
+    if not isinstance(model, mujoco.MjModel):
+        raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
     return validate(FingerDescription, _Reader(mujoco, model).table(name), ("finger",))
 
 
@@ -70,6 +75,8 @@ class _Reader:
         kinds = mujoco.mjtJoint
         for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
             raise InputError(f"joint {self.joints[i]}", "is a ball joint; joints have to turn or slide about one axis")
+        self.affine = self.rest.affine_actuators()
+        self.pulling = [i for i in self.affine if self._pulls(i)]
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
 
     def table(self, name: str) -> Table:
@@ -86,7 +93,7 @@ class _Reader:
             "name": _name(name),
             "gravity": [0.0, 0.0, 0.0] if weightless else model.opt.gravity.tolist(),
             "joints": {self.joints[i]: self._joint(i) for i in self.kept_joints},
-            "tendons": {},
+            "tendons": self._pulled(),
             "joint_friction": {
                 "viscous": 0.0,
                 "floor": np.maximum(model.dof_frictionloss[dofs], _LEAST_FRICTION).tolist(),
@@ -132,7 +139,30 @@ class _Reader:
             "mass": float(model.body_mass[i]),
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "solids": self._solids(i),
         }
+
+    def _solids(self, body: int) -> Table:
+        """Return what is seen of a body: its primitives, or boxes around its meshes if it moves and has none."""
+        model, kinds = self.model, self.mujoco.mjtGeom
+        primitives, boxes = {}, {}
+        for i in np.flatnonzero(model.geom_bodyid == body):
+            kind, size = model.geom_type[i], model.geom_size[i]
+            place = {"position": model.geom_pos[i].tolist(), "orientation": _quaternion(model.geom_quat[i])}
+            radius, length = float(size[0]), 2.0 * float(size[1])
+            if kind == kinds.mjGEOM_SPHERE:
+                primitives[self.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+            elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
+                name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
+                primitives[self.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+            elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
+                primitives[self.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+            elif kind == kinds.mjGEOM_MESH:
+                middle, half = np.split(model.geom_aabb[i], 2)
+                place["position"] = (model.geom_pos[i] + rotation(place["orientation"]) @ middle).tolist()
+                boxes[self.geoms[i]] = {"kind": "box", "sides": (2.0 * half).tolist(), **place}
+        # What stands still is only in the way.
+        return primitives or (boxes if model.body_weldid[body] else {})
 
     def _joint(self, i: int) -> Table:
         model, dof = self.model, int(self.model.jnt_dofadr[i])
@@ -236,7 +266,9 @@ class _Reader:
 
     def _actuators(self) -> Table:
         model, found = self.model, {}
-        for i in self.rest.affine_actuators():
+        for i in self.affine:
+            if i in self.pulling:
+                continue
             kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
             of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
             affine = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_AFFINE
@@ -255,6 +287,28 @@ class _Reader:
                 found[i]["force_range"] = model.actuator_forcerange[i].tolist()
         names = _names("actuator", [model.actuator(i).name for i in found])
         return dict(zip(names, found.values(), strict=True))
+
+    def _pulls(self, i: int) -> bool:
+        """Return whether an actuator is a motor that can only pull a tendon through space."""
+        model, types = self.model, self.mujoco
+        at = int(model.actuator_trnid[i, 0])
+        if (
+            model.actuator_trntype[i] != types.mjtTrn.mjTRN_TENDON
+            or model.actuator_biastype[i] != types.mjtBias.mjBIAS_NONE
+            or not model.actuator_ctrllimited[i]
+            or model.actuator_forcelimited[i]
+            or model.wrap_type[model.tendon_adr[at]] == types.mjtWrap.mjWRAP_JOINT
+        ):
+            return False
+        exerted = model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[i]
+        return bool(np.all(exerted <= 0.0) and np.any(exerted))
+
+    def _pulled(self) -> Table:
+        """Return the tendons that motors pull, by the names of these."""
+        model = self.model
+        names = _names("actuator", [model.actuator(i).name for i in self.pulling])
+        along = [self.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
+        return {name: {"along": path} for name, path in zip(names, along, strict=True)}
 
     def _tip_body(self) -> tuple[int, Array]:
         """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""

@@ -26,6 +26,9 @@ from finger_pin.mechanism.pieces import Paths, Reach, moved, reach
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 
+#: The power that a moving base supplies.
+BASE = "palm"
+
 
 @dataclass(frozen=True, eq=False)
 class Books:
@@ -42,12 +45,13 @@ class Books:
     supplies: frozenset[str]
 
     @classmethod
-    def of(cls, rows: Sequence[Rows]) -> Books:
-        """Collect the names of tables."""
+    def of(cls, rows: Sequence[Rows], moved: bool = False) -> Books:
+        """Collect the names of tables, and that of a base that moves."""
+        base = (BASE,) if moved else ()
         return cls(
             stored=tuple(dict.fromkeys(table.stored for table in rows)),
-            powers=tuple(dict.fromkeys(name for table in rows for name in table.powers)),
-            supplies=frozenset(name for table in rows for name in table.powers[: len(table.law.supplies)]),
+            powers=(*dict.fromkeys(name for table in rows for name in table.powers), *base),
+            supplies=frozenset(name for table in rows for name in table.powers[: len(table.law.supplies)]) | {*base},
         )
 
 
@@ -62,6 +66,7 @@ class Evaluation:
         external: J^T F, shape (..., N).
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
+        base_power: That of a base that moves, shape (..., 1), W.
         booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
     """
 
@@ -71,6 +76,7 @@ class Evaluation:
     external: Array
     acceleration: Array
     rate: Array
+    base_power: Array | None = None
     booked: Array | None = None
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -89,6 +95,8 @@ class Evaluation:
             energies[signals.rows.stored] = energies[signals.rows.stored] + stored
             for name, value in flows.items():
                 powers[name] = powers[name] + value
+        if self.base_power is not None:
+            powers[BASE] = self.base_power[..., 0]
         return energies, powers
 
 
@@ -103,6 +111,7 @@ class Mechanism:
         states: For every table the range of its states in z.
         books: Names under which energies and powers of the rows are booked.
         channels: Number of inputs from outside.
+        moved: Whether the base moves along a path.
     """
 
     def __init__(
@@ -112,6 +121,7 @@ class Mechanism:
         lumps: Sequence[str] = (),
         inertia: Array | None = None,
         channels: int = 0,
+        moved: bool = False,
     ) -> None:
         """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
 
@@ -121,7 +131,8 @@ class Mechanism:
         self.lumps = tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
-        self.books = Books.of(self.rows)
+        self.moved = moved
+        self.books = Books.of(self.rows, moved)
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
@@ -202,13 +213,15 @@ class Mechanism:
         linear[..., model.nv :] = q[..., model.nq :]
         return linear
 
-    def evaluate(self, x: Array, command: Array, force: Array | None = None) -> Evaluation:
+    def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states.
 
         Args:
             x: Shape (size,) or (m, size).
             command: Inputs u, shape (channels,) or (m, channels).
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
+            base: How the base moves, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more); at rest by
+                default.
         """
         q, v, z = self.split(x)
         joints, turning = int(self.body.model.nv), q[..., : self.body.model.nq]
@@ -242,11 +255,15 @@ class Mechanism:
         external = np.zeros_like(torque)
         if pressed:
             external[..., :joints] = self.body.external_torque(turning, forces)
-        net = torque + external
+        net, power = torque + external, None
+        if base is not None:
+            net[..., :joints] += self._inertial(turning, v[..., :joints], base)
         acceleration = np.concatenate(
             [self.body.forward_dynamics(turning, v[..., :joints], net[..., :joints]), net[..., joints:] / self.inertia],
             axis=-1,
         )
+        if base is not None:
+            power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
         moving = self.body.position_rate(turning, v[..., :joints])
         rates = [found[t.group].rate for t in self.rows if t.states]
         return Evaluation(
@@ -255,6 +272,7 @@ class Mechanism:
             torque=torque,
             external=external,
             acceleration=acceleration,
+            base_power=np.zeros((*lead, 1)) if power is None and self.moved else power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 
@@ -266,6 +284,18 @@ class Mechanism:
             return reach(self.body, q, table.paths, self.coordinates)
         each = [reach(self.body, one, table.paths, self.coordinates) for one in q]
         return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
+
+    def _inertial(self, q: Array, v: Array, base: Array) -> Array:
+        """Return what a base that moves adds to the torques of one at rest under gravity, shape (..., n)."""
+        if q.ndim > 1:
+            return np.array([self._inertial(*each) for each in zip(q, v, base, strict=True)])
+        still = np.zeros_like(v)
+        return self.body.inverse_dynamics(q, v, still) - self.body.base_dynamics(q, v, still, base)[1]
+
+    def _base_power(self, q: Array, v: Array, a: Array, base: Array) -> Array:
+        if q.ndim > 1:
+            return np.array([self._base_power(*each) for each in zip(q, v, a, base, strict=True)])
+        return np.array([base[:6] @ self.body.base_dynamics(q, v, a, base)[0]])
 
     def _input(self, table: Rows, found: dict[str, RowSignals], command: Array, lead: tuple[int, ...]) -> Array:
         total = np.zeros((*lead, table.count))

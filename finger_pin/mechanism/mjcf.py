@@ -40,9 +40,11 @@ _NOTES = """
   - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
   - the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false", and limited="true" makes them
     MuJoCo's own soft constraints;
-  - an external force at the fingertip: apply it to the site "{tip}".
+  - an external force at the fingertip: apply it to the site "{tip}".{servos}
   Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
 """
+_SERVOS = """
+  - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
 _MASSIVE = """
   A passive tendon is a slide joint, its lumped mass, between two springs that only pull."""
 _MASSLESS = """
@@ -76,6 +78,8 @@ def to_mjcf(
     Raises:
         InputError: If a joint has no link, the posture has the wrong size, or the time step is not positive.
     """
+    if description.hand is not None:
+        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)
@@ -86,6 +90,7 @@ def to_mjcf(
         raise InputError("timestep", "must be above 0", timestep)
     root = ET.Element("mujoco", model=description.name)
     notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
+    notes["servos"] = _SERVOS if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _MASSLESS if massless else _MASSIVE
     root.append(ET.Comment(_NOTES.format(**notes).replace("--", "- -")))

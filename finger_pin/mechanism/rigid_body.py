@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -44,11 +45,13 @@ class Motion:
         tip: p, shape (..., 3), m; of several shape (..., t, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
+        objects: Both energies of free objects around it; None without surroundings.
     """
 
     tip: Array
     kinetic_energy: Array
     potential_energy: Array
+    objects: tuple[Array, Array] | None = None
 
 
 class RigidBody:
@@ -105,6 +108,11 @@ class RigidBody:
             shared = parent == 0 or length == 0.0
             self.carriers.append(self.carriers[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
+
+    @property
+    def mass(self) -> float:
+        """Of all bodies, kg."""
+        return float(pin.computeTotalMass(self.model))
 
     @classmethod
     def join(cls, parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:
@@ -227,15 +235,52 @@ class RigidBody:
             return np.array(pin.aba(self.model, self._data, q, v, torque))
         return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
 
+    def base_dynamics(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array]:
+        """Return what moves a base and the joints on it as given: a wrench and torques, by Newton-Euler.
+
+        Args:
+            q: Shape (n,).
+            v: Shape (n,).
+            a: Shape (n,).
+            base: Velocity of the base and its acceleration less gravity in its own axes, angular parts first, as in
+                `laws.palm`; shape (12,) or more.
+
+        Returns:
+            Moment and force on the base about its origin, in its axes, shape (6,), and torques, shape (n,).
+        """
+        model, data = self._afloat
+        turned = np.r_[3:6, 0:3]
+        pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        moving, speeding = np.append(base[:6][turned], v), np.append(base[6:12][turned], a)
+        found = np.array(pin.rnea(model, data, np.append(pose, q), moving, speeding))
+        return found[:6][turned], found[6:]
+
+    @cached_property
+    def _afloat(self) -> tuple[pin.Model, pin.Data]:
+        """The same joints on a base that floats free of gravity."""
+        own, model = self.model, pin.Model()
+        base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
+        for index in range(1, own.njoints):
+            parent = int(own.parents[index])
+            at = model.addJoint(base + parent, own.joints[index], own.jointPlacements[index], own.names[index])
+            model.inertias[at] = own.inertias[index]
+        model.gravity.linear[:] = 0.0
+        return model, model.createData()
+
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
         pin.computeSubtreeMasses(self.model, self._data)
         return np.outer(np.array(self._data.mass)[1:], self.model.gravity.linear)
 
-    def kinematics(self, q: Array, v: Array) -> Kinematics:
-        """Return what follows from position and velocity, for shapes (..., n)."""
+    def kinematics(self, q: Array, v: Array, base: Array | None = None) -> Kinematics:
+        """Return what follows from position and velocity, for shapes (..., n).
+
+        With a base that moves, (..., 15) or more numbers of `laws.palm`, energies are those of the motion in the world,
+        where the base has no height; all else is as seen from the base.
+        """
         if q.ndim > 1:
-            each = [self.kinematics(*row) for row in zip(q, v, strict=True)]
+            bases = [None] * len(q) if base is None else base
+            each = [self.kinematics(*row) for row in zip(q, v, bases, strict=True)]
             return Kinematics(*(np.array([getattr(k, name) for k in each]) for name in Kinematics.__annotations__))
         jacobian = self.jacobian(q)
         # Pinocchio's kinetic energy is without what turns with the joints' motors.
@@ -243,6 +288,13 @@ class RigidBody:
         # Only now is every branch placed: the Jacobian places the fingertip's alone.
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
+        if base is not None:
+            model, data = self._afloat
+            pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+            moving = np.concatenate([base[3:6], base[:3], v])
+            kinetic = pin.computeKineticEnergy(model, data, np.append(pose, q), moving)
+            centre = pin.centerOfMass(self.model, self._data, q)
+            potential = -self.mass * float(base[12:15] @ centre)
         pin.framesForwardKinematics(self.model, self._data, q)
         tips = np.array([self._data.oMf[each].translation for each in self.tips])
         tip = tips[0] if len(tips) == 1 else tips

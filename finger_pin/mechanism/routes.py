@@ -57,10 +57,12 @@ class Routes:
     Attributes:
         body: The rigid body.
         routes: By name.
+        placed: Where the bodies of the tree stand, by name.
     """
 
     body: RigidBody
     routes: Mapping[str, Route]
+    placed: Mapping[str | None, Placed]
 
     @classmethod
     def of(cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed]) -> Routes:
@@ -71,7 +73,13 @@ class Routes:
             for joint, coefficient in (tendon.joints or {}).items():
                 coefficients[joints.index(joint)] = coefficient
             routes[name] = Route(coefficients, _legs(tendon.path or {}, placed))
-        return cls(body, routes)
+        return cls(body, routes, placed)
+
+    @property
+    def fixed(self) -> Array:
+        """What of dL/dq does not depend on the posture, shape (t, n)."""
+        rows = [route.coefficients for route in self.routes.values()]
+        return np.array(rows).reshape(-1, int(self.body.model.nv))
 
     def length(self, q: Array) -> Array:
         """Return the lengths at q, shape (..., n), as MuJoCo's ``ten_length``: shape (..., t), m."""
@@ -92,8 +100,7 @@ class Routes:
             length, arms, turn = (np.array(part) for part in zip(*each, strict=True))
             return length, arms, turn
         found = reach(self.body, q, [route.legs for route in self.routes.values()], len(q))
-        fixed = np.array([route.coefficients for route in self.routes.values()]).reshape(-1, len(q))
-        return found.length + fixed @ q, found.arm + fixed, found.turn
+        return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
 
 
 def _legs(path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> tuple[Leg, ...]:

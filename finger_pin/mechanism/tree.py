@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,22 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
     rigid_body = RigidBody(model, _TIP)
     return rigid_body, Routes.of(tree, rigid_body, placed)
+
+
+def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
+    """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
+    assert description.tree is not None
+    if table.group != "driven_tendons":
+        return table
+    arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
+    rest = np.array([joint.reference for joint in description.tree.joints.values()])
+    lengths = dict(zip(routes.routes, routes.length(rest), strict=True))
+    for k, name in enumerate(table.names):
+        along = description.tendons[name].along
+        if along is not None:
+            route = routes.routes[along].times(-1.0)
+            arm[k, : len(rest)], offset[k], paths[k] = route.coefficients, lengths[along], route.legs
+    return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(paths))
 
 
 def tree_rows(description: FingerDescription, routes: Routes, width: int) -> list[Rows]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -36,6 +37,8 @@ def to_urdf(description: FingerDescription) -> str:
     Raises:
         InputError: If a joint has no link, or a name that the URDF needs itself.
     """
+    if description.hand is not None:
+        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     links = _links(description)
     shapes = link_shapes(description, links)
     first, last = next(iter(links)), next(reversed(links.values()))
@@ -71,9 +74,15 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
     """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
     if description.hand is not None:
         return build_hand(description.hand)
-    model = pin.buildModelFromXML(to_urdf(description))
+    model = _read(to_urdf(description)).copy()
     model.gravity.linear[:] = description.gravity
     return RigidBody(model, TIP_FRAME)
+
+
+@lru_cache(maxsize=16)
+def _read(text: str) -> pin.Model:
+    """Return the model of a URDF; a hand is read as a whole and finger by finger."""
+    return pin.buildModelFromXML(text)
 
 
 def build_hand(hand: HandDescription) -> RigidBody:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
@@ -50,6 +51,7 @@ _EXCHANGED = {
     "gearbox_coulomb": "lost by gears sliding",
     "gearbox_viscous": "lost in the gears' viscous friction",
     "elastic_damping": "lost as tendons on spools stretch",
+    "palm": "supplied by what moves the palm",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",
@@ -76,11 +78,11 @@ def record(
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
     signals = loop.evaluate(times, trajectory.interpolate(times))
     state = signals.finger.state
-    motion = loop.dynamics.motion(state.position, state.velocity)
+    motion = loop.motion(times, state)
     kept = account(loop, trajectory, times, signals, motion)
     routing = loop.finger.routing
     further = loop.finger.further
-    variables = _signals(loop, signals, motion) | contact_variables(loop.finger, signals.finger)
+    variables = _signals(loop, times, signals, motion) | contact_variables(loop.finger, signals.finger)
     variables |= _further(further, signals.finger.mechanism) | _energies(kept)
     dataset = xr.Dataset(
         {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
@@ -132,7 +134,9 @@ def load_result(path: str | Path) -> xr.Dataset:
     return xr.load_dataset(file, engine="netcdf4")
 
 
-def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str, tuple[Any, Array, dict[str, str]]]:
+def _signals(
+    loop: ClosedLoop, times: Array, signals: LoopSignals, motion: Motion
+) -> dict[str, tuple[Any, Array, dict[str, str]]]:
     finger, tendons, joints, state = signals.finger, signals.finger.tendons, signals.finger.joints, signals.finger.state
     actuated, passive = loop.finger.routing.actuated, loop.finger.routing.passive
     halves = tendons.strands[..., actuated:]
@@ -165,6 +169,12 @@ def _signals(loop: ClosedLoop, signals: LoopSignals, motion: Motion) -> dict[str
         "spring_torque": _entry(_JOINT, finger.spring_torque, "N m", "torque of the joints' springs"),
         "external_torque": _entry(_JOINT, finger.external_torque, "N m", "torque of the fingertip force", "6"),
     }
+    if loop.palm is not None:
+        place, rotation = loop.palm.place(times)
+        quaternions = [pin.Quaternion(each).coeffs() for each in rotation]
+        table["palm_position"] = _entry(("time", "axis"), place, "m", "place of the palm in the world")
+        text = "rotation of the palm to the world, x, y, z, w"
+        table["palm_orientation"] = _entry(("time", "quaternion"), np.array(quaternions), "1", text)
     if signals.control.shortfall is not None:
         text = "desired torque that tension limits keep from being planned"
         table["torque_shortfall"] = _entry(_JOINT, signals.control.shortfall, "N m", text)

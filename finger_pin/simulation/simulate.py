@@ -113,6 +113,9 @@ def simulate(
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
+    elif loop.finger.actuators.names:
+        # Before the controller is sampled: then it must not be asked for a start.
+        loop = replace(loop, start=loop.initial_state())
     if loop.finger.surroundings is not None:
         start = loop.finger.layout.unpack(loop.initial_state())
         assert start.object_pose is not None
@@ -144,7 +147,7 @@ def simulate(
     sampled = None if sampling is None else SampledController(loop, sampling)
     if positioned:
         duration = scenario.simulation.duration
-        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration, sampled)
+        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
         loop = replace(loop, drives=drives, parts=())
     if sampled is not None:
         loop = replace(loop, controller=sampled, parts=())
@@ -248,11 +251,14 @@ def _integrate(
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
         control, tableau = compiled_control(loop) or sampled_control(loop), TABLEAUS[method]()
+        stepper = Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force)
+        if loop.drives is not None:
+            stepper.drive(loop.drives.compiled)
         return integrate_compiled(
-            Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force),
+            stepper,
             settings.duration,
             loop.finger.layout.names,
-            held=loop.drives or (controller if isinstance(controller, SampledController) else None),
+            held=controller if isinstance(controller, SampledController) else None,
             knots=loop.knots(),
             watch=watch,
             chunk=chunk,

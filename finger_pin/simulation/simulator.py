@@ -73,7 +73,7 @@ class Simulator:
         start = 0.5 * (limiter.lower + limiter.upper) if position is None else position
         self.finger = finger
         self._compiled = CompiledFinger(finger)
-        self._tension = np.zeros(finger.routing.actuated)
+        self._tension = np.zeros(finger.mechanism.channels)
         mechanism = finger.mechanism
         self._stepper = Stepper(
             mechanism,
@@ -115,7 +115,8 @@ class Simulator:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon.
+            tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon. Inputs of a
+                tree's actuators follow.
             dt: s.
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
@@ -125,7 +126,7 @@ class Simulator:
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
         command = _numbers("tension", tension, self._tension.shape)
-        tensions = np.delete(command, self.finger.actuators.voltages)
+        tensions = np.delete(command[: self.finger.routing.actuated], self.finger.actuators.voltages)
         if np.any(tensions < 0.0):
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:

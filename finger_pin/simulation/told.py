@@ -66,9 +66,9 @@ class Told:
         if not self._numbers:
             raise InputError("result", "is of steps, and there are none yet: call step")
         tips = finger.mechanism.body.tips
-        steps = np.array(self._numbers).reshape(-1, 1 + finger.routing.actuated + 3 * len(tips))
+        steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
         knots, joints = np.append(self.start.time, steps[:, 0]), len(finger.routing.joints)
-        tension, force = np.split(steps[:, 1:], [finger.routing.actuated], axis=1)
+        tension, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
         description = finger.description
         table = {
             "name": description.name,

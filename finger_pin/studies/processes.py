@@ -18,7 +18,7 @@ import pickle
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -28,7 +28,7 @@ from typing import Any, Self, TypeVar
 
 import cloudpickle
 
-from finger_pin.core.compilation import CACHE_FOLDER
+from finger_pin.core.compilation import CACHE_FOLDER, is_cached
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.simulation.simulate import simulate
@@ -40,6 +40,8 @@ _Result = TypeVar("_Result")
 _POLL, _GLANCE = 0.1, 1e-3
 # A process may die for a reason outside, such as memory that others took; work that ends two of them is reported.
 _ATTEMPTS = 2
+#: Variable of the environment: whether the server that processes are copied from loads compiled code.
+WARM = "FINGER_PIN_WARM"
 # Matrices of a finger are too small for several threads to help, and the cores are taken by the processes.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -217,24 +219,25 @@ def process_context() -> multiprocessing.context.BaseContext:
     if "forkserver" in methods:
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["finger_pin.studies.preloaded"])
-        # Its processes have the environment in which it was started.
-        with _single_threaded():
+        # Its processes have the environment in which it was started. What is not compiled yet is compiled here, once.
+        with _environment({**dict.fromkeys(_THREADS, "1"), WARM: "1" if is_cached() else "0"}):
             multiprocessing.forkserver.ensure_running()
         return context
     return multiprocessing.get_context("spawn")
 
 
 @contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Let processes that are started meanwhile use one thread each."""
-    earlier = {name: os.environ.pop(name, None) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+def _environment(entries: Mapping[str, str]) -> Iterator[None]:
+    """Give processes that are started meanwhile other variables of the environment."""
+    earlier = {name: os.environ.get(name) for name in entries}
+    os.environ.update(entries)
     try:
         yield
     finally:
         for name, value in earlier.items():
-            os.environ.pop(name)
-            if value is not None:
+            if value is None:
+                os.environ.pop(name)
+            else:
                 os.environ[name] = value
 
 

@@ -25,7 +25,7 @@ _SETTLING = 1.0
 _LONG = 2.0
 # What counts as sliding, m/s.
 _CREEP = 1e-6
-_SUPPLIES = ("actuators", "electrical", "fingertip")
+_SUPPLIES = ("actuators", "electrical", "fingertip", "palm")
 
 
 def summarize(result: xr.Dataset) -> str:
@@ -228,8 +228,10 @@ def _energy(result: xr.Dataset) -> list[str]:
         for name in map(str, result)
         if name.startswith("energy_") and name.removeprefix("energy_exchanged_") == name and name != "energy_residual"
     )
-    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in _SUPPLIES if name in exchanged]
-    came_in = sum(max(value, 0.0) for value in (*(value for _, value in entries), -stored))
+    supplied = [name for name in _SUPPLIES if name in exchanged]
+    supplies = [_final(exchanged[name]) for name in supplied]
+    came_in = sum(max(value, 0.0) for value in (*supplies, -stored))
+    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in supplied]
     entries += [(_label(values), _final(values)) for name, values in exchanged.items() if name not in _SUPPLIES]
     entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
     rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]

@@ -25,6 +25,7 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
     for name, lines in (
         ("step-interface", _stepping),
         ("joints", _joints),
+        ("hand", _hand),
         ("mujoco", _mujoco),
         ("many-runs", _many),
         ("main-job", _main_job),
@@ -95,6 +96,22 @@ def _joints(study: Mapping[str, Any]) -> Iterator[str]:
     ]
     yield from table(("joints", "states", "wall time", "real time", "steps", "per step", "NumPy evaluation"), rows)
     yield f"time per step grows as joints^{study['exponent']:.2f} in the upper half"
+
+
+def _hand(study: Mapping[str, Any]) -> Iterator[str]:
+    sizes = f"{study['fingers']} fingers, {study['joints']} joints, {study['tendons']} tendons"
+    yield f"hand, {sizes}, {study['duration']:g} s, against its fingers one by one"
+    rows = [
+        (
+            f"{count} core{'s' if int(count) > 1 else ''}, {kind}",
+            _seconds(times["hand"]),
+            _seconds(times["fingers"] / study["fingers"]),
+            f"{study['fingers'] * times['hand'] / times['fingers']:.2f}x",
+        )
+        for count, kinds in study["cores"].items()
+        for kind, times in kinds.items()
+    ]
+    yield from table(("", "hand", "one finger", "hand / finger"), rows)
 
 
 def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:

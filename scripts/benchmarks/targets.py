@@ -55,6 +55,8 @@ def targets(stages: Mapping[str, Any]) -> list[Target]:
         step = stages["step-interface"]
         found.append(target("step interface at 1 kHz, steps", step["real_time_factor_stepping"], ">=", 20.0, "x"))
         found.append(target("step interface at 1 kHz, with controller", step["real_time_factor"], ">=", 20.0, "x"))
+    if stages.get("hand"):
+        found += _hand(stages["hand"])
     if stages.get("many-runs"):
         many = stages["many-runs"]
         found.append(target("two processes, many runs", many["speed_up"], ">=", 1.85, "x"))
@@ -86,6 +88,16 @@ def _speed(name: str, study: Mapping[str, Any], real_time: float, ratio: float) 
             best, bound = min(theirs)
             known = bound if flipped == "=" else flipped if bound in ("=", flipped) else "?"
             yield target(f"{label}: over the textbook", best / mine, ">=", ratio, "x", known)
+
+
+def _hand(study: Mapping[str, Any]) -> Iterator[Target]:
+    cores, fingers = study["cores"], study["fingers"]
+    for kind in ("integration", "whole"):
+        times = cores["1"][kind]
+        yield target(f"hand over one finger, {kind}", fingers * times["hand"] / times["fingers"], "<=", 5.5, "x")
+    if "2" in cores:
+        speed_up = cores["1"]["integration"]["hand"] / cores["2"]["integration"]["hand"]
+        yield target("hand, two threads, integration", speed_up, ">=", 1.6, "x")
 
 
 def _mujoco(study: Mapping[str, Any]) -> Iterator[Target]:

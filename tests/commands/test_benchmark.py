@@ -158,6 +158,12 @@ def stages():
         | {"real_time_factor_stepping": 40.0, "error": 1e-5, "worst": 1e-4},
         "joints": {"duration": 2.0, "rtol": 1e-5, "exponent": 1.5}
         | {"rows": [{"joints": n, "time_per_textbook_evaluation": 2e-4, **joint} for n in (1, 2, 3)]},
+        "hand": {"duration": 4.0, "joints": 20, "tendons": 25, "fingers": 5}
+        | {
+            "cores": {
+                n: {kind: {"hand": 1.0 / int(n), "fingers": 0.9} for kind in ("integration", "whole")} for n in "12"
+            }
+        },
         "mujoco": {"version": "3", "duration": 8.0, "limit": 1e-3, "ours": {"worst": {"method": "Rodas4", "rtol": 0.1}}}
         | {"rows": [row | {"rollout_over_ours": 10.0}]},
         "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}
@@ -186,6 +192,8 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["step interface at 1 kHz, steps"] is True
     assert verdicts["step interface at 1 kHz, with controller"] is False
     assert verdicts["MuJoCo, lumped mass, worst error 0.001 rad: Python loop"] is True
+    assert verdicts["hand over one finger, integration"] is False
+    assert verdicts["hand, two threads, integration"] is True
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out
     assert "pass" in output and "FAIL" in output and "Rodas5P" in output

@@ -24,6 +24,8 @@ def test_a_mujoco_hand_is_simulated_and_its_scenario_runs_again(tmp_path, capsys
     assert "Not carried over:\n  contacts: 1 geoms collide in the model, none here" in said
     assert "servo" in said and "finger_joint" in said
     assert sorted(each.name for each in (output / "figures").iterdir()) == ["energy.png", "motion.png"]
+    page = (output / "animation.html").read_text("utf-8")
+    assert "finger_joint_link" in page and "CylinderGeometry" in page
     result = xr.load_dataset(output / "trajectory.nc")
     assert np.ptp(result.joint_position.values) > 0.3
     shutil.copy(output / "scenario.toml", tmp_path / "again.toml")

@@ -8,6 +8,7 @@ from core_cases import (
     FORCE,
     Case,
     Unpowered,
+    carried,
     lugre,
     none_passive,
     on_model,
@@ -54,6 +55,7 @@ def cases(scenarios):
     """All loops by name, each with and without a fingertip force."""
     loops = {name: ClosedLoop.from_scenario(scenario) for name, scenario in scenarios.items()}
     loops["servos"] = replace(loops["servos"], drives=Unpowered())
+    loops["carried"] = ClosedLoop.from_scenario(carried())
     loops["meeting_axes"] = without_abduction_link(loops["fig6"])
     pushed = {f"{name}_pushed": replace(loop, fingertip_force=FORCE) for name, loop in loops.items()}
     return {name: Case.of(loop) for name, loop in (loops | pushed).items()}

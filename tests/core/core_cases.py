@@ -21,7 +21,7 @@ BODIES = ("ub", "planar", "dexmart_index", "tree", "hand")
 LOOPS = tuple(
     name + push
     for push in ("", "_pushed")
-    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos")
+    for name in ("fig6", "stick_slip", "two_passive", "none_passive", "lugre", "meeting_axes", "servos", "carried")
 )
 FORCE = np.array([0.3, -0.2, 0.4])
 
@@ -129,6 +129,16 @@ class Unpowered:
 
     def planned(self, time, reference, control):
         return control
+
+
+def carried():
+    """The thumb of a hand whose palm swings about and along all axes."""
+    names, rates = ("x", "y", "z", "roll", "pitch", "yaw"), (1.1, 1.7, 2.3, 1.3, 0.9, 1.9)
+    path = {
+        name: {"amplitude": 0.05 if index < 3 else 0.5, "frequency": rate, "phase": 0.3 * index}
+        for index, (name, rate) in enumerate(zip(names, rates, strict=True))
+    }
+    return fp.load_scenario("hand", {"hand.palm.path": path}).parts()["thumb"]
 
 
 def without_abduction_link(loop):

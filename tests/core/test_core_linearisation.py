@@ -7,6 +7,7 @@ import pytest
 from core_cases import LOOPS, Case
 from numpy.linalg import norm
 
+from finger_pin.control.proportional import ControlSignals
 from finger_pin.core.inputs import HELD
 
 #: Sixth-order central differences: where to look, in steps, and weights.
@@ -40,7 +41,7 @@ class Held:
 
     def command(self, time, reference, position, velocity):
         tension = np.broadcast_to(self.tension, (*position.shape[:-1], len(self.tension)))
-        return type("Kept", (), {"tension": tension, "torque": np.zeros_like(position)})
+        return ControlSignals(np.zeros_like(position), tension)
 
 
 def pieces(case, times, x):

@@ -22,6 +22,20 @@ def model_of(body, rest):
     return mujoco.MjModel.from_xml_string(f"<mujoco>{HEAD}<worldbody>{body}</worldbody>{rest}</mujoco>")
 
 
+SMOOTH = {
+    f"finger.{table}.{entry}": 0.0
+    for table, entries in (("tendon_friction", ("coulomb", "viscous")), ("joint_friction", ("coulomb", "stiction")))
+    for entry in entries
+}
+
+
+def inputs(hand, model, control):
+    """Return the inputs of a hand for MuJoCo's: tensions of the tendons that motors pull, then those of actuators."""
+    given = {model.actuator(i).name.replace(":", "_"): control[i] for i in range(model.nu)}
+    pulled = [np.clip(given[name], 0.0, 20.0) for name in hand.description.tendons]
+    return [*pulled, *(given[name] for name in hand.further[-1].names)]
+
+
 LINK = '<body><joint name="j" axis="0 1 0"/><geom type="box" size="0.1 0.1 0.1"/><site name="s" pos="0.1 0 0"/></body>'
 FIXED = '<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>'
 
@@ -43,7 +57,8 @@ def test_accelerations_are_mujoco_s_without_its_constraints(name):
     """Inertia, gravity, springs, dampers, tendons and actuators at random states, by both evaluators."""
     model, random = MODELS[name](), np.random.default_rng(1)
     model.tendon_limited[:] = 0
-    data, hand = mujoco.MjData(model), fp.Hand(fp.from_mujoco(model))
+    smooth = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH)
+    data, hand = mujoco.MjData(model), fp.Hand(smooth.finger)
     compiled = CompiledFinger(hand)
     for _ in range(50 if name == "routed" else 10):
         data.qpos, data.qvel = posture(model, random), 0.3 * random.normal(size=model.nv)
@@ -51,7 +66,7 @@ def test_accelerations_are_mujoco_s_without_its_constraints(name):
         mujoco.mj_forward(model, data)
         x = hand.rest_state(data.qpos, data.qvel)
         for evaluator in (hand, compiled):
-            found = evaluator.evaluate(x, data.ctrl)
+            found = evaluator.evaluate(x, inputs(hand, model, data.ctrl))
             # As close as MuJoCo's arms of wraps inside.
             np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
 
@@ -59,11 +74,11 @@ def test_accelerations_are_mujoco_s_without_its_constraints(name):
 def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
     model = MODELS["routed"]()
     model.jnt_limited[:] = 0
-    smooth = {"finger.joint_friction.coulomb": 0.0, "finger.joint_friction.stiction": 0.0}
     settings = {"simulation.duration": 0.2, "simulation.rtol": 1e-9, "simulation.atol_scale": 1e-9}
-    scenario = read_scenario(exercise(fp.from_mujoco(model)), smooth | settings)
+    scenario = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH | settings)
     result = fp.simulate(scenario)
-    signals = [scenario.controller.inputs[model.actuator(i).name] for i in range(model.nu)]
+    given = {**scenario.controller.inputs, **scenario.controller.tensions}
+    signals = [given[model.actuator(i).name] for i in range(model.nu)]
     errors = []
     for step in (2.5e-4, 1.25e-4):
         data, model.opt.timestep = mujoco.MjData(model), step
@@ -81,6 +96,33 @@ def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
     assert np.abs(result.energy_residual).max() < 1e-6
 
 
+def test_a_tendon_that_a_motor_pulls_loses_tension_by_the_turn_of_its_path():
+    """The capstan law with mu_e phi, phi from the path's directions at one posture: pulled in, then let out."""
+    model = MODELS["routed"]()
+    settings = {"finger.tendon_friction.viscous": 0.0, "finger.tendon_friction.floor": 1e-6}
+    described = read_scenario(exercise(fp.from_mujoco(model)), settings).finger
+    hand, data = fp.Hand(described), mujoco.MjData(model)
+    data.qpos = [0.2, 0.4, 0.01]
+    mujoco.mj_forward(model, data)
+    first, count = data.ten_wrapadr[1], data.ten_wrapnum[1]
+    points, passed = data.wrap_xpos.reshape(-1, 3)[first : first + count], data.wrap_obj.ravel()[first : first + count]
+    turn = 0.0
+    for branch in np.split(points, np.flatnonzero(passed == -2)):
+        pieces = np.diff(branch[np.any(branch, axis=1)], axis=0)
+        pieces = pieces[np.linalg.norm(pieces, axis=1) > 0.0]
+        unit = pieces / np.linalg.norm(pieces, axis=1)[:, None]
+        turn += np.sum(np.arccos(np.clip(np.sum(unit[:-1] * unit[1:], axis=1), -1.0, 1.0)))
+    assert hand.paths.turn(data.qpos)[1] == pytest.approx(turn, abs=1e-6)
+    for speed in (1.0, -1.0):
+        x = hand.rest_state(data.qpos, [0.0, -speed / hand.paths.arms(data.qpos)[1, 1], 0.0])
+        for _ in range(200):
+            found = hand.evaluate(x, [5.0, 0.0, 0.0])
+            found.state.tendon_stiction[:] += found.tendons.stiction_rate * 2e-6
+            x = hand.layout.pack(found.state)
+        assert found.tendons.velocity[0] == pytest.approx(speed)
+        assert found.tendons.strands[0] == pytest.approx(5.0 * np.exp(-speed * 0.11 * turn), rel=1e-6)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_a_hand_is_the_same_when_written_and_read_again(hands, name, tmp_path):
     description = hands[name][1].description
@@ -91,12 +133,26 @@ def test_a_hand_is_the_same_when_written_and_read_again(hands, name, tmp_path):
 def test_entries_of_a_tree_are_changed_by_keys(hands, tmp_path):
     table = exercise(hands["routed"][1].description)
     key = "finger.tree.tendons.top.path.a1.position"
-    changed = read_scenario(table, {key: [0.05, 0.0, 0.02], "controller.inputs.pull.offset": 3.0})
+    changed = read_scenario(table, {key: [0.05, 0.0, 0.02], "controller.tensions.pull.offset": 3.0})
     moved = fp.Hand(changed.finger).paths.length(np.zeros(3)) - hands["routed"][1].paths.length(np.zeros(3))
     assert np.flatnonzero(moved).tolist() == [0]
     for wrong, text in (("tendons.up.stiffness", "there are top, branched"), ("tip.bodi", "did you mean")):
         with pytest.raises(fp.InputError, match=text):
             read_scenario(table, {f"finger.tree.{wrong}": 1.0})
+
+
+def test_a_hand_is_stepped_as_a_finger_is(hands):
+    hand = hands["routed"][1]
+    sim = fp.Simulator(hand, position=[0.0, 0.3, 0.01])
+    for step in range(20):
+        state = sim.step([2.0, 0.01 * step, 0.5], 1e-3)
+    result = sim.result()
+    np.testing.assert_array_equal(result.joint_position[-1], state.position)
+    np.testing.assert_allclose(result.actuator_input[-1], [0.19, 0.5])
+    assert np.abs(result.energy_residual).max() < 1e-5
+    with pytest.raises(fp.InputError, match="must be 3 numbers"):
+        sim.step([2.0], 1e-3)
+    assert repr(hand) == "<Finger hand: a tree of 3 joints, 4 tendons (1 pulled), 2 actuators>"
 
 
 def test_a_coupled_joint_follows_as_mujoco_s_equality_says():
@@ -122,10 +178,10 @@ def test_what_is_not_carried_over_is_listed():
         "free joint of thing: it stays where it is",
         "body w: gravity compensation",
         "contacts: 2 geoms collide in the model, none here",
-        "equality equality_0: of kind weld",
-        "equality equality_1: its polynomial is not linear",
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
+        "equality equality_0: of kind weld",
+        "equality equality_1: its polynomial is not linear",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w"]
@@ -148,6 +204,8 @@ def test_a_file_that_mujoco_refuses_is_refused_in_its_words_on_one_line(tmp_path
     with pytest.raises(fp.InputError, match="unknown transmission target 'j9'") as refused:
         fp.from_mujoco(tmp_path / "hand.xml")
     assert "\n" not in str(refused.value)
+    with pytest.raises(fp.InputError, match=r"must be a mujoco\.MjModel"):
+        fp.from_mujoco(7)
     with pytest.raises(fp.InputError, match="no_such"):
         fp.from_mujoco(tmp_path / "no_such.xml")
 

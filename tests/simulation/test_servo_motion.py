@@ -180,3 +180,14 @@ def test_hands_of_servos_fall_into_islands_that_move_as_each_does_alone():
         each.hold(np.array([voltage, 0.0]))
         assert not each.advance(0.05)
         np.testing.assert_array_equal(together.x[[index, 2 + index]], each.x[:2])
+
+
+@pytest.mark.parametrize(
+    "controller", [{}, {"sampling.period": 1e-3}, {"sampling.period": 1e-3, "passive_tension_loop": {}}]
+)
+def test_servos_start_with_their_tendons_stretched_by_what_is_commanded_there(controller):
+    """At rest on the reference, (22) plans f0 times the ratio of the internal tensions."""
+    settings = {f"controller.{key}": value for key, value in controller.items()} | {"controller.damping": 0.0}
+    result = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.002, **settings}))
+    internal = fp.Finger("ub").routing.force_closure().tension[:4]
+    np.testing.assert_allclose(result.spool_tension.values[0, :4], internal / internal.min(), rtol=1e-6)

@@ -95,3 +95,15 @@ def test_a_plain_script_without_a_guard_works_with_a_metric_of_its_own(tmp_path)
 
 def test_what_is_typed_works_with_a_metric_of_its_own(tmp_path):
     assert ends_of(tmp_path, ["-"], input=SWEEP) == (0, "[2. 6.]", "")
+
+
+def test_the_server_compiles_nothing_where_this_process_is_about_to(tmp_path):
+    code = (
+        "import os\n"
+        "from finger_pin.studies.processes import WARM, Pool\n"
+        "with Pool(1) as pool:\n"
+        "    print(list(pool.do(os.getenv, [WARM], lambda: False)))\n"
+    )
+    environment = {**os.environ, "FINGER_PIN_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("[(0, '0')]\n", "")

@@ -286,3 +286,13 @@ def test_two_results_lie_over_each_other_each_on_its_own_time(result):
 def test_results_of_fingers_with_other_joints_are_not_compared():
     with pytest.raises(InputError, match="joint_0"):
         plots.compare(synthetic(4), synthetic(2, 3, 0))
+
+
+def test_a_joint_that_no_torque_turns_but_rounding_shows_a_flat_line():
+    result = synthetic()
+    for name in ("joint_torque_command", "joint_torque", "joint_friction"):
+        result[name][:, 0] *= 1e-18
+    panel = next(
+        axes for axes in plots.plot_losses(result).axes if axes.get_ylabel().startswith(str(result.joint[0].item()))
+    )
+    assert panel.get_ylim() == (-1.0, 1.0)

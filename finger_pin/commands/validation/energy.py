@@ -14,7 +14,7 @@ from finger_pin.views.plots.style import new_figure, styled
 
 TITLE = "Energy account"
 TOLERANCES = (1e-4, 1e-6, 1e-8)
-#: The residual at the default tolerances over the work of the actuators, and at a hundredth of them.
+#: The residual at the default tolerances over the work of actuators and electronics, and at a hundredth of them.
 LIMIT, TIGHT_LIMIT = 2e-6, 2e-8
 
 
@@ -23,9 +23,15 @@ def run(name: str, tolerance: float) -> xr.Dataset:
     return simulate(load_scenario(name, {"simulation.rtol": tolerance, "simulation.atol_scale": tolerance}))
 
 
+def supplied(result: xr.Dataset) -> float:
+    """Return the greatest work of the actuators and of the motors' electronics, J."""
+    names = [f"energy_exchanged_{each}" for each in ("actuators", "electrical")]
+    return sum(float(abs(result[name]).max()) for name in names if name in result)
+
+
 def open_share(result: xr.Dataset) -> float:
-    """Return the largest residual over the greatest work of the actuators."""
-    return float(abs(result.energy_residual).max() / abs(result.energy_exchanged_actuators).max())
+    """Return the largest residual over the work supplied."""
+    return float(abs(result.energy_residual).max()) / supplied(result)
 
 
 def measure() -> Section:
@@ -53,8 +59,7 @@ def plot(runs: dict[str, dict[float, xr.Dataset]]) -> Figure:
         unused.set_visible(False)
     for axes, (name, results) in zip(panels, runs.items(), strict=False):
         for index, (tolerance, result) in enumerate(results.items()):
-            supplied = float(abs(result.energy_exchanged_actuators).max())
-            share = np.maximum(np.abs(result.energy_residual.values) / supplied, 1e-13)
+            share = np.maximum(np.abs(result.energy_residual.values) / supplied(result), 1e-13)
             trace(axes, result.time.values, share, label=f"tolerance {tolerance:.0e}", linewidth=1.0, **_line(index))
         axes.set(yscale="log", xlabel="time (s)", title=name)
     for axes in panels[::columns]:

@@ -1,7 +1,9 @@
 """Where the tendons run: lanes beside each other, winding around the joints, and paths in space."""
 
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
-from finger_pin.mechanism.geometry.paths import LinkPoses, Pulley, TendonGeometry, TendonPath, Visual, tendon_paths
+from finger_pin.mechanism.geometry.fingers import Pulley, Visual
+from finger_pin.mechanism.geometry.paths import LinkPoses, TendonGeometry, TendonPath, tendon_paths
+from finger_pin.mechanism.geometry.tree import TreeGeometry
 from finger_pin.mechanism.geometry.winding import BASE_LEAD
 
 __all__ = [
@@ -12,6 +14,7 @@ __all__ = [
     "Pulley",
     "TendonGeometry",
     "TendonPath",
+    "TreeGeometry",
     "Visual",
     "tendon_paths",
 ]

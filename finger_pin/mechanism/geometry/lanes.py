@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,14 +23,16 @@ class Lanes:
         offset: By tendon and joint index (1 is the first joint), along the joint axis, m.
         spacing: Least distance between lanes, m.
         families: Joint indices with parallel axes at theta = 0, the largest family first.
+        lead: Width of the first link, m, in which the length behind the base is measured.
     """
 
     offset: dict[tuple[str, int], float]
     spacing: float
     families: tuple[tuple[int, ...], ...]
+    lead: float
 
 
-def tendon_lanes(description: FingerDescription, model: pin.Model) -> Lanes:
+def tendon_lanes(description: FingerDescription, model: pin.Model, widths: Sequence[float]) -> Lanes:
     """Give every tendon a lane at every joint.
 
     Joints with parallel axes share their lanes. A tendon whose winding at the other joints puts it to one side gets
@@ -39,11 +42,12 @@ def tendon_lanes(description: FingerDescription, model: pin.Model) -> Lanes:
     Args:
         description: The finger.
         model: Its Pinocchio model.
+        widths: Of its links, m.
     """
     data = model.createData()
     pin.forwardKinematics(model, data, np.zeros(model.nq))
     frames: dict[int, Array] = {joint: np.array(data.oMi[joint].rotation) for joint in range(1, model.njoints)}
-    width = min(joint.link.width for joint in description.joints.values() if joint.link is not None)
+    width = min(widths)
     families = _families(frames)
     offset: dict[tuple[str, int], float] = {}
     spacings = [_ONE_LANE * width]
@@ -65,7 +69,7 @@ def tendon_lanes(description: FingerDescription, model: pin.Model) -> Lanes:
             for joint in family:
                 sign = float(np.sign(frames[joint][:, 2] @ axis))
                 offset[name, joint] = sign * spacing * (lane - count / 2)
-    return Lanes(offset, min(spacings), families)
+    return Lanes(offset, min(spacings), families, widths[0])
 
 
 def _radius(description: FingerDescription, tendon: str, joint: str) -> float | None:

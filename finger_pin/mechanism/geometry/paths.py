@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry.cuts import Cut, Groove, cuts
-from finger_pin.mechanism.geometry.lanes import Lanes, tendon_lanes
-from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, Span, wind
-from finger_pin.mechanism.shapes import MATERIALS
-from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model, palm_of
+from finger_pin.mechanism.geometry.foreign import turned_model
+from finger_pin.mechanism.geometry.winding import Arc, Span
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.urdf import build_rigid_body
 
 #: Drawn sag of a loose span in parts of its length, and lift of a loose arc off its pulley in parts of its radius.
 SAG, LIFT = 0.12, 0.15
@@ -54,42 +51,6 @@ class TendonPath:
     distal: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Pulley:
-    """The winding surface of one tendon at one joint.
-
-    Attributes:
-        tendon: Name of the tendon.
-        joint: Index of the joint, 1 for the first; its axis is the z axis of the link after it.
-        radius: r, signed, m.
-        offset: Along the joint axis, m.
-    """
-
-    tendon: str
-    joint: int
-    radius: float
-    offset: float
-
-
-@dataclass(frozen=True)
-class Visual:
-    """A solid that is fixed to a link.
-
-    Attributes:
-        name: Of the solid.
-        link: Index of the link, 0 for the base.
-        shape: Geometry of Pinocchio: a box, a cylinder, a sphere or a mesh.
-        placement: In the frame of the link.
-        colour: Red, green, blue and opacity, 0 to 1.
-    """
-
-    name: str
-    link: int
-    shape: Any
-    placement: pin.SE3
-    colour: tuple[float, float, float, float]
-
-
 class TendonGeometry:
     """The tendons of a finger, or of all fingers of a hand: wound once, placed for any joint position.
 
@@ -102,77 +63,63 @@ class TendonGeometry:
         tips: The fingertips: index of the link, and place in its frame, shape (3,), m.
         size: How far the fingertips can be from the base, about, m.
         widths: Of the links, m.
+        first_seen: First link that the camera must have in view.
     """
 
-    def __init__(self, description: FingerDescription, *, resolution: int = 8) -> None:
+    first_seen = 0
+
+    def __init__(
+        self,
+        description: FingerDescription,
+        *,
+        resolution: int = 8,
+        body: RigidBody | None = None,
+        solids: pin.GeometryModel | None = None,
+    ) -> None:
         """Wind the tendons.
 
         Args:
-            description: A finger whose joints all carry links.
+            description: A finger or hand whose joints all carry links, or one on a body of the user's own.
             resolution: Points per straight span and per radian of arc.
+            body: The body that the joints are of, if it is not made of links.
+            solids: Of that body.
 
         Raises:
-            InputError: If a joint carries no link.
+            InputError: If a joint carries no link, or the body has joints that do not turn.
         """
         self.description = description
-        body = build_rigid_body(description)
-        self.model = body.model
-        frames = [self.model.frames[tip] for tip in body.tips]
-        self.tips = tuple((int(tip.parentJoint), np.array(tip.placement.translation)) for tip in frames)
+        if body is None:
+            fingers, own = fingers_of_links(description, resolution), palm_of(description.hand)
+            body = build_rigid_body(description)
+            self.model = body.model
+        else:
+            self.model, fingers, own = fingers_on_model(description, body, solids, resolution)
+        rotations = [np.eye(3)] * self.model.njoints if body.model is self.model else turned_model(body)[1]
+        frames = [body.model.frames[tip] for tip in body.tips]
+        self.tips = tuple((int(f.parentJoint), rotations[f.parentJoint].T @ f.placement.translation) for f in frames)
+        pieces = {name: each for finger in fingers for name, each in finger.pieces.items()}
+        self._pieces = {name: pieces[name] for name in description.tendons}
+        self.pulleys = tuple(pulley for finger in fingers for pulley in finger.pulleys)
+        self.visuals = (*own, *(visual for finger in fingers for visual in finger.visuals))
+        self.widths = tuple(width for finger in fingers for width in finger.widths)
+        travel = 0.0
         if description.hand is not None:
-            self._join(description.hand, resolution)
-            return
-        links = [joint.link for joint in description.joints.values() if joint.link is not None]
-        self.widths = tuple(link.width for link in links)
-        self.size = BASE_LEAD * links[0].width + sum(link.length for link in links)
-        solids = pin.buildGeomFromUrdfString(self.model, to_urdf(description), pin.GeometryType.VISUAL).geometryObjects
-        self.visuals = tuple(
-            Visual(each.name, int(each.parentJoint), each.geometry, each.placement, tuple(each.meshColor))
-            for each in solids
-        )
-        self.lanes = tendon_lanes(description, self.model)
-        self._pieces = {
-            name: wind(description, self.model, self.lanes, name, resolution) for name in description.tendons
-        }
-        indices = {name: index for index, name in enumerate(description.joints, start=1)}
-        self.pulleys = tuple(
-            Pulley(name, indices[joint], crossing.radius, self.lanes.offset[name, indices[joint]])
-            for name, tendon in description.tendons.items()
-            for joint, crossing in tendon.crossings.items()
-            if crossing.radius
-        )
-
-    def _join(self, hand: HandDescription, resolution: int) -> None:
-        """Take over the geometries of the fingers of a hand, each in its place."""
-        pieces: dict[str, tuple[Span | Arc, ...]] = {}
-        pulleys, lanes, first = [], [], 0
-        visuals, widths, sizes = list(_palm(hand)), list[float](), []
-        for name, finger in hand.built().items():
-            own, placed, begin = TendonGeometry(finger, resolution=resolution), hand.fingers[name], first
-            place = pin.SE3(placed.rotation, np.array(placed.position))
-            pieces |= {f"{name}.{key}": _moved(each, place, begin) for key, each in own._pieces.items()}
-            pulleys += [replace(each, tendon=f"{name}.{each.tendon}", joint=begin + each.joint) for each in own.pulleys]
-            for each in own.visuals:
-                at = {"link": begin + each.link} if each.link else {"placement": place * each.placement}
-                visuals.append(replace(each, name=f"{name}.{each.name}", **at))
-            lanes.append((begin, own.lanes))
-            widths += own.widths
-            sizes.append(float(np.linalg.norm(placed.position)) + own.size)
-            first += len(finger.joints)
-        self._pieces = {name: pieces[name] for name in self.description.tendons}
-        self.pulleys, self.visuals, self.widths, self.size = tuple(pulleys), tuple(visuals), tuple(widths), max(sizes)
+            travel = sum(description.hand.palm.on_path(axis).greatest for axis in ("x", "y", "z"))
+        self.size = max(finger.size for finger in fingers) + travel
         # Joints are looked at along the axes of the finger that reaches farthest.
-        begin, farthest = lanes[int(np.argmax(sizes))]
-        families = tuple(tuple(begin + joint for joint in family) for family in farthest.families)
-        offsets = {
-            (f"{name}.{tendon}", begin + joint): offset
-            for name, (begin, own) in zip(hand.fingers, lanes, strict=True)
-            for (tendon, joint), offset in own.offset.items()
-        }
-        self.lanes = Lanes(offsets, min(own.spacing for _, own in lanes), families)
+        self.lanes = replace(
+            max(fingers, key=lambda finger: finger.size).lanes,
+            offset={key: at for finger in fingers for key, at in finger.lanes.offset.items()},
+            spacing=min(finger.lanes.spacing for finger in fingers),
+        )
 
-    def poses(self, joint_position: ArrayLike) -> LinkPoses:
-        """Return where the links are at theta, shape (..., n), rad."""
+    def poses(self, joint_position: ArrayLike, base: LinkPoses | None = None) -> LinkPoses:
+        """Return where the links are at theta, shape (..., n), rad.
+
+        Args:
+            joint_position: theta.
+            base: Poses of the base, shapes (..., 3, 3) and (..., 3), where it moves.
+        """
         q = self._checked(joint_position)
         flat, count = np.ascontiguousarray(q.reshape(-1, self.model.nq)), self.model.njoints
         rotation, translation = np.empty((len(flat), count, 3, 3)), np.empty((len(flat), count, 3))
@@ -182,6 +129,10 @@ class TendonGeometry:
             for index, placement in enumerate(data.oMi):
                 rotation[row, index], translation[row, index] = placement.rotation, placement.translation
         leading = q.shape[:-1]
+        if base is not None:
+            turned, moved = base.rotation.reshape(-1, 1, 3, 3), base.translation.reshape(-1, 1, 3)
+            translation = (turned @ translation[..., None])[..., 0] + moved
+            rotation = turned @ rotation
         return LinkPoses(rotation.reshape(*leading, count, 3, 3), translation.reshape(*leading, count, 3))
 
     def paths(
@@ -232,25 +183,6 @@ class TendonGeometry:
                 "joint_position", f"the last of its dimensions must be the {self.model.nq} joints", q.shape
             )
         return q
-
-
-def _moved(pieces: tuple[Span | Arc, ...], place: pin.SE3, begin: int) -> tuple[Span | Arc, ...]:
-    """Return the pieces of a finger's tendon as those of a hand, where its joints begin later."""
-    moved: list[Span | Arc] = []
-    for piece in pieces:
-        if isinstance(piece, Arc):
-            moved.append(replace(piece, joint=begin + piece.joint))
-        elif piece.link:
-            moved.append(replace(piece, link=begin + piece.link))
-        else:
-            moved.append(replace(piece, points=piece.points @ place.rotation.T + place.translation))
-    return tuple(moved)
-
-
-def _palm(hand: HandDescription) -> Iterator[Visual]:
-    if all(hand.palm.size):
-        place = pin.SE3(np.eye(3), np.array(hand.palm.centre))
-        yield Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"])
 
 
 def tendon_paths(

@@ -113,7 +113,7 @@ def wind(
     entry, leave = directions(skew)
 
     mass_link = _mass_link(description, tendon, crossed)
-    start = _start(description, model, path[0])
+    start = _start(lanes, model, path[0])
     begin = _on_pulley(radius[path[0]], lanes.offset[tendon, path[0]] - skew[path[0]], entry[path[0]])
     back = np.array([math.cos(entry[path[0]]), math.sin(entry[path[0]]), 0.0])
     placement = model.jointPlacements[path[0]]
@@ -156,10 +156,9 @@ def _on_pulley(radius: float, offset: float, direction: float) -> Array:
     return np.array([-radius * math.sin(direction), radius * math.cos(direction), offset])
 
 
-def _start(description: FingerDescription, model: pin.Model, joint: int) -> float:
+def _start(lanes: Lanes, model: pin.Model, joint: int) -> float:
     if joint == 1:
-        link = next(iter(description.joints.values())).link
-        return BASE_LEAD * link.width if link is not None else 0.0
+        return BASE_LEAD * lanes.lead
     return LINK_LEAD * float(np.linalg.norm(model.jointPlacements[joint].translation))
 
 

@@ -44,7 +44,7 @@ _STORED = {
     "elastic_tendons": "tendons on spools",
     "gearboxes": "gear bristles",
 }
-_SUPPLIED = ("actuators", "electrical", "fingertip")
+_SUPPLIED = ("actuators", "electrical", "fingertip", "palm")
 _LOST = {
     "tendon_coulomb": ("tendons sliding", VERMILLION),
     "tendon_viscous": ("tendons viscous", ORANGE),
@@ -80,9 +80,9 @@ def plot_energy(result: xr.Dataset) -> Figure:
     time = result["time"].values
     stored = {name: result[f"energy_{name}"].values for name in _STORED if f"energy_{name}" in result}
     shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
-    came_in = [f"energy_exchanged_{name}" for name in _SUPPLIED]
-    supplied = np.asarray(sum(result[name].values for name in came_in if name in result))
-    figure = new_figure(11.0, 6.6)
+    given = [result.get(f"energy_exchanged_{name}") for name in _SUPPLIED]
+    supplied = np.asarray(sum(each.values for each in given if each is not None))
+    figure = new_figure(11.0, max(6.6, 1.15 * len(shown)))
     strips = stack(figure, 0.0, 5.0, [labelled(_STORED[name], "mJ") for name in shown], bottom=0.5)
     title(strips[0], "(a) stored energy")
     for axes, values in zip(strips, shown.values(), strict=True):

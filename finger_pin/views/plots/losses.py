@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
-from finger_pin.views.plots.panels import labelled, legend, stack, title
+from finger_pin.views.plots.panels import flatten_rounding, labelled, legend, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ _COLUMNS = (
 def plot_losses(result: xr.Dataset, finger: str | None = None) -> Figure:
     """Draw what friction takes, from a result.
 
-    (a) One panel per tendon, N: the tension before its friction (the command; of a passive tendon, the proximal half)
-    and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d of (19), the
-    torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
+    (a) One panel per tendon, N: the tension before its friction (the command, or that at a spool; of a passive tendon,
+    the proximal half) and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d
+    of (19), the torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
 
     Of a hand there is a row for each finger, with the friction of its tendons and of its joints.
 
@@ -52,7 +52,8 @@ def plot_losses(result: xr.Dataset, finger: str | None = None) -> Figure:
 
 def _tendons(figure: Figure, result: xr.Dataset) -> None:
     time, tendons = result["time"].values, names(result, "tendon")
-    before = result["tendon_command"].transpose("time", "tendon").values
+    entering = "spool_tension" if "spool_tension" in result else "tendon_command"
+    before = result[entering].transpose("time", "tendon").values
     after = result["tendon_tension"].transpose("time", "tendon").values
     proximal = passive_proximal(result)
     titles = [f"{name}, passive" if name in proximal else name for name in tendons]
@@ -75,6 +76,7 @@ def _joints(figure: Figure, result: xr.Dataset) -> None:
         trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=1.0)
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
+        flatten_rounding(axes)
     title(panels[0], "(b) joint torque before and after joint friction")
     legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=4)
 

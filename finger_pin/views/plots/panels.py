@@ -17,6 +17,9 @@ from finger_pin.views.plots.style import power_of_ten
 # Distances in inches: the top margin, and where labels stand outside a panel.
 _TOP, _LABELS, _LABEL, _TIME = 0.32, 0.92, 0.52, 0.27
 
+# What is below this in the unit of a panel is zero.
+_ROUNDING = 1e-9
+
 # Steps between ticks, times powers of ten.
 _FEW, _MANY = [1, 2, 5, 10], [1, 2, 2.5, 5, 10]
 
@@ -67,6 +70,12 @@ def stack(
 def title(axes: Axes, text: str) -> None:
     """Write a title at a fixed height, so that nothing has to be measured."""
     axes.set_title(text, y=1.0)
+
+
+def flatten_rounding(axes: Axes) -> None:
+    """Make a panel that holds nothing but rounding errors two units high, so that zero looks like zero."""
+    if max(map(abs, axes.dataLim.intervaly)) < _ROUNDING:
+        axes.set_ylim(-1.0, 1.0)
 
 
 def legend(axes: Axes, handles: Sequence[Artist], columns: int) -> None:

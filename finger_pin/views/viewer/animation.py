@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +19,8 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 from finger_pin.views.viewer.things import Things
@@ -36,6 +39,7 @@ def write_animation(
     *,
     forces: ForcePolytope | None = None,
     ghost: xr.Dataset | None = None,
+    finger: Finger | None = None,
 ) -> Path:
     """Write a result as one HTML file that plays it, without a network.
 
@@ -46,6 +50,7 @@ def write_animation(
         path: Of the file.
         forces: Drawn at the fingertip of its posture, if given.
         ghost: Another result, whose finger moves faintly beside this one at the same times, if given.
+        finger: What has moved, where it stands on a model of the user's own (`Finger.from_model`).
 
     Returns:
         The path of the file.
@@ -53,39 +58,48 @@ def write_animation(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    target, text = Path(path), animation_page(result, forces, ghost)
+    target, text = Path(path), animation_page(result, forces, ghost, finger)
     with replacing(target) as temporary:
         Path(temporary).write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def animation_page(result: xr.Dataset, forces: ForcePolytope | None = None, ghost: xr.Dataset | None = None) -> str:
+def animation_page(
+    result: xr.Dataset,
+    forces: ForcePolytope | None = None,
+    ghost: xr.Dataset | None = None,
+    finger: Finger | None = None,
+) -> str:
     """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
-    motion = Motion.of(result)
-    in_view = motion.position[:: max(1, len(motion.time) // _POSITIONS_IN_VIEW)]
+    motion = Motion.of(result, finger=finger)
+    every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
+    seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
     beside = Motion.of(ghost).ghost(motion.time) if ghost is not None else None
-    header = motion.scene.header(motion.title, in_view, motion.largest, live=False, forces=forces, ghost=beside)
-    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension)
+    header = motion.scene.header(
+        motion.title, motion.position[every], motion.largest, live=False, forces=forces, ghost=beside, palm=seen
+    )
+    chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
         chunk["ghost"] = beside.chunk()
     scene = motion.scene
-    tips = scene.tips(scene.geometry.poses(in_view)).reshape(-1, 3)
-    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0))
+    tips = scene.tips(scene.geometry.poses(motion.position[every])).reshape(-1, 3)
+    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0), motion.palm)
     if things is not None:
         header |= things.header(scene.view())
         chunk |= things.chunk()
     return render({**header, "chunks": [chunk]})
 
 
-def posture_page(description: FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
+def posture_page(finger: Finger | FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
     """Return the page of a finger at rest in the posture of its fingertip forces.
 
     Args:
-        description: The finger.
+        finger: The finger, or its description.
         forces: Its forces.
         strands: Tensions to show, shape (s,), N; none by default.
     """
-    scene = Scene(description)
+    scene = Scene(finger)
+    description = scene.geometry.description
     tension = np.zeros((1, len(scene.strands))) if strands is None else np.asarray(strands, dtype=float)[None]
     position = forces.position[None]
     title = description.title or description.name
@@ -103,6 +117,7 @@ class Motion:
         time: Shape (m,), s: samples of the result.
         position: theta, shape (m, n), rad.
         tension: Of every strand, shape (m, s), N.
+        palm: Where the palm is, m poses, if it moves.
     """
 
     scene: Scene
@@ -110,24 +125,27 @@ class Motion:
     time: Array
     position: Array
     tension: Array
+    palm: LinkPoses | None = None
 
     @property
     def largest(self) -> float:
         """Largest tension of all, N."""
-        return float(self.tension.max())
+        return float(self.tension.max(initial=0.0))
 
     def ghost(self, time: Array) -> Ghost:
         """Return it as seen beside another motion, with frames at other times, shape (m,), s; it ends where it ends."""
         position = np.stack([np.interp(time, self.time, column) for column in self.position.T], axis=-1)
+        # A palm is shown at rest beside another one.
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
-    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE) -> Motion:
+    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE, finger: Finger | None = None) -> Motion:
         """Choose the frames of a result.
 
         Args:
             result: What `simulate` returned or saved.
             rate: Frames per second of motion; fewer where the motion is long or the result has fewer samples.
+            finger: What has moved, if it stands on a model of the user's own.
 
         Raises:
             InputError: If the result lacks something that is shown.
@@ -135,7 +153,7 @@ class Motion:
         scenario = _scenario(result)
         hand = scenario.get("hand")
         described = FingerDescription.model_validate(scenario["finger"]) if hand is None else _joined(hand)
-        scene = Scene(described)
+        scene = Scene(finger or described)
         time = _variable(result, "time")
         if len(time) == 0:
             raise InputError("result.time", "must have at least one sample")
@@ -146,7 +164,7 @@ class Motion:
             if not np.isfinite(values).all():
                 raise InputError(f"result.{name}", "must be finite")
         title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
-        return cls(scene, title, time[frames], position, tension)
+        return cls(scene, title, time[frames], position, tension, _palm(result, frames))
 
 
 def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
@@ -160,6 +178,14 @@ def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array
     proximal = _variable(result, "passive_tension_proximal")[frames].reshape(len(frames), passive)
     halves = np.stack([proximal, distal], axis=-1).reshape(len(frames), 2 * passive)
     return np.concatenate([tension[:, :actuated], halves], axis=1)
+
+
+def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:
+    if "palm_position" not in result:
+        return None
+    quaternions = _variable(result, "palm_orientation")[frames]
+    rotations = np.array([pin.Quaternion(each).toRotationMatrix() for each in quaternions])
+    return LinkPoses(rotations, _variable(result, "palm_position")[frames])
 
 
 def _frame_indices(time: Array, rate: float) -> Indices:

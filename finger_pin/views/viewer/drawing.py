@@ -53,7 +53,8 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
         if ahead < -1.0 / rate and index < last:
             continue
         time.sleep(max(0.0, ahead))
-        for command in _frame(scene, motion.position[index], motion.tension[index], scale):
+        palm = motion.palm and LinkPoses(motion.palm.rotation[index], motion.palm.translation[index])
+        for command in _frame(scene, motion.position[index], motion.tension[index], scale, palm):
             _send(visualizer, {**command, "path": root + command["path"]})
 
 
@@ -66,9 +67,9 @@ def tension_colours(tension: Array, scale: float) -> Array:
     return np.asarray(taut + loose * (np.array(_LOOSE) - taut))
 
 
-def _frame(scene: Scene, position: Array, tension: Array, scale: float) -> list[Command]:
+def _frame(scene: Scene, position: Array, tension: Array, scale: float, palm: LinkPoses | None) -> list[Command]:
     geometry = scene.geometry
-    poses = geometry.poses(position)
+    poses = geometry.poses(position, palm)
     commands = [_placement(name, poses, index) for index, name in enumerate(link_names(geometry))]
     colours = tension_colours(tension, scale)
     for path, tendon in zip(geometry.paths(position, scene.looseness(tension), poses), scene.tendons, strict=True):

@@ -6,6 +6,7 @@ import base64
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,10 @@ from numpy.typing import ArrayLike
 from finger_pin.analysis import ForcePolytope
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry
+from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.solids import ROOT, link_names, root_command, solid_commands
+from finger_pin.views.viewer.solids import ROOT, is_mesh, link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
 SLACK_TENSION = 0.05
@@ -62,18 +62,20 @@ class Ghost:
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
-def shown(finger: Finger | FingerDescription) -> FingerDescription:
-    """Return the description of what can be shown, a finger or the description of one.
+def shown(finger: Finger | FingerDescription) -> TendonGeometry | TreeGeometry:
+    """Return what can be shown of a finger or hand, or of the description of one.
 
     Raises:
-        InputError: If it is a finger on a model of the user's own (`Finger.from_model`), whose looks are not known.
+        InputError: If a joint of a description carries no link.
     """
+    description = finger if isinstance(finger, FingerDescription) else finger.description
+    if description.tree is not None:
+        return TreeGeometry(description)
     if isinstance(finger, FingerDescription):
-        return finger
-    if finger.rigid_body.joints != tuple(finger.description.joints):
-        allowed = "stands on another model (Finger.from_model); the viewer shows fingers that are made of links"
-        raise InputError(f"finger {finger.description.name}", allowed)
-    return finger.description
+        return TendonGeometry(finger, resolution=_RESOLUTION)
+    foreign = finger.visuals is not None
+    body = finger.rigid_body if foreign else None
+    return TendonGeometry(finger.description, resolution=_RESOLUTION, body=body, solids=finger.visuals)
 
 
 class Scene:
@@ -86,17 +88,14 @@ class Scene:
         tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots.
     """
 
-    def __init__(self, description: FingerDescription) -> None:
+    def __init__(self, finger: Finger | FingerDescription) -> None:
         """Prepare solids and tendons.
 
         Raises:
-            InputError: If a joint carries no link.
+            InputError: If a joint of a description carries no link.
         """
-        for name, joint in description.joints.items():
-            if joint.link is None:
-                allowed = "is missing; the viewer shows fingers whose joints all have links, not those on another model"
-                raise InputError(f"finger.joints.{name}.link", allowed)
-        self.geometry = TendonGeometry(description, resolution=_RESOLUTION)
+        self.geometry = shown(finger)
+        description = self.geometry.description
         halves = [f"{name} {half}" for name in description.passive_names for half in ("proximal", "distal")]
         self.strands = (*description.actuated_names, *halves)
         self._widths, size = self.geometry.widths, self.geometry.size
@@ -124,6 +123,7 @@ class Scene:
         live: bool,
         forces: ForcePolytope | None = None,
         ghost: Ghost | None = None,
+        palm: LinkPoses | None = None,
     ) -> dict[str, Any]:
         """Return what the page needs to know before the first frame.
 
@@ -134,13 +134,15 @@ class Scene:
             live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
             ghost: Another finger, drawn faintly beside this one, if given.
+            palm: Where the palm is at those positions, if it moves.
         """
         geometry, tube = self.geometry, self.tube_radius
-        poses = geometry.poses(joint_positions)
+        poses = geometry.poses(joint_positions, palm)
         paths = geometry.paths(joint_positions, poses=poses)
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
-        seen = [poses.translation, self.tips(poses), *(path.points for path in paths)]
+        seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
+        seen += [_corners(visual, poses) for visual in geometry.visuals if is_mesh(visual.shape)]
         if shown is not None:
             seen.append(shown.corners)
         if ghost is not None:
@@ -168,17 +170,22 @@ class Scene:
             "chunks": [],
         }
 
-    def chunk(self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike) -> dict[str, str]:
+    def chunk(
+        self, time: ArrayLike, joint_position: ArrayLike, tension: ArrayLike, palm: LinkPoses | None = None
+    ) -> dict[str, str]:
         """Return frames for the page.
 
         Args:
             time: Shape (m,), s.
             joint_position: theta, shape (m, n), rad.
             tension: Of every strand, shape (m, s), N.
+            palm: Where the palm is, if it moves.
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
-        poses = self.geometry.poses(q)
-        paths = np.concatenate([path.points for path in self.geometry.paths(q, self.looseness(f), poses)], axis=-2)
+        poses = self.geometry.poses(q, palm)
+        none = np.zeros((*q.shape[:-1], 0, 3))
+        drawn = [none, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
+        paths = np.concatenate(drawn, axis=-2)
         return {
             "time": _encode(time, "<f8"),
             "pose": _encode_poses(poses),
@@ -227,6 +234,15 @@ class Scene:
         back = -(frame[:, 2] - (frame[:, 2] @ up) * up)
         back /= np.linalg.norm(back)
         return np.array([np.cross(back, up), back, up])
+
+
+def _corners(visual: Visual, poses: LinkPoses) -> Array:
+    """Return the corners of the box around a mesh in all poses of its link."""
+    corners = np.asarray(visual.shape.vertices())
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    box = np.array(list(product(*zip(low, high, strict=True)))) @ visual.placement.rotation.T
+    rotation, translation = poses.rotation[..., visual.link, :, :], poses.translation[..., visual.link, None, :]
+    return np.asarray((box + visual.placement.translation) @ np.swapaxes(rotation, -1, -2) + translation)
 
 
 def _outermost(points: Array) -> Array:

@@ -22,7 +22,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
-from finger_pin.views.viewer.scene import Scene, shown
+from finger_pin.views.viewer.scene import Scene
 from finger_pin.views.viewer.server import PageServer
 
 #: Upper end of the legend before a live tension exceeds it, N.
@@ -78,6 +78,7 @@ def view(
     *,
     forces: ForcePolytope | None = None,
     ghost: xr.Dataset | None = None,
+    finger: Finger | None = None,
     open_browser: bool | None = None,
     block: bool | None = None,
 ) -> Viewing:
@@ -87,6 +88,7 @@ def view(
         result: What `simulate` returned or saved.
         forces: What `force_polytope` returned, drawn translucent at the fingertip of its posture.
         ghost: Another result, whose finger moves faintly beside this one at the same times.
+        finger: What has moved, where it stands on a model of the user's own (`Finger.from_model`).
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
@@ -96,7 +98,7 @@ def view(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    return _served(animation_page(result, forces, ghost), open_browser, block)
+    return _served(animation_page(result, forces, ghost, finger), open_browser, block)
 
 
 def view_forces(
@@ -122,7 +124,7 @@ def view_forces(
     Raises:
         InputError: If the finger is not made of links.
     """
-    return _served(posture_page(shown(finger), forces, tension), open_browser, block)
+    return _served(posture_page(finger, forces, tension), open_browser, block)
 
 
 def _served(page: str, open_browser: bool | None, block: bool | None) -> Viewing:
@@ -164,8 +166,8 @@ class LiveView(Viewing):
             open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
             rate: Most frames per second of real time.
         """
-        description = shown(finger)
-        self._scene = Scene(description)
+        self._scene = Scene(finger)
+        description = self._scene.geometry.description
         self._interval = 1.0 / rate
         self._due = -np.inf
         self._started = -np.inf

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import coal
 import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.geometry import TendonGeometry
+from finger_pin.mechanism.geometry import TendonGeometry, TreeGeometry
 
 ROOT = "/finger_pin"
 Command = dict[str, Any]
@@ -22,13 +23,16 @@ GROOVE_COLOUR = (0.55, 0.62, 0.72)
 Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-def link_names(geometry: TendonGeometry) -> list[str]:
+def link_names(geometry: TendonGeometry | TreeGeometry) -> list[str]:
     """Return the names under which the base and the links stand in the scene."""
     return ["base", *(f"{name}_link" for name in geometry.description.joints)]
 
 
 def solid_commands(
-    geometry: TendonGeometry, tube_radius: float, root: str = ROOT, colour: tuple[float, ...] | None = None
+    geometry: TendonGeometry | TreeGeometry,
+    tube_radius: float,
+    root: str = ROOT,
+    colour: tuple[float, ...] | None = None,
 ) -> Iterator[Command]:
     """Yield meshcat's ``set_object`` command for every solid; each hangs below the link that carries it.
 
@@ -39,7 +43,7 @@ def solid_commands(
         colour: Of all solids, red, green and blue; by default each has its own.
 
     Raises:
-        InputError: If a visual is no box, cylinder or sphere.
+        InputError: If a visual is no box, cylinder, sphere or mesh.
     """
     links = link_names(geometry)
     for visual in geometry.visuals:
@@ -66,10 +70,32 @@ def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
         return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z
     if kind == "Sphere":
         return {"type": "SphereGeometry", "radius": shape.radius, "widthSegments": 40, "heightSegments": 28}, np.eye(3)
+    if is_mesh(shape):
+        return _mesh_geometry(shape), np.eye(3)
     if kind == "Box":
         width, height, depth = (2.0 * float(half) for half in shape.halfSide)
         return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, np.eye(3)
-    raise InputError(f"visual {name}", "must be a box, a cylinder or a sphere", kind)
+    raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere or a mesh", kind)
+
+
+def is_mesh(shape: Any) -> bool:
+    """Return whether a geometry of Pinocchio is a mesh."""
+    return isinstance(shape, coal.BVHModelBase)
+
+
+def _mesh_geometry(shape: Any) -> Command:
+    """Return a mesh with a normal for each face, so that its edges show."""
+    corners = np.asarray(shape.vertices())
+    faces = np.array([[triangle[i] for i in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))])
+    points = corners[faces]
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    buffers = {"position": np.round(points.reshape(-1, 3), 5), "normal": np.round(np.repeat(normals, 3, axis=0), 2)}
+    attributes = {
+        name: {"itemSize": 3, "type": "Float32Array", "array": values.ravel().tolist()}
+        for name, values in buffers.items()
+    }
+    return {"type": "BufferGeometry", "data": {"attributes": attributes}}
 
 
 def cylinder(radius: float, height: float) -> Command:

@@ -26,7 +26,7 @@ from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Motion
 from finger_pin.views.viewer.drawing import tension_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
-from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY
+from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, is_mesh
 
 _BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -104,7 +104,7 @@ class _Film:
         """Set the stage: camera, legend, and what stays."""
         scene = motion.scene
         self.motion = motion
-        self.poses = scene.geometry.poses(motion.position)
+        self.poses = scene.geometry.poses(motion.position, motion.palm)
         self.solids = tuple(_solids(scene))
         self.scale = scale_above(motion.largest)
         away = np.array(_AWAY) / np.linalg.norm(_AWAY)
@@ -190,6 +190,8 @@ def _corners(shape: Any) -> Array:
     kind = type(shape).__name__
     if kind == "Cylinder":
         return _ring(shape.radius, 2.0 * shape.halfLength)
+    if is_mesh(shape):
+        return np.asarray(shape.vertices())
     if kind == "Box":
         return np.array(list(product(*((-half, half) for half in shape.halfSide))))
     turns = np.linspace(0.0, np.pi, 13)

@@ -174,6 +174,7 @@ class Player {
       button.onclick = () => this.scene.frame(button.dataset.view);
     }
     window.addEventListener("keydown", (event) => this.key(event));
+    window.addEventListener("resize", () => this.scene.reframe());
     // A phone that is turned.
     window.matchMedia("(orientation: portrait)").addEventListener("change", () => this.scene.frame(this.scene.view));
   }

@@ -275,7 +275,13 @@ class FingerScene {
     controls.minDistance = 0.1 * distance;
     controls.maxDistance = 10 * distance;
     controls.update();
+    this.placed = camera.position.clone();
     this.viewer.set_dirty();
+  }
+
+  // A window of another size needs another place, unless the user has chosen one.
+  reframe() {
+    if (this.viewer.camera.position.distanceTo(this.placed) < 1e-9) this.frame(this.view);
   }
 
   // Names stand where the tendons begin, and make room for each other.

@@ -1,0 +1,147 @@
+"""Force closure that depends on the posture, for tendons whose paths run through space."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.locking import CriticalFriction, critical_friction
+from finger_pin.description.routing import Array, ForceClosure
+from finger_pin.description.validation import finite_vector
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+
+# Postures from which the search for the worst goes on.
+_DEEPER = 3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosureRange(Finding):
+    """Internal tensions over the joints' ranges, t tendons at m postures.
+
+    Attributes:
+        positions: Shape (m, n), rad; the last are those that a search for the worst has ended at.
+        tension: f^k, shape (m, t), largest entry 1; zero where there is no force closure.
+        margin: Least internal tension over the largest, shape (m,); not above 0 where closure is lost.
+        tendons: Names.
+        joints: Names.
+    """
+
+    positions: Array
+    tension: Array
+    margin: Array
+    tendons: tuple[str, ...]
+    joints: tuple[str, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is force closure at every posture."""
+        return bool(np.all(self.tension > 0.0))
+
+    @property
+    def worst(self) -> Array:
+        """The posture with the least margin, shape (n,), rad."""
+        return np.asarray(self.positions[np.argmin(self.margin)])
+
+    def __str__(self) -> str:
+        """Say in one line whether it holds, and where it is least or lost."""
+        where = ", ".join(f"{name} {angle:.3g}" for name, angle in zip(self.joints, self.worst, strict=True))
+        if self.holds:
+            return f"force closure everywhere, tensions differ at most {1 / self.margin.min():.3g}-fold, at {where}"
+        return f"no force closure at {where}"
+
+
+def posed(finger: Finger, position: Sequence[float] | Array) -> Finger:
+    """Return a finger whose tendons have the arms everywhere that they have at a posture, for statics there.
+
+    What this room says of a finger at a posture, such as `critical_friction` and `force_polytope`, it says of one with
+    tendons along paths through ``posed(finger, position)``.
+
+    Args:
+        finger: A finger.
+        position: theta, shape (n,), rad.
+    """
+    theta = finite_vector("position", position, len(finger.routing.joints))
+    if finger.paths is None:
+        return finger
+    coupling, actuated = finger.coupling_at(theta), finger.routing.actuated
+    turns = dict(zip(finger.paths.routes, finger.paths.turn(theta), strict=True))
+    added = [turns.get(str(tendon.along), 0.0) for tendon in finger.description.tendons.values()]
+    routing = replace(
+        finger.routing,
+        coupling=coupling,
+        strand_coupling=np.concatenate([coupling[:actuated], finger.routing.strand_coupling[actuated:]]),
+        curvature_offset=finger.routing.curvature_offset + added,
+    )
+    twin = copy.copy(finger)
+    twin.routing, twin.tendons = routing, replace(finger.tendons, routing=routing)
+    return twin
+
+
+def closure_over_range(finger: Finger, samples: int = 512) -> ClosureRange:
+    """Return force closure over the joints' ranges: at evenly spread postures, and at the worst that is found.
+
+    Postures are a Sobol sequence; from the worst of them a simplex search goes on within the ranges.
+
+    Args:
+        finger: A finger; what its tendons run along may depend on the posture.
+        samples: Postures, best a power of two.
+    """
+    lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
+    spread = scipy.stats.qmc.Sobol(len(lower), seed=0).random(samples)
+    positions = list(lower + spread * (upper - lower))
+    margins = [_closure(finger, each)[1] for each in positions]
+    for start in np.argsort(margins, kind="stable")[:_DEEPER]:
+        found = scipy.optimize.minimize(
+            lambda theta: _closure(finger, theta)[1],
+            positions[start],
+            method="Nelder-Mead",
+            bounds=list(zip(lower, upper, strict=True)),
+            options={"maxfev": 60 * len(lower)},
+        )
+        positions.append(np.clip(found.x, lower, upper))
+    closures = [_closure(finger, each) for each in positions]
+    return ClosureRange(
+        positions=np.array(positions),
+        tension=np.array([closure.tension for closure, _ in closures]),
+        margin=np.array([margin for _, margin in closures]),
+        tendons=finger.routing.tendons,
+        joints=finger.routing.joints,
+    )
+
+
+def locking_over_range(finger: Finger, samples: int = 64) -> tuple[CriticalFriction, Array]:
+    """Return where over the joints' ranges a finger is closest to locking itself, and the posture, shape (n,), rad.
+
+    All joints move in their worst directions, which are 2^n, at evenly spread postures with force closure; tendons
+    along paths have their arms and turns there. The margin is the critical coefficient over the joints' M^c.
+
+    Args:
+        finger: A finger.
+        samples: Postures, best a power of two.
+
+    Raises:
+        InputError: If no posture has force closure.
+    """
+    found = closure_over_range(finger, samples)
+    taut = found.positions[np.all(found.tension > 0.0, axis=1)]
+    if not len(taut):
+        raise InputError("finger.tendons", str(found))
+    critical = [critical_friction(posed(finger, each), each) for each in taut]
+    worst = int(np.argmin([each.coefficient for each in critical]))
+    return critical[worst], np.asarray(taut[worst])
+
+
+def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
+    """Return the internal tensions at a posture, and their margin: with its sign where there is one balance alone."""
+    closure = ForceClosure.of(finger.coupling_at(position), finger.routing.tendons)
+    balances = closure.null_space
+    if balances.shape[1] != 1:
+        return closure, float(closure.tension.min(initial=0.0)) if balances.shape[1] else -1.0
+    balance = balances[:, 0] / np.abs(balances).max()
+    return closure, float(max(balance.min(), (-balance).min()))

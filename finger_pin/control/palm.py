@@ -1,0 +1,67 @@
+"""A palm that moves along a prescribed path: the inertial forces that its motion brings act on every link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.control.signal import Signal
+from finger_pin.description.hand import PATH, HandDescription
+from finger_pin.description.routing import Array
+from finger_pin.laws.palm import base_motion
+from finger_pin.mechanism.rigid_body import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class PalmPath:
+    """Where the palm is, and what its frame sees.
+
+    Attributes:
+        signal: x, y, z, m, and roll, pitch, yaw, rad, over time.
+        gravity: In the world, shape (3,), m/s2.
+    """
+
+    signal: Signal
+    gravity: Array
+
+    @classmethod
+    def of(cls, hand: HandDescription | None, start: float) -> PalmPath | None:
+        """Return the path of a hand's palm from a time on, s; None if it rests."""
+        if hand is None or hand.palm.path is None:
+            return None
+        settings = [hand.palm.on_path(name) for name in PATH]
+        return cls(Signal.from_settings(settings).later(start), np.array(hand.gravity))
+
+    def place(self, time: Array | float) -> tuple[Array, Array]:
+        """Return the palm's place, shape (..., 3), m, and rotation to the world, (..., 3, 3), at times (...)."""
+        at = self.signal.at(time)[0]
+        (a, b, c), (d, e, f) = (np.moveaxis(each(at[..., 3:]), -1, 0) for each in (np.cos, np.sin))
+        rows = [
+            [b * c, e * d * c - a * f, e * a * c + d * f],
+            [b * f, e * d * f + a * c, e * a * f - d * c],
+            [-e, b * d, b * a],
+        ]
+        return at[..., :3], np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+    def base(self, time: Array | float) -> Array:
+        """Return the 27 numbers of `base_motion`, shape (..., 27), at times (...)."""
+        place, first, second, third = (np.moveaxis(self.signal.derivative(time, order), -1, 0) for order in range(4))
+        turns = [each(angle) for angle in place[3:] for each in (np.sin, np.cos)]
+        found = base_motion(first, second, third, turns, self.gravity)
+        return np.stack(np.broadcast_arrays(*found), axis=-1)
+
+    def to_world(self, time: Array, motion: Motion, mass: float) -> Motion:
+        """Return what is seen from the palm, at times (m,), as the world sees it.
+
+        Args:
+            time: Shape (m,), s.
+            motion: With kinetic energies of the motion in the world already, and tips in the palm's frame.
+            mass: Of all that is carried, kg, which gains weight energy with the palm's height.
+        """
+        place, rotation = self.place(time)
+        several = motion.tip.ndim == 3
+        tips = motion.tip if several else motion.tip[:, None]
+        tips = tips @ np.swapaxes(rotation, -1, -2) + place[:, None]
+        lifted = motion.potential_energy - mass * place @ self.gravity
+        return Motion(tips if several else tips[:, 0], motion.kinetic_energy, lifted)

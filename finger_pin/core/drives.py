@@ -1,0 +1,86 @@
+"""Loops of motors in position drive, compiled: sampled at their own period while an island advances."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finger_pin.core.binding import Indices, Matrix, Vector, bound_at, get
+from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.model import MODEL
+from finger_pin.core.rosenbrock import DONE, FULL, INTEGRATION, TIME, advance
+
+
+class Drives(NamedTuple):
+    """The loops of m motors, U = V clip(k_p e + k_d e' + k_i int e, -1, 1); arrays that are memory change in place.
+
+    Attributes:
+        places: Coordinates of the rotors, shape (m,).
+        channels: Inputs that are their voltages, shape (m,).
+        period: s.
+        goals: theta_m^d at multiples of the period, shape (k, m), rad; the last one is kept.
+        resolution: Step of the measured angles, 0 for none, shape (m,), rad.
+        gains: k_p, k_d, k_i, shape (3, m).
+        supply: V, shape (m,), V.
+        taken: Memory, the number of samples so far, shape (1,).
+        integral: Memory, int e, shape (m,).
+        last: Memory, e of the last sample, shape (m,).
+        voltages: Memory, U of every sample, shape (k, m), V.
+    """
+
+    places: Indices
+    channels: Indices
+    period: float
+    goals: Matrix
+    resolution: Vector
+    gains: Matrix
+    supply: Vector
+    taken: Indices
+    integral: Vector
+    last: Vector
+    voltages: Matrix
+
+
+@compiled
+def _sample(drives: Any, x: Any, tension: Any) -> None:
+    """Take a sample of all motors, and set their voltages."""
+    k = min(drives.taken[0], drives.goals.shape[0] - 1)
+    for j in range(drives.places.size):
+        angle, step = x[drives.places[j]], drives.resolution[j]
+        if step > 0.0:
+            angle = np.round(angle / step) * step
+        error = drives.goals[k, j] - angle
+        rate = (error - drives.last[j]) / drives.period if drives.taken[0] > 0 else 0.0
+        drives.last[j] = error
+        summed = drives.integral[j] + error * drives.period
+        duty = drives.gains[0, j] * error + drives.gains[1, j] * rate + drives.gains[2, j] * summed
+        if abs(duty) < 1.0:
+            # The integral stands still while the supply is at its limit.
+            drives.integral[j] = summed
+        drives.voltages[k, j] = drives.supply[j] * min(max(duty, -1.0), 1.0)
+        tension[drives.channels[j]] = drives.voltages[k, j]
+    drives.taken[0] += 1
+
+
+@entry
+def advance_driven(block: Any, drives: Any, end: float, times: Any, states: Any, attitudes: Any, dense: Any) -> Any:
+    """Advance as `rosenbrock.advance` does, and sample at every multiple of the period on the way, its start included.
+
+    A sample at the end itself is taken by the next call.
+    """
+    integration = get(block, INTEGRATION)
+    model = bound_at(integration.model, MODEL)
+    memory, recorded = integration.memory, 0
+    while True:
+        if memory[TIME] >= drives.taken[0] * drives.period and (memory[TIME] < end or drives.taken[0] == 0):
+            _sample(drives, integration.x, model.control.tension)
+        goal = min(end, drives.taken[0] * drives.period)
+        status, steps = advance(
+            block, goal, times[recorded:], states[recorded:], attitudes[recorded:], dense[recorded:]
+        )
+        recorded += steps
+        if status != DONE or memory[TIME] >= end:
+            return status, recorded
+        if recorded == times.size and times.size > 0:
+            return FULL, recorded

@@ -1,0 +1,212 @@
+"""One finger of what is shown: its tendons wound, its solids, and where it begins in the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.hand import HandDescription
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.geometry.foreign import chain, placed_solids, turned_model, width_of
+from finger_pin.mechanism.geometry.lanes import Lanes, tendon_lanes
+from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, Span, wind
+from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.shapes import MATERIALS
+from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+
+
+@dataclass(frozen=True)
+class Visual:
+    """A solid that is fixed to a link.
+
+    Attributes:
+        name: Of the solid.
+        link: Index of the link, 0 for the base.
+        shape: Geometry of Pinocchio: a box, a cylinder, a sphere or a mesh.
+        placement: In the frame of the link.
+        colour: Red, green, blue and opacity, 0 to 1.
+    """
+
+    name: str
+    link: int
+    shape: Any
+    placement: pin.SE3
+    colour: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Pulley:
+    """The winding surface of one tendon at one joint.
+
+    Attributes:
+        tendon: Name of the tendon.
+        joint: Index of the joint, 1 for the first; its axis is the z axis of the link after it.
+        radius: r, signed, m.
+        offset: Along the joint axis, m.
+    """
+
+    tendon: str
+    joint: int
+    radius: float
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class WoundFinger:
+    """A finger with its tendons wound.
+
+    Attributes:
+        pieces: Of its tendons, by name.
+        pulleys: Winding surfaces whose radius is not zero.
+        visuals: Its solids.
+        lanes: How far along the joint axes each tendon runs.
+        widths: Of its links, m.
+        size: How far its tip can be from its base, about, m.
+    """
+
+    pieces: dict[str, tuple[Span | Arc, ...]]
+    pulleys: tuple[Pulley, ...]
+    visuals: tuple[Visual, ...]
+    lanes: Lanes
+    widths: tuple[float, ...]
+    size: float
+
+    @classmethod
+    def of_links(cls, description: FingerDescription, resolution: int) -> WoundFinger:
+        """Wind the tendons of a finger that is made of links.
+
+        Raises:
+            InputError: If a joint carries no link.
+        """
+        model = build_rigid_body(description).model
+        links = [joint.link for joint in description.joints.values() if joint.link is not None]
+        solids = pin.buildGeomFromUrdfString(model, to_urdf(description), pin.GeometryType.VISUAL).geometryObjects
+        visuals = tuple(_visual(each, each.placement) for each in solids)
+        widths = tuple(link.width for link in links)
+        size = BASE_LEAD * widths[0] + sum(link.length for link in links)
+        return cls._wound(description, model, visuals, widths, size, resolution)
+
+    @classmethod
+    def on_chain(cls, description: FingerDescription, model: pin.Model, resolution: int) -> WoundFinger:
+        """Wind the tendons of a finger on the joints of a chain, which carries solids of its own."""
+        width = width_of(description)
+        lengths = [float(np.linalg.norm(each.translation)) for each in list(model.jointPlacements)[2:]]
+        size = BASE_LEAD * width + sum(lengths) + max(lengths, default=width)
+        return cls._wound(description, model, (), (width,) * len(description.joints), size, resolution)
+
+    @classmethod
+    def _wound(
+        cls,
+        description: FingerDescription,
+        model: pin.Model,
+        visuals: tuple[Visual, ...],
+        widths: tuple[float, ...],
+        size: float,
+        resolution: int,
+    ) -> WoundFinger:
+        lanes = tendon_lanes(description, model, widths)
+        pieces = {name: wind(description, model, lanes, name, resolution) for name in description.tendons}
+        indices = {name: index for index, name in enumerate(description.joints, start=1)}
+        pulleys = tuple(
+            Pulley(name, indices[joint], crossing.radius, lanes.offset[name, indices[joint]])
+            for name, tendon in description.tendons.items()
+            for joint, crossing in tendon.crossings.items()
+            if crossing.radius
+        )
+        return cls(pieces, pulleys, visuals, lanes, widths, size)
+
+    def placed(self, name: str, place: pin.SE3, first: int) -> WoundFinger:
+        """Return it as part of a hand: under dotted names, on its place, with its joints after ``first`` others."""
+        lanes = replace(
+            self.lanes,
+            offset={(f"{name}.{tendon}", first + joint): at for (tendon, joint), at in self.lanes.offset.items()},
+            families=tuple(tuple(first + joint for joint in family) for family in self.lanes.families),
+        )
+        pulleys = (replace(each, tendon=f"{name}.{each.tendon}", joint=first + each.joint) for each in self.pulleys)
+        visuals = (
+            replace(
+                each,
+                name=f"{name}.{each.name}",
+                link=each.link and first + each.link,
+                placement=each.placement if each.link else place * each.placement,
+            )
+            for each in self.visuals
+        )
+        return replace(
+            self,
+            pieces={f"{name}.{key}": _moved(each, place, first) for key, each in self.pieces.items()},
+            pulleys=tuple(pulleys),
+            visuals=tuple(visuals),
+            lanes=lanes,
+            size=self.size + float(np.linalg.norm(place.translation)),
+        )
+
+
+def fingers_of_links(description: FingerDescription, resolution: int) -> list[WoundFinger]:
+    """Return the fingers of a hand that is made of links, or the only one.
+
+    Raises:
+        InputError: If a joint carries no link.
+    """
+    for name, joint in description.joints.items():
+        if joint.link is None:
+            allowed = "is missing; the viewer shows links, or with finger= the model of the user's own"
+            raise InputError(f"finger.joints.{name}.link", allowed)
+    hand, first, found = description.hand, 0, []
+    if hand is None:
+        return [WoundFinger.of_links(description, resolution)]
+    for name, finger in hand.built().items():
+        placed = hand.fingers[name]
+        place = pin.SE3(placed.rotation, np.array(placed.position))
+        found.append(WoundFinger.of_links(finger, resolution).placed(name, place, first))
+        first += len(finger.joints)
+    return found
+
+
+def fingers_on_model(
+    description: FingerDescription, body: RigidBody, solids: pin.GeometryModel | None, resolution: int
+) -> tuple[pin.Model, list[WoundFinger], tuple[Visual, ...]]:
+    """Return a model whose joint axes are z, the fingers on it, and its solids.
+
+    Raises:
+        InputError: If a joint does not turn, or the joints of a finger do not follow each other.
+    """
+    model, turns = turned_model(body)
+    hand, first, found = description.hand, 0, []
+    for name, finger in {"": description}.items() if hand is None else hand.built().items():
+        wound = WoundFinger.on_chain(finger, chain(model, first + 1, len(finger.joints)), resolution)
+        found.append(wound.placed(name, pin.SE3.Identity(), first) if name else wound)
+        first += len(finger.joints)
+    placed = placed_solids(solids, turns) if solids is not None else ()
+    return model, found, tuple(_visual(each, placement) for each, placement in placed)
+
+
+def palm_of(hand: HandDescription | None) -> tuple[Visual, ...]:
+    """Return the box of a palm, if it has one."""
+    if hand is None or not all(hand.palm.size):
+        return ()
+    place = pin.SE3(np.eye(3), np.array(hand.palm.centre))
+    return (Visual("palm", 0, coal.Box(*hand.palm.size), place, MATERIALS["palm"]),)
+
+
+def _visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:
+    red, green, blue, opacity = (float(part) for part in solid.meshColor)
+    return Visual(solid.name, int(solid.parentJoint), solid.geometry, placement, (red, green, blue, opacity))
+
+
+def _moved(pieces: tuple[Span | Arc, ...], place: pin.SE3, first: int) -> tuple[Span | Arc, ...]:
+    """Return the pieces of a finger's tendon as those of a hand, where its joints come after others."""
+    moved: list[Span | Arc] = []
+    for piece in pieces:
+        if isinstance(piece, Arc):
+            moved.append(replace(piece, joint=first + piece.joint))
+        elif piece.link:
+            moved.append(replace(piece, link=first + piece.link))
+        else:
+            moved.append(replace(piece, points=piece.points @ place.rotation.T + place.translation))
+    return tuple(moved)

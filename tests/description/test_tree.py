@@ -1,0 +1,105 @@
+"""Trees of bodies: what is refused, by the name of its entry."""
+
+import copy
+
+import pytest
+
+import finger_pin as fp
+from finger_pin.description.validation import validate
+
+FINGER = {
+    "name": "seesaw",
+    "joints": {"hinge": {"range": [-0.3, 0.3]}},
+    "tendons": {"pull": {"along": "upper"}},
+    "tree": {
+        "bodies": {"link": {"mass": 0.02, "inertia": [1e-5, 1e-5, 1e-5, 0.0, 0.0, 0.0]}, "tip": {"parent": "link"}},
+        "joints": {"hinge": {"body": "link"}},
+        "tendons": {
+            "upper": {
+                "path": {
+                    "a": {"kind": "point"},
+                    "wrap": {"kind": "cylinder", "radius": 0.01},
+                    "b": {"kind": "point", "body": "link", "position": [0.03, 0.0, 0.01]},
+                }
+            },
+            "sum": {"joints": {"hinge": 0.01}},
+        },
+        "couplings": {"held": {"joint": "hinge"}},
+        "actuators": {"motor": {"tendon": "sum"}},
+    },
+}
+
+
+def changed(**entries):
+    """Return the description with entries at keys whose dots are double underscores; None takes one away."""
+    table = copy.deepcopy(FINGER)
+    for key, value in entries.items():
+        *path, last = key.split("__")
+        inner = table
+        for part in path:
+            inner = inner[part]
+        if value is None:
+            del inner[last]
+        else:
+            inner[last] = value
+    return validate(fp.FingerDescription, table, ("finger",))
+
+
+def test_the_tree_itself_is_taken():
+    assert changed().tree.crossed("upper") == {"hinge"}
+    assert fp.Finger(changed()).mechanism.channels == 2
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "says"),
+    [
+        ("tree__bodies__link__parent", "tip", "finger.tree.bodies.link.parent"),
+        ("tree__bodies__tip__parent", "lnk", "did you mean link"),
+        ("tree__bodies__link__orientation", [1.0, 1.0, 0.0, 0.0], "quaternion x, y, z, w of length 1"),
+        ("tree__bodies__link__mass", -1.0, "finger.tree.bodies.link.mass = -1.0: must be at least 0"),
+        ("tree__joints__hinge__axis", [0.0, 0.5, 0.0], "must be a unit vector"),
+        ("tree__joints__hinge__body", "thumb", "no such body; there are link, tip"),
+        ("tree__joints__hinge__kind", "ball", "must be one of hinge, slide"),
+        ("joints__more", {"range": [0.0, 1.0]}, "must be those of the finger, in order: hinge, more"),
+        ("tree__tendons__upper__path__b__body", "palm", "finger.tree.tendons.upper.path.b.body"),
+        ("tree__tendons__upper__path__a", None, "a wrap stands between two points"),
+        ("tree__tendons__upper__path__b", None, "must end with a point"),
+        ("tree__tendons__upper__path__wrap__radius", 0.0, "must be above 0"),
+        ("tree__tendons__upper__joints", {"hinge": 1.0}, "needs joints or a path, and not both"),
+        ("tree__tendons__sum__joints", {"elbow": 1.0}, "no such joint; there are hinge"),
+        ("tree__tendons__sum__range", [1.0, 0.0], "the least length must be below the largest"),
+        ("tree__tendons__sum__rest", [1.0, 0.0], "the first length must not be above the second"),
+        ("tree__actuators__motor__joint", "hinge", "drives a joint or a tendon, and not both"),
+        ("tree__actuators__motor__force_range", [1.0, 0.0], "the lower limit must not be above the upper one"),
+        ("tree__couplings__held__other", "knee", "no such joint; there are hinge"),
+        ("tree__tip", {"body": "nail"}, "no such body"),
+        ("tendons__pull__along", "lower", "no such tendon of the tree; there are upper, sum"),
+        ("tendons__pull__crossings", {"hinge": {"radius": 0.01}}, "has no place beside crossings"),
+        ("tendons__pull__kind", "passive", "is for actuated tendons only"),
+        ("tree", None, "no such tendon of the tree; there are none"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_its_name(entry, value, says):
+    with pytest.raises(fp.InputError) as refused:
+        changed(**{entry: value})
+    assert says in str(refused.value) and str(refused.value).startswith("finger.t")
+
+
+def test_a_joint_that_moves_nothing_is_refused():
+    light = changed(tree__bodies__link={"mass": 0.0})
+    with pytest.raises(fp.InputError, match=r"finger\.tree\.joints\.hinge: moves nothing that has mass or inertia"):
+        fp.Finger(light)
+
+
+def test_actuators_of_a_tree_are_driven_in_open_loop_alone():
+    scenario = {"name": "x", "finger": FINGER, "controller": {"kind": "proportional"}}
+    with pytest.raises(fp.InputError, match=r"controller\.kind"):
+        validate(fp.Scenario, scenario, ())
+    scenario["controller"] = {"kind": "tensions", "inputs": {"moter": {"offset": 1.0}}}
+    with pytest.raises(fp.InputError, match="no such actuator; there are motor; did you mean motor"):
+        validate(fp.Scenario, scenario, ())
+
+
+def test_a_tree_is_not_placed_on_a_palm():
+    with pytest.raises(fp.InputError, match="a tree of bodies cannot be placed on a palm"):
+        validate(fp.HandDescription, {"name": "hand", "fingers": {"index": {"finger": FINGER}}}, ("hand",))
