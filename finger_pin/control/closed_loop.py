@@ -218,10 +218,16 @@ class ClosedLoop:
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips and energies at times (m,) and states, in the world: the base frame of a palm at rest."""
-        found = self.dynamics.motion(state.position, state.velocity, self.base(time))
-        if self.palm is None:
-            return found
-        return self.palm.to_world(time, found, self.finger.rigid_body.mass)
+        base, around, objects = self.base(time), self.finger.surroundings, None
+        found = self.dynamics.motion(state.position, state.velocity, base)
+        if around is not None and state.object_pose is not None and state.object_velocity is not None:
+            objects = around.energies(state.object_pose, state.object_velocity, base)
+        if self.palm is not None:
+            found = self.palm.to_world(time, found, self.finger.rigid_body.mass)
+            if around is not None and objects is not None:
+                lifted = objects[1] - np.sum(around.mass) * self.palm.place(time)[0] @ self.palm.gravity
+                objects = objects[0], lifted
+        return replace(found, objects=objects)
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:
         """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
