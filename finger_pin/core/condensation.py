@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.core import law_code as at
+from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled, compiled_loosely
-from finger_pin.core.paths import add_pushes
 
 
 @compiled
@@ -31,58 +31,9 @@ def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, out: Any)
 
 
 @compiled
-def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, out: Any) -> None:
-    """Add the change of a contact's gap, speed and slips, with a weight each."""
-    width = linear.mass.shape[0]
-    for m in range(3):
-        by_length, by_speed = (weights[0] if m == 0 else 0.0), weights[m + 1]
-        for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
-            j = tables.arm_at[e]
-            out[j] += by_length * linear.measure[e] + by_speed * linear.turning[e]
-            out[width + j] += by_speed * linear.arm[e]
-
-
-@compiled
-def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any) -> None:
-    """Fill the gains of the three rows of a contact and of its two states."""
-    width, slopes = linear.mass.shape[0], work.slopes
-    wide = linear.load.size
-    first, second = tables.state[k + 1], tables.state[k + 2]
-    # (g - A) dz = r_z + B (what the contact sees): A is two by two.
-    a, b = g - slopes[at.R_LENGTH + 4, k + 1], -slopes[at.R_LENGTH + 5, k + 1]
-    c, d = -slopes[at.R_LENGTH + 4, k + 2], g - slopes[at.R_LENGTH + 5, k + 2]
-    inverse = 1.0 / (a * d - b * c)
-    for i in range(2):
-        by_first, by_second = (inverse * d, -inverse * b) if i == 0 else (-inverse * c, inverse * a)
-        own = linear.state_gain[first if i == 0 else second]
-        for column in range(wide):
-            own[column] = 0.0
-        weights = (
-            by_first * slopes[at.R_LENGTH, k + 1] + by_second * slopes[at.R_LENGTH, k + 2],
-            by_first * slopes[at.R_LENGTH + 1, k + 1] + by_second * slopes[at.R_LENGTH + 1, k + 2],
-            by_first * slopes[at.R_LENGTH + 2, k + 1] + by_second * slopes[at.R_LENGTH + 2, k + 2],
-            by_first * slopes[at.R_LENGTH + 3, k + 1] + by_second * slopes[at.R_LENGTH + 3, k + 2],
-        )
-        _add_inputs(tables, k, weights, linear, own)
-        own[2 * width + first] += by_first
-        own[2 * width + second] += by_second
-    for m in range(3):
-        row = linear.gain[k + m]
-        of_first, of_second = slopes[4, k + m], slopes[5, k + m]
-        for column in range(wide):
-            row[column] = of_first * linear.state_gain[first, column] + of_second * linear.state_gain[second, column]
-        weights = slopes[0, k + m], slopes[1, k + m], slopes[2, k + m], slopes[3, k + m]
-        _add_inputs(tables, k, weights, linear, row)
-        for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
-            arm, target = linear.arm[e], linear.force[tables.arm_at[e]]
-            if arm != 0.0:
-                for column in range(wide):
-                    target[column] += arm * row[column]
-
-
-@compiled
-def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
+def _gains(model: Any, address: int, g: float) -> None:
     """Fill the gains of all rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
+    tables, control, work, linear = model.tables, model.control, model.work, model.linear
     count, width = tables.state.size, linear.mass.shape[0]
     load, command, force, slopes = linear.load, linear.command, linear.force, work.slopes
     wide = load.size
@@ -96,10 +47,10 @@ def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
             for j in range(width):
                 for r in range(3):
                     force[j, last] += work.jacobian[t, r, j] * work.force_rate[t, r]
+    if tables.touching:
+        call_at(model.touch, address, g)
     for k in range(count):
         if tables.touch[k] > 0:
-            if tables.touch[k] == 1:
-                _contact_gains(tables, g, k, work, linear)
             continue
         row, state = linear.gain[k], tables.state[k]
         of_length, of_speed, of_curvature = slopes[at.F_LENGTH, k], slopes[at.F_SPEED, k], slopes[at.F_CURVATURE, k]
@@ -125,7 +76,7 @@ def _gains(tables: Any, control: Any, g: float, work: Any, linear: Any) -> None:
                     load[c] += linear.load_by_position[k, c]
                 load[last] += linear.load_by_time[k]
                 if tables.touching:
-                    add_pushes(tables, work, k, linear.gain, load)
+                    call_at(model.press, address, float(k))
             for c in range(wide):
                 row[c] = of_load * load[c]
             if by_load != 0.0:
@@ -222,12 +173,13 @@ def _substitute(matrix: Any, pivots: Any, right: Any) -> None:
 
 
 @compiled
-def condense(tables: Any, control: Any, g: float, work: Any, linear: Any) -> bool:
+def condense(model: Any, address: int, g: float) -> bool:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
+    linear = model.linear
     width = linear.mass.shape[0]
     states = linear.state_gain.shape[0]
     wide = linear.load.size
-    _gains(tables, control, g, work, linear)
+    _gains(model, address, g)
     force, velocity, reduced = linear.force, linear.velocity, linear.reduced
     inverse = 1.0 / g
     for i in range(width):

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import inputs, move_base, tip_forces
+from finger_pin.core.inputs import inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
-from finger_pin.core.paths import measure_paths, passes, push
+from finger_pin.core.paths import passes, push
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.tables import BENT, END, FED, FIRST, PRESSED, STATEFUL
 
@@ -125,17 +126,20 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
 
 
 @compiled
-def evaluate(tables: Any, control: Any, time: float, x: Any, work: Any, rate: Any) -> None:
+def evaluate(model: Any, address: int, time: float) -> None:
     """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
+    tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
     size, width = tables.parents.size, work.torque.size
     q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
     inputs(control, time, q, v, work.command)
-    move_base(control, time, tables, work)
+    if model.carry != 0:
+        call_at(model.carry, address, time)
     move(tables, q, v, work)
     if tables.loaded:
         tip_forces(control, time, tables)
         _tips(tables, work)
-    measure_paths(tables, work)
+    if model.measure != 0:
+        call_at(model.measure, address, time)
     _exert(tables, q, v, z, work, rate[2 * width :])
     mass_matrix(tables, work)
     factorise_mass(size, work)

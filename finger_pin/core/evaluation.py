@@ -38,7 +38,7 @@ class CompiledMechanism:
         mechanism, tables = self.mechanism, self._tables
         own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy())
         work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
-        return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work)
+        return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work, mechanism.moved)
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""

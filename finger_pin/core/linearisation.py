@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Indices, Matrix, Vector
+from finger_pin.core.binding import Indices, Matrix, Vector, call_at
 from finger_pin.core.compilation import compiled
 from finger_pin.core.inputs import input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
-from finger_pin.core.paths import linearise_paths, passes, turn_pushes
-from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, bias_rate, inverse_dynamics
+from finger_pin.core.paths import passes
+from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.tables import END, FIRST, Tables
 
@@ -158,13 +158,12 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
                 pull[0] * (a[1] * z - a[2] * y) + pull[1] * (a[2] * x - a[0] * z) + pull[2] * (a[0] * y - a[1] * x)
             ) / size
             j = tables.parents[j]
-        if tables.touching:
-            turn_pushes(tables, work, k, size, linear.load_by_position[k])
 
 
 @compiled
-def linearise(tables: Any, control: Any, time: float, x: Any, work: Any, linear: Any) -> None:
+def linearise(model: Any, address: int, time: float) -> None:
     """Fill all partial derivatives after `evaluate` at the same time and state."""
+    tables, control, x, work, linear = model.tables, model.control, model.state, model.work, model.linear
     size, width = tables.parents.size, work.torque.size
     velocity = x[width : 2 * width]
     # The derivatives of inverse dynamics are taken at the actual acceleration.
@@ -176,7 +175,7 @@ def linearise(tables: Any, control: Any, time: float, x: Any, work: Any, linear:
             linear.by_position[i, j] = work.square[BY_POSITION, i, j]
             linear.by_velocity[i, j] = work.square[BY_VELOCITY, i, j]
     if control.palm.harmonics.shape[0] > 0:
-        bias_rate(tables, velocity, work, linear.bias_rate)
+        call_at(model.sway, address, time)
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
@@ -187,5 +186,6 @@ def linearise(tables: Any, control: Any, time: float, x: Any, work: Any, linear:
         call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
-    linearise_paths(tables, velocity, work, linear)
     _load_slopes(tables, work, linear)
+    if model.turn != 0:
+        call_at(model.turn, address, time)

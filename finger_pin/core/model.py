@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from finger_pin.core import condensation, dynamics, linearisation
+from finger_pin.core import condensation, contacts, dynamics, linearisation, paths
 from finger_pin.core.binding import Vector, block_for, bound_at, kind_of, put
 from finger_pin.core.compilation import address_of, entry
-from finger_pin.core.inputs import Control
+from finger_pin.core.inputs import Control, move_base
 from finger_pin.core.linearisation import Linear, build_linear
+from finger_pin.core.rigid_body import base_power, bias_rate
 from finger_pin.core.tables import Tables, Work
 
 
@@ -33,6 +34,13 @@ class Model(NamedTuple):
         evaluate: Address of the function that fills ``rate``, at a time.
         linearise: Address of the function that fills all partial derivatives after it, at a time.
         condense: Address of the function that fills the solution of (g - J) u = r for a g; 0 where it is singular.
+        measure: Address of what `evaluate` calls for paths through space; 0 without any, as for the next three.
+        turn: Address of what `linearise` calls for them.
+        touch: Address of what `condense` calls for contacts.
+        press: Address of what it calls for the pin of a row that their forces may pass.
+        carry: Address of what `evaluate` calls for a base that moves; 0 at rest, as for the next two.
+        sway: Address of what `linearise` calls for it.
+        power: Address of what fills the power that it supplies.
     """
 
     tables: Tables
@@ -44,6 +52,13 @@ class Model(NamedTuple):
     evaluate: int
     linearise: int
     condense: int
+    measure: int
+    turn: int
+    touch: int
+    press: int
+    carry: int
+    sway: int
+    power: int
 
 
 MODEL = kind_of(Model)
@@ -57,10 +72,16 @@ class BoundModel:
         address: Of what `bound_at` reads.
     """
 
-    def __init__(self, tables: Tables, control: Control, work: Work) -> None:
-        """Bind; arrays are taken as they are, not copied."""
+    def __init__(self, tables: Tables, control: Control, work: Work, moved: bool = False) -> None:
+        """Bind; arrays are taken as they are, not copied. The base may be ``moved`` by others than its control."""
         size = 2 * len(work.torque) + int(tables.state.max(initial=-1)) + 1
-        self.model = Model(tables, control, work, build_linear(tables), np.zeros(size), np.zeros(size), *_units())
+        moved = moved or len(control.palm.harmonics) > 0
+        units = (
+            *_units(),
+            *(_units_for_paths() if len(tables.paths.columns) else (0, 0, 0, 0)),
+            *(_units_for_base() if moved else (0, 0, 0)),
+        )
+        self.model = Model(tables, control, work, build_linear(tables), np.zeros(size), np.zeros(size), *units)
         self._block = block_for(MODEL)
         bind(self.model, self._block)
         self.address = int(self._block.ctypes.data)
@@ -79,18 +100,79 @@ def _units() -> tuple[int, int, int]:
     return evaluate, linearise, condense
 
 
+@cache
+def _units_for_paths() -> tuple[int, int, int, int]:
+    """Compile what only mechanisms with paths through space or contacts need."""
+    kind = types.int64(types.int64, types.float64)
+    measure, turn, touch, press = (address_of(kind, each, kept=True) for each in (_measure, _turn, _touch, _press))
+    return measure, turn, touch, press
+
+
+@cache
+def _units_for_base() -> tuple[int, int, int]:
+    """Compile what only mechanisms on a base that moves need."""
+    kind = types.int64(types.int64, types.float64)
+    carry, sway, power = (address_of(kind, each, kept=True) for each in (_carry, _sway, _power))
+    return carry, sway, power
+
+
 def _evaluate(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
-    dynamics.evaluate(model.tables, model.control, time, model.state, model.work, model.rate)
+    dynamics.evaluate(model, address, time)
     return 1
 
 
 def _linearise(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
-    linearisation.linearise(model.tables, model.control, time, model.state, model.work, model.linear)
+    linearisation.linearise(model, address, time)
     return 1
 
 
 def _condense(address: int, g: float) -> int:
     model = bound_at(address, MODEL)
-    return 1 if condensation.condense(model.tables, model.control, g, model.work, model.linear) else 0
+    return 1 if condensation.condense(model, address, g) else 0
+
+
+def _measure(address: int, _time: float) -> int:
+    model = bound_at(address, MODEL)
+    paths.measure_paths(model.tables, model.work)
+    return 1
+
+
+def _turn(address: int, _time: float) -> int:
+    model = bound_at(address, MODEL)
+    width = model.work.torque.size
+    paths.linearise_paths(model.tables, model.state[width : 2 * width], model.work, model.linear)
+    return 1
+
+
+def _touch(address: int, g: float) -> int:
+    model = bound_at(address, MODEL)
+    contacts.all_contact_gains(model.tables, g, model.work, model.linear)
+    return 1
+
+
+def _press(address: int, row: float) -> int:
+    model = bound_at(address, MODEL)
+    contacts.add_pushes(model.tables, model.work, int(row), model.linear.gain, model.linear.load)
+    return 1
+
+
+def _carry(address: int, time: float) -> int:
+    model = bound_at(address, MODEL)
+    move_base(model.control, time, model.tables, model.work)
+    return 1
+
+
+def _sway(address: int, _time: float) -> int:
+    model = bound_at(address, MODEL)
+    width = model.work.torque.size
+    bias_rate(model.tables, model.state[width : 2 * width], model.work, model.linear.bias_rate)
+    return 1
+
+
+def _power(address: int, _time: float) -> int:
+    model = bound_at(address, MODEL)
+    width = model.work.torque.size
+    model.work.base_power[0] = base_power(model.tables, model.state[width : 2 * width], model.work)
+    return 1

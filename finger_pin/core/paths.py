@@ -286,8 +286,24 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
 
 
 @compiled
+def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
+    """Add to a pin's load what contacts do that turn with the posture at constant forces."""
+    paths, own = tables.paths, work.paths
+    size = max(work.rows[LOAD, k], 1e-100)
+    for e in range(paths.columns.size):
+        share = passes(paths, e, tables.pins[k]) / size
+        if share == 0.0 or own.active[e] == 0:
+            continue
+        for s in range(paths.start[e], paths.start[e + 1]):
+            for m in range(3):
+                force = share * work.rows[FORCE, paths.row[e] + m]
+                for r in range(3):
+                    by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
+
+
+@compiled
 def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
-    """Fill the derivatives of arms and turns after `measure_paths`; subtract those of A^T phi from by_position."""
+    """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
     paths, own = tables.paths, work.paths
     for e in range(paths.columns.size):
         if own.active[e]:
@@ -321,35 +337,7 @@ def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
             linear.arm[a], linear.measure[a] = work.arm[a], work.gradient[a]
             linear.turning[a] = gather[tables.arm_at[a]]
             gather[tables.arm_at[a]] = 0.0
-
-
-@compiled
-def turn_pushes(tables: Any, work: Any, k: int, size: float, by_position: Any) -> None:
-    """Add to a pin's load what contacts do that turn with the posture at constant forces; ``size`` is the load."""
-    paths, own = tables.paths, work.paths
-    for e in range(paths.columns.size):
-        share = passes(paths, e, tables.pins[k]) / size
-        if share == 0.0 or own.active[e] == 0:
-            continue
-        for s in range(paths.start[e], paths.start[e + 1]):
-            for m in range(3):
-                force = share * work.rows[FORCE, paths.row[e] + m]
-                for r in range(3):
-                    by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
-
-
-@compiled
-def add_pushes(tables: Any, work: Any, k: int, gain: Any, load: Any) -> None:
-    """Add to the change of a pin's load that of the forces of contacts; ``gain`` is theirs."""
-    paths, own = tables.paths, work.paths
-    for e in range(paths.columns.size):
-        passing = passes(paths, e, tables.pins[k])
-        if passing == 0.0 or own.active[e] == 0:
-            continue
-        size = max(work.rows[LOAD, k], 1e-100)
-        for m in range(3):
-            share = 0.0
-            for r in range(3):
-                share += passing * work.pull[k, r] * own.wrench[e, m, 3 + r] / size
-            for c in range(load.size):
-                load[c] += share * gain[paths.row[e] + m, c]
+    if tables.touching:
+        for k in range(tables.pins.size):
+            if tables.pins[k] >= 0:
+                _turn_pushes(tables, work, k, linear.load_by_position[k])

@@ -8,7 +8,7 @@ from finger_pin.core.binding import bound_at, call_at
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.model import MODEL
-from finger_pin.core.rigid_body import ARMATURE, MOTION, base_power, move
+from finger_pin.core.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.tables import END, FIRST
 
 
@@ -75,8 +75,8 @@ def evaluate_many(
             externals[m, j] = work.external[j]
         _book(tables, work, booked[m])
         if bases.shape[0] > 0:
-            width = torques.shape[1]
-            booked[m, booked.shape[1] - 1] = base_power(tables, model.state[width : 2 * width], work)
+            call_at(model.power, address, 0.0)
+            booked[m, booked.shape[1] - 1] = work.base_power[0]
 
 
 @compiled

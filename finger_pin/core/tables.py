@@ -127,6 +127,7 @@ class Work(NamedTuple):
     Attributes:
         base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
         base_rate: Their rates, shape (2, 6).
+        base_power: What the base supplies, shape (1,), W.
         rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
         slopes: Derivatives of the laws, shape (SLOPES, K).
         powers: Stored energy and powers of the rows, shape (1 + powers, K).
@@ -148,6 +149,7 @@ class Work(NamedTuple):
     base_velocity: Vector
     base_acceleration: Vector
     base_rate: Matrix
+    base_power: Vector
     spatial: Layers
     inertia: Matrix
     composite: Matrix
@@ -345,6 +347,7 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         frame=np.zeros((3, 3)),
         centre=np.zeros(3),
         base_velocity=np.zeros(6),
+        base_power=np.zeros(1),
         base_acceleration=base,
         base_rate=np.zeros((2, 6)),
         spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
