@@ -14,7 +14,17 @@ from finger_pin.core.inputs import HELD
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 #: By kind of state: small against what curves the right-hand side, large against rounding.
-STEPS = (1e-4, 1e-8, 1e-5, 1e-3, 1e-5, 1e-3, 1e-4, 1e-6, 1e-5)
+STEPS = {
+    "position": 1e-4,
+    "passive_position": 1e-8,
+    "motor_position": 1e-5,
+    "velocity": 1e-3,
+    "passive_velocity": 1e-5,
+    "motor_velocity": 1e-3,
+    "tendon_stiction": 1e-4,
+    "joint_stiction": 1e-6,
+    "gearbox_stiction": 1e-5,
+}
 TIME_STEP = 1e-3
 STATES = 40
 
@@ -83,7 +93,9 @@ def pieces(case, times, x):
 def smooth_states(case, rng):
     """Yield times and states with the differences of the right-hand side by state and by time."""
     loop, size = case.loop, case.layout.size
-    step = np.repeat(STEPS, case.layout.sizes[:-1])
+    step = np.zeros(size)
+    for kind, own in STEPS.items():
+        getattr(case.layout.unpack(step), kind)[:] = own
     for time, x in zip(rng.uniform(0.0, 4.0, STATES), case.states(rng, STATES), strict=True):
         near = (x + OFFSETS[:, None, None] * np.diag(step)).reshape(-1, size)
         times = time + TIME_STEP * OFFSETS
