@@ -33,9 +33,6 @@ from finger_pin.mechanism.state import State
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
-# Controllers that remember nothing: asked for the start beforehand, they answer alike later.
-_ANSWERS_ALIKE = (ProportionalController, CompensatedController, OpenLoopTensions)
-
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
 
@@ -162,10 +159,8 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
-        controller, tension = self.controller, None
-        if isinstance(controller, PassiveTensionLoop):
-            controller = controller.controller
-        if self.finger.actuators.names and isinstance(controller, _ANSWERS_ALIKE):
+        controller, tension = _remembering_nothing(self.controller), None
+        if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
@@ -223,10 +218,16 @@ class ClosedLoop:
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips and energies at times (m,) and states, in the world: the base frame of a palm at rest."""
-        found = self.dynamics.motion(state.position, state.velocity, self.base(time))
-        if self.palm is None:
-            return found
-        return self.palm.to_world(time, found, self.finger.rigid_body.mass)
+        base, around, objects = self.base(time), self.finger.surroundings, None
+        found = self.dynamics.motion(state.position, state.velocity, base)
+        if around is not None and state.object_pose is not None and state.object_velocity is not None:
+            objects = around.energies(state.object_pose, state.object_velocity, base)
+        if self.palm is not None:
+            found = self.palm.to_world(time, found, self.finger.rigid_body.mass)
+            if around is not None and objects is not None:
+                lifted = objects[1] - np.sum(around.mass) * self.palm.place(time)[0] @ self.palm.gravity
+                objects = objects[0], lifted
+        return replace(found, objects=objects)
 
     def _command(self, time: Array | float, control: ControlSignals) -> Array:
         """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
@@ -248,6 +249,19 @@ class ClosedLoop:
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
+
+
+def _remembering_nothing(controller: Controller) -> Controller | None:
+    """Return a controller that may be asked for the start beforehand, as it will answer alike later; None without."""
+    if isinstance(controller, ProportionalController | CompensatedController | OpenLoopTensions):
+        return controller
+    if isinstance(controller, PassiveTensionLoop):
+        return controller.controller
+    if isinstance(controller, HandController):
+        own = [_remembering_nothing(each) for each in controller.controllers]
+        known = [each for each in own if each is not None]
+        return HandController(known, controller.routing) if len(known) == len(own) else None
+    return None
 
 
 def _controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:

@@ -161,7 +161,7 @@ class CompiledFinger:
         # Fingertip and energies are those of the finger alone.
         self._alone = self._mechanism
         if finger.surroundings is not None:
-            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, []))
+            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, [], moved=finger.mechanism.moved))
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

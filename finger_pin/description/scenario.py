@@ -209,8 +209,6 @@ class Scenario(Description):
 
     def _check_names(self) -> None:
         """Raise where a table is for a joint or a finger that is not there."""
-        if self.environment.objects and self.hand and self.hand.palm.path is not None:
-            raise problem("environment.objects", "objects need a palm at rest: leave out hand.palm.path")
         initial = self.simulation.initial or InitialSettings()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {

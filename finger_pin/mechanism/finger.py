@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
-from finger_pin.description.loading import load_finger
+from finger_pin.description.loading import list_hands, load_finger, load_hand
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -165,8 +165,8 @@ class Finger:
         """Build a finger.
 
         Args:
-            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand is all
-                its fingers together, whose joints and tendons have dotted names.
+            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand, or the
+                name of one that ships, is all its fingers together, whose joints and tendons have dotted names.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
@@ -177,7 +177,7 @@ class Finger:
                 size, or an object the name of a joint.
         """
         if isinstance(description, str | Path):
-            description = load_finger(description)
+            description = load_hand(description) if description in list_hands() else load_finger(description)
         if isinstance(description, HandDescription):
             description = description.joined()
         self.description = description

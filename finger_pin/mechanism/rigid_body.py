@@ -45,11 +45,13 @@ class Motion:
         tip: p, shape (..., 3), m; of several shape (..., t, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.
+        objects: Both energies of free objects around it; None without surroundings.
     """
 
     tip: Array
     kinetic_energy: Array
     potential_energy: Array
+    objects: tuple[Array, Array] | None = None
 
 
 class RigidBody:

@@ -88,7 +88,8 @@ class Surroundings:
         joints, bodies, lumps = int(mechanism.body.model.nv), int(self.body.model.nv), len(mechanism.lumps)
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
         rows = [table.spread(places, bodies + lumps) for table in mechanism.rows]
-        return Mechanism(self.body, [self.contacts, *rows], mechanism.lumps, mechanism.inertia)
+        lumps_of = mechanism.lumps, mechanism.inertia
+        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved)
 
     def start(self) -> tuple[Array, Array]:
         """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""
@@ -104,15 +105,33 @@ class Surroundings:
         """
         check_start(self.contacts, self.body, np.concatenate([position, pose]))
 
-    def energies(self, pose: Array, velocity: Array) -> tuple[Array, Array]:
-        """Return kinetic and potential energy of the free objects, shape (...,), J."""
+    @property
+    def mass(self) -> Array:
+        """Of the free objects, shape (f,), kg."""
+        return np.array([each.mass or 0.0 for each in self.free.values()])
+
+    def energies(self, pose: Array, velocity: Array, base: Array | None = None) -> tuple[Array, Array]:
+        """Return kinetic and potential energy of the free objects, shape (...,), J.
+
+        With a base that moves, (..., 15) or more numbers of `laws.palm`, they are those of the motion in the world,
+        where the base has no height.
+        """
         lead = pose.shape[:-1]
-        places = pose.reshape(*lead, -1, POSE)[..., :3]
-        rates = velocity.reshape(*lead, -1, VELOCITY)
-        mass = np.array([each.mass or 0.0 for each in self.free.values()])
+        poses, rates = pose.reshape(*lead, -1, POSE), velocity.reshape(*lead, -1, VELOCITY)
+        places, speeds, turns = poses[..., :3], rates[..., :3], rates[..., 3:]
+        gravity = np.asarray(self.body.model.gravity.linear)
+        if base is not None:
+            moved = base[..., None, :]
+            speeds = speeds + moved[..., 3:6] + np.cross(moved[..., :3], places)
+            # The base turns in its own axes, objects in theirs: R^T omega by the conjugate of the quaternion.
+            axis, scalar = -poses[..., 3:6], poses[..., 6:]
+            omega = np.broadcast_to(moved[..., :3], axis.shape)
+            across = 2.0 * np.cross(axis, omega)
+            turns = turns + omega + scalar * across + np.cross(axis, across)
+            gravity = moved[..., 12:15]
         inertia = np.array([each.inertia for each in self.free.values()]).reshape(-1, 3)
-        kinetic = 0.5 * (np.sum(rates[..., :3] ** 2, axis=-1) @ mass + np.sum(inertia * rates[..., 3:] ** 2, (-2, -1)))
-        return kinetic, -(places @ self.body.model.gravity.linear) @ mass
+        kinetic = 0.5 * (np.sum(speeds**2, axis=-1) @ self.mass + np.sum(inertia * turns**2, (-2, -1)))
+        return kinetic, -np.sum(places * gravity, axis=-1) @ self.mass
 
     def touching(self, position: Array, pose: Array, force: Array) -> Touching:
         """Return what contacts do in space.

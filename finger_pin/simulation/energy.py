@@ -62,9 +62,8 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     found = {"kinetic": motion.kinetic_energy + lumps, "gravity": motion.potential_energy, **stored}
     if finger.actuators.names and state.motor_velocity is not None:
         found["rotors"] = 0.5 * np.sum(finger.actuators.inertia * state.motor_velocity**2, axis=-1)
-    if finger.surroundings is not None and state.object_pose is not None and state.object_velocity is not None:
-        kinetic, potential = finger.surroundings.energies(state.object_pose, state.object_velocity)
-        found |= {"objects_kinetic": kinetic, "objects_gravity": potential}
+    if isinstance(motion, Motion) and motion.objects is not None:
+        found["objects_kinetic"], found["objects_gravity"] = motion.objects
     return found
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from finger_pin.core import rosenbrock
 from finger_pin.core.inputs import held_control
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
@@ -146,3 +147,24 @@ def test_a_bounce_is_that_of_mujoco_where_contact_is_stiff_and_nothing_rubs():
     assert x[:, :3] == pytest.approx(np.array(expected), abs=3e-4)
     fall = np.sqrt(2.0 * 0.1 / G)
     assert times[0] < fall < times[-1] - 0.1
+
+
+@pytest.mark.parametrize(("method", "order"), [("Rodas5P", 5), ("Rodas4", 4)])
+def test_the_methods_keep_their_order_while_a_contact_stays_closed_and_slides(method, order):
+    """A ball that slides, spins and bobs on a soft floor, in equal steps, against itself at tight tolerances."""
+    soft = {"stiffness": 1e3, "damping": 5.0, "tangential_stiffness": 1e3, "lag": 0.01, "stiction_ratio": 1.3}
+    turning = {"velocity": (0.8, 0.6, 0.02), "angular_velocity": (3.0, -2.0, 5.0)}
+    ball = Object(shape="sphere", radius=0.02, mass=0.1, position=(0.0, 0.0, 0.019), **turning)
+    mechanism, start = scene((0.0, 0.0, -G), table=Object(shape="half_space", surface=soft), ball=ball)
+    end, errors = 0.02, []
+    exact = motion(mechanism, start, [end], tolerance=1e-12)[0]
+    assert np.hypot(*exact[7:9]) > 0.85 and exact[2] < 0.0199
+    for count in (5, 20):
+        control = held_control(mechanism.channels, mechanism.coordinates)
+        stepper = Stepper(mechanism, control, start, TABLEAUS[method](), 1e6, np.full(mechanism.size, 1e6))
+        stepper.parts[0].memory[rosenbrock.STEP] = end
+        for k in range(count):
+            assert stepper.advance(end * (k + 1) / count) == rosenbrock.DONE
+        assert stepper.parts[0].memory[rosenbrock.ACCEPTED] == count
+        errors.append(np.abs(stepper.x - exact)[:7].max())
+    assert np.log(errors[0] / errors[1]) / np.log(4.0) == pytest.approx(order, abs=0.6)

@@ -161,13 +161,16 @@ def test_two_fingers_hold_a_ball_until_friction_can_no_longer_carry_it():
     found = fp.simulate(fp.load_scenario("pinch", {"simulation.duration": 4.6}))
     pads = found.sel(contact=["left.distal-ball", "right.distal-ball"])
     held = found.time < 3.0
-    # Down is x, and the ball swings across: what carries it is its weight on average.
-    carried = pads.contact_force.sel(axis="x").sum("contact").where(held & (found.time > 1.0), drop=True)
+    # Down is x, and the palm is shaken at 3 and 4 Hz: over whole periods what carries the ball is its weight.
+    carried = pads.contact_force.sel(axis="x").sum("contact").where(held & (found.time >= 1.0), drop=True)
+    assert float(carried.std()) > 0.05
     assert float(carried.mean()) == pytest.approx(-0.03 * 9.81, rel=1e-2)
     slip = pads.contact_slip.where(held & (found.time > 0.5), drop=True)
     assert float(slip.max()) < 1e-9
     depth = found.object_position.sel(object="ball", axis="x")
     assert float(depth.where(held, drop=True).max()) < 0.093 and float(depth[-1]) > 0.12
     lost = int(np.argmax(depth.values > 0.1))
+    moved = sum(float(np.abs(found[name]).max()) for name in found if name.startswith("energy_exchanged_"))
+    assert float(np.abs(found.energy_residual).max()) < 1e-4 * moved
     level = pads.contact_level.sum("contact")
     assert float(level[lost - 60 : lost].min()) < 0.03 * 9.81 < float(level[3000])

@@ -83,7 +83,7 @@ def animation_page(
         chunk["ghost"] = beside.chunk()
     scene = motion.scene
     tips = scene.tips(scene.geometry.poses(motion.position[every])).reshape(-1, 3)
-    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0))
+    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0), motion.palm)
     if things is not None:
         header |= things.header(scene.view())
         chunk |= things.chunk()

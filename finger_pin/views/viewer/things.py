@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command, cylinder, mesh
 
 _FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
@@ -30,7 +32,8 @@ class Things:
 
     Attributes:
         objects: By name.
-        free: Poses of the free ones, x, y, z and quaternion x, y, z, w, shape (m, f, 7).
+        moving: Names of those that move: the free ones, and all on a palm that moves.
+        poses: Their poses, x, y, z and quaternion x, y, z, w, shape (m, k, 7).
         contacts: Point, m, force on the second body, N, and normal of every contact, shape (m, c, 9).
         steepness: mu of every contact, shape (c,): the most friction over the normal force that there was.
         size: Length of the finger, m.
@@ -38,15 +41,26 @@ class Things:
     """
 
     objects: dict[str, Object]
-    free: Array
+    moving: tuple[str, ...]
+    poses: Array
     contacts: Array
     steepness: Array
     size: float
     middle: Array
 
     @classmethod
-    def of(cls, result: xr.Dataset, time: Array, size: float, middle: Array) -> Things | None:
-        """Read a result at the times of the frames, which are among its samples; None if it has no contacts."""
+    def of(
+        cls, result: xr.Dataset, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
+    ) -> Things | None:
+        """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
+
+        Args:
+            result: What `simulate` returned or saved.
+            time: Of the frames, shape (m,), s.
+            size: Length of the finger, m.
+            middle: Where the finger is, shape (3,), m.
+            palm: Poses of a palm that moves, at those times; objects and contacts are seen from it.
+        """
         if "contact_force" not in result:
             return None
         described = tomllib.loads(result.attrs["scenario"]).get("environment", {}).get("objects", {})
@@ -56,20 +70,34 @@ class Things:
         at = result.isel(time=np.searchsorted(result["time"].values, time))
         closed = at.isel(contact=np.flatnonzero(steepness > 0.0))
         parts = [closed[f"contact_{name}"].values for name in ("point", "force", "normal")]
-        free = np.zeros((len(time), 0, 7))
-        if "object_position" in at:
-            free = np.concatenate([at["object_position"].values, at["object_orientation"].values], axis=-1)
-        return cls(objects, free, np.concatenate(parts, axis=-1), steepness[steepness > 0.0], size, middle)
+        placed = {
+            name: np.broadcast_to(np.append(each.position, each.quaternion), (len(time), 7))
+            for name, each in objects.items()
+            if palm is not None
+        }
+        for name in result["object"].values if "object_position" in result else ():
+            own = at.sel(object=name)
+            placed[str(name)] = np.concatenate([own["object_position"], own["object_orientation"]], axis=-1)
+        poses = np.stack(list(placed.values()), axis=1) if placed else np.zeros((len(time), 0, 7))
+        if palm is not None:
+            turned = [np.einsum("mij,mcj->mci", palm.rotation, each) for each in (*parts, poses[..., :3])]
+            open_ = ~np.any(parts[1], axis=-1, keepdims=True)
+            parts = [turned[0] + palm.translation[:, None] * ~open_, *turned[1:3]]
+            attitudes = Rotation.from_matrix(palm.rotation)
+            columns = np.moveaxis(poses[..., 3:], 1, 0)
+            seen = np.stack([(attitudes * Rotation.from_quat(each)).as_quat() for each in columns], axis=1)
+            poses = np.concatenate([turned[3] + palm.translation[:, None], seen], axis=-1)
+        contacts = np.concatenate(parts, axis=-1)
+        return cls(objects, tuple(placed), poses, contacts, steepness[steepness > 0.0], size, middle)
 
     def header(self, turn: Array) -> dict[str, Any]:
         """Return what the page needs before the first frame; ``turn`` is the rotation of the scene."""
-        moved = [name for name, each in self.objects.items() if each.mass is not None]
         strongest = float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
         length = _length(_ARROW * self.size, strongest)
         return {
             "things": {
                 "commands": list(self._commands()),
-                "free": [f"object_{name}" for name in moved],
+                "free": [f"object_{name}" for name in self.moving],
                 "steepness": np.round(self.steepness, 4).tolist(),
                 "length": length,
                 "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
@@ -79,11 +107,12 @@ class Things:
 
     def chunk(self) -> dict[str, str]:
         """Return the frames for the page."""
-        return {name: _encode(values) for name, values in (("object", self.free), ("contact", self.contacts))}
+        return {name: _encode(values) for name, values in (("object", self.poses), ("contact", self.contacts))}
 
     def _seen(self) -> Array:
         """Return where free objects are and where bodies touch, as far as that is near the finger, shape (m, 3)."""
-        places = self.free[..., :3].reshape(-1, 3)
+        free = [index for index, name in enumerate(self.moving) if self.objects[name].mass is not None]
+        places = self.poses[:, free, :3].reshape(-1, 3)
         points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
         found = np.concatenate([places, points])
         return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size][::10])
@@ -96,10 +125,9 @@ class Things:
             place = np.array(each.position)
             if each.shape == "half_space":
                 # The part of it that is nearest to the finger.
-                normal = rotation[:, 2]
-                place = self.middle - ((self.middle - place) @ normal) * normal - 0.5 * _THICK * self.size * normal
-                side = 2.0 * _WIDE * self.size
-                parts = [(_box(side, side, _THICK * self.size), np.eye(3), np.zeros(3))]
+                side, thick = 2.0 * _WIDE * self.size, _THICK * self.size
+                below = rotation.T @ (self.middle - place) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thick]
+                parts = [(_box(side, side, thick), np.eye(3), below)]
             elif each.shape == "box":
                 parts = [(_box(*sizes), np.eye(3), np.zeros(3))]
             elif each.shape == "sphere":

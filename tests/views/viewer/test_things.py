@@ -30,13 +30,17 @@ def pinched():
 def test_every_object_stands_where_it_is_and_moves_as_in_the_result(pinched):
     found, column = played(pinched)
     things = found["things"]
-    assert things["free"] == ["object_ball"]
+    # On a palm that moves, what is fixed moves along.
+    assert things["free"] == ["object_ball", "object_tray"]
     drawn = {each["path"] for each in things["commands"]}
-    assert {"/finger_pin/object_ball/part0", "/finger_pin/object_floor/part0"} <= drawn
-    time, poses = column("time", "<f8"), column("object").reshape(-1, 7)
+    assert {"/finger_pin/object_ball/part0", "/finger_pin/object_tray/part0"} <= drawn
+    time, poses = column("time", "<f8"), column("object").reshape(-1, 2, 7)
     at = pinched.sel(time=time)
-    assert poses[:, :3] == pytest.approx(at.object_position.values[:, 0], abs=1e-6)
-    assert poses[:, 3:] == pytest.approx(at.object_orientation.values[:, 0], abs=1e-6)
+    # The palm moves without turning.
+    assert np.ptp(at.palm_position.values, axis=0).max() > 0.01
+    assert poses[:, 0, :3] == pytest.approx(at.palm_position.values + at.object_position.values[:, 0], abs=1e-6)
+    assert poses[:, 0, 3:] == pytest.approx(at.object_orientation.values[:, 0], abs=1e-6)
+    assert poses[:, 1, :3] == pytest.approx(np.add(at.palm_position.values, [0.2, 0.0, 0.0]), abs=1e-6)
 
 
 def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_friction(pinched):
@@ -44,8 +48,9 @@ def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_
     assert found["things"]["steepness"] == [0.7, 0.7]
     numbers = column("contact").reshape(-1, 2, 9)
     at = pinched.sel(time=column("time", "<f8"), contact=["left.distal-ball", "right.distal-ball"])
-    for first, name in ((0, "contact_point"), (3, "contact_force"), (6, "contact_normal")):
-        assert numbers[..., first : first + 3] == pytest.approx(at[name].values, abs=1e-5), name
+    points = at.contact_point.values + at.palm_position.values[:, None]
+    for first, expected in ((0, points), (3, at.contact_force.values), (6, at.contact_normal.values)):
+        assert numbers[..., first : first + 3] == pytest.approx(expected, abs=1e-5)
     strongest = np.linalg.norm(at.contact_force.values, axis=-1).max()
     assert 0.02 < found["things"]["length"] * strongest < 0.06
 
