@@ -111,6 +111,13 @@ class PlacedFinger(Description):
         1.0, unit="1", source="design", doc="All lengths times this, masses times its third power."
     )
 
+    @field_validator("finger")
+    @classmethod
+    def _of_links(cls, value: FingerDescription) -> FingerDescription:
+        if value.tree is not None:
+            raise problem("tree", "a tree is a hand by itself, and cannot be a finger of one")
+        return value
+
     @property
     def rotation(self) -> Array:
         """From the finger's base frame to the palm's, shape (3, 3)."""
@@ -170,6 +177,13 @@ class HandDescription(Description):
             joint_friction=JointFriction.model_construct(**_lists(parts, "joint_friction")),
             passive_tendon=PassiveTendon.model_construct(**_lists(parts, "passive_tendon")),
             stroke_limiter=StrokeLimiter.model_construct(**_lists(parts, "stroke_limiter")),
+            actuators={
+                f"{name}.{own}": actuator.model_copy(
+                    update={"tendons": tuple(f"{name}.{tendon}" for tendon in actuator.tendons)}
+                )
+                for name, part in parts.items()
+                for own, actuator in part.actuators.items()
+            },
         )
         joined._hand = self
         return joined
@@ -204,8 +218,8 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
     """Return a finger of the same shape and material in another size.
 
     Lengths and radii go with the scale, masses with its third power and moments of inertia with its fifth; so do the
-    friction coefficients of joints, which are lengths (coefficient times pin radius). Springs, tendons and limiters
-    stay as they are.
+    friction coefficients of joints, which are lengths (coefficient times pin radius). Springs, tendons, actuators and
+    limiters stay as they are.
     """
     if scale == 1.0:
         return finger

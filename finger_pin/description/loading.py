@@ -358,7 +358,7 @@ def _override(overrides: Table, table: Table, folder: Path) -> None:
     first = (".kind", ".motor")
     for early in (True, False):
         _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
-        for finger in [each.get("finger") for each in _fingers(table).values()] or [table["finger"]]:
+        for finger in [each.get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
             _with_motors(_as_table(finger), Path())
 
 

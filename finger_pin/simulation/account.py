@@ -12,7 +12,7 @@ from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.textbook import Stop, Trajectory, integrate
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import Motion
-from finger_pin.simulation.energy import Flows, energies, powers
+from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
 # tensions at the ends of steps, where a node would see those of the next one.
@@ -56,9 +56,12 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         motion: Fingertip and energies of the rigid body at those times.
     """
     booked = powers(signals.finger)
-    count = len(booked.names)
-    done = [_works(*part, times, count) for part in _apart(loop, trajectory)]
-    works = Flows(np.sum(done, axis=0), booked.names, booked.supplies)
+    done = np.zeros((len(times), len(booked.names)))
+    for part, ends, states in _apart(loop, trajectory):
+        # A finger without motors, say, has fewer powers than the hand.
+        columns = [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)]
+        done[:, columns] += _works(part, ends, states, times, len(columns))
+    works = Flows(done, booked.names, booked.supplies)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     gained = total - total[0]

@@ -78,6 +78,10 @@ def shown(tmp_path_factory):
         yield SimpleNamespace(folder=folder, done=set())
 
 
+def not_moved(result, path, finger=None):
+    Path(path).write_text("moves")
+
+
 def run_command(line, shown):
     for pattern, shorter in SHORTER.items():
         line = re.sub(pattern, shorter, line)
@@ -107,7 +111,7 @@ def run_scenario(text, name):
 @pytest.mark.filterwarnings("ignore:zmq.eventloop.ioloop is deprecated:DeprecationWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
-    monkeypatch.setattr("finger_pin.views.viewer.write_animation", lambda result, path: Path(path).write_text("moves"))
+    monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)
     monkeypatch.setattr("finger_pin.commands.simulate.Drawing", lambda: nullcontext(Quick()))
     text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
     for found in SHOWN.finditer(text):

@@ -129,6 +129,21 @@ def test_other_controllers_and_forces_act_on_the_finger_that_they_are_for(overri
     assert float(abs(found.energy_residual).max()) < 1e-6
 
 
+def test_motors_of_a_finger_move_with_it_bit_by_bit_as_alone():
+    """One in tension drive, one in position drive, on different fingers."""
+    tension = {"m": {"motor": "XL330-M288", "tendons": ["T3"], "spool_radius": 0.005}}
+    held = {"motor": "STS3215", "tendons": ["T4"], "spool_radius": 0.006, "drive": "position", "pretension": 2.0}
+    for actuators in (tension, {"m": held}):
+        changed = fp.load_scenario(
+            "hand", {"simulation.duration": 0.02, "hand.fingers.ring.finger.actuators": actuators}
+        )
+        found, alone = fp.simulate(changed), fp.simulate(changed.parts()["ring"])
+        assert list(found.motor.values) == ["ring.m"]
+        np.testing.assert_array_equal(found.joint_position.sel(joint=alone.joint), alone.joint_position)
+        np.testing.assert_array_equal(found.motor_position, alone.motor_position)
+        assert float(abs(found.energy_residual).max()) < 1e-6
+
+
 WRONG = {
     "hand.fingers.thumb.position": ([0.0, 0.0], "must be a list of 3 numbers"),
     "hand.fingers.index.position": ([0.0, 0.0, 50.0], "is it in millimetres?"),
