@@ -33,9 +33,6 @@ from finger_pin.mechanism.state import State
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
-# Controllers that remember nothing: asked for the start beforehand, they answer alike later.
-_ANSWERS_ALIKE = (ProportionalController, CompensatedController, OpenLoopTensions)
-
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
 
@@ -162,10 +159,8 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
-        controller, tension = self.controller, None
-        if isinstance(controller, PassiveTensionLoop):
-            controller = controller.controller
-        if self.finger.actuators.names and isinstance(controller, _ANSWERS_ALIKE):
+        controller, tension = _remembering_nothing(self.controller), None
+        if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         return self.finger.rest_state(position, velocity, tension)
@@ -254,6 +249,19 @@ class ClosedLoop:
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
+
+
+def _remembering_nothing(controller: Controller) -> Controller | None:
+    """Return a controller that may be asked for the start beforehand, as it will answer alike later; None without."""
+    if isinstance(controller, ProportionalController | CompensatedController | OpenLoopTensions):
+        return controller
+    if isinstance(controller, PassiveTensionLoop):
+        return controller.controller
+    if isinstance(controller, HandController):
+        own = [_remembering_nothing(each) for each in controller.controllers]
+        known = [each for each in own if each is not None]
+        return HandController(known, controller.routing) if len(known) == len(own) else None
+    return None
 
 
 def _controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:

@@ -62,7 +62,8 @@ class PositionDrives:
                 allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
         self.compiled = Drives(
-            places=len(finger.routing.joints) + finger.routing.passive + np.flatnonzero(actuators.holds),
+            motors=np.arange(len(chosen)),
+            places=finger.mechanism.coordinates - len(actuators.names) + np.flatnonzero(actuators.holds),
             channels=self.channels,
             period=period,
             goals=np.ascontiguousarray(goals),
@@ -86,5 +87,5 @@ class PositionDrives:
     def voltages(self, time: Array | float) -> Array:
         """Return what was held at one time, or at times (m,), by motor, V; an instant belongs to its sample."""
         index = np.floor(np.asarray(time) / self.compiled.period * (1.0 + 1e-12)).astype(int)
-        held: Array = self.compiled.voltages[np.clip(index, 0, max(int(self.compiled.taken[0]) - 1, 0))]
+        held: Array = self.compiled.voltages[np.clip(index, 0, len(self.compiled.voltages) - 1)]
         return held

@@ -16,6 +16,7 @@ class Drives(NamedTuple):
     """The loops of m motors, U = V clip(k_p e + k_d e' + k_i int e, -1, 1); arrays that are memory change in place.
 
     Attributes:
+        motors: Those that count here, of which the rotors are in one island.
         places: Coordinates of the rotors, shape (m,).
         channels: Inputs that are their voltages, shape (m,).
         period: s.
@@ -26,9 +27,10 @@ class Drives(NamedTuple):
         taken: Memory, the number of samples so far, shape (1,).
         integral: Memory, int e, shape (m,).
         last: Memory, e of the last sample, shape (m,).
-        voltages: Memory, U of every sample, shape (k, m), V.
+        voltages: Memory, U from every sample on, shape (k, m), V.
     """
 
+    motors: Indices
     places: Indices
     channels: Indices
     period: float
@@ -45,8 +47,9 @@ class Drives(NamedTuple):
 @compiled
 def _sample(drives: Any, x: Any, tension: Any) -> None:
     """Take a sample of all motors, and set their voltages."""
-    k = min(drives.taken[0], drives.goals.shape[0] - 1)
-    for j in range(drives.places.size):
+    last = drives.goals.shape[0] - 1
+    k = min(drives.taken[0], last)
+    for j in drives.motors:
         angle, step = x[drives.places[j]], drives.resolution[j]
         if step > 0.0:
             angle = np.round(angle / step) * step
@@ -58,8 +61,10 @@ def _sample(drives: Any, x: Any, tension: Any) -> None:
         if abs(duty) < 1.0:
             # The integral stands still while the supply is at its limit.
             drives.integral[j] = summed
-        drives.voltages[k, j] = drives.supply[j] * min(max(duty, -1.0), 1.0)
-        tension[drives.channels[j]] = drives.voltages[k, j]
+        voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
+        # Until the next one is taken, perhaps never.
+        drives.voltages[k, j] = drives.voltages[min(k + 1, last), j] = voltage
+        tension[drives.channels[j]] = voltage
     drives.taken[0] += 1
 
 

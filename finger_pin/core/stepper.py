@@ -291,14 +291,22 @@ class Stepper:
             part.restart(start[self._places(part.island)], attitude[free])
 
     def drive(self, drives: Drives) -> None:
-        """Let loops of motors run from now on, in a mechanism that is one island, as every finger is."""
-        (part,) = self.parts
-        part.drives = drives
+        """Let loops of motors run from now on, in every island those of its rotors; what they do they share."""
+        for part in self.parts:
+            motors = np.flatnonzero(np.isin(drives.places, part.island.coordinates))
+            if len(motors):
+                part.drives = drives._replace(
+                    motors=motors,
+                    places=np.searchsorted(part.island.coordinates, drives.places),
+                    channels=np.searchsorted(part.island.channels, drives.channels),
+                    taken=np.zeros(1, dtype=np.int64),
+                )
 
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
         for part in self.parts:
-            driven = np.zeros(0, dtype=np.int64) if part.drives is None else part.drives.channels
+            running = part.drives
+            driven = np.zeros(0, dtype=np.int64) if running is None else running.channels[running.motors]
             voltages = part.control.tension[driven]
             part.control.tension[:] = inputs[part.island.channels]
             part.control.tension[driven] = voltages

@@ -306,10 +306,8 @@ class FingerDescription(Description):
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
         for name, actuator in self.actuators.items():
-            for pulled in actuator.tendons:
-                if self.tendons[pulled].along is not None:
-                    allowed = "runs along a path through space: motors pull tendons with crossings"
-                    raise problem(f"actuators.{name}.tendons", allowed, pulled)
+            if actuator.drive == "position" and any(self.tendons[each].along for each in actuator.tendons):
+                raise problem(f"actuators.{name}.drive", "must be tension for a tendon along a path", actuator.drive)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),

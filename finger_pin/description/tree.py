@@ -24,18 +24,19 @@ from finger_pin.description.validation import (
     real,
     vector,
 )
+from finger_pin.description.waypoints import PLACE, Triple, Waypoint, check_path
 
 _MILLIMETRES = " m (is it in millimetres?)"
-_PLACE = vector(3, -10.0, 10.0, _MILLIMETRES)
 _LARGE = 1e9
-Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
 class Solid(Description):
     """What is seen of a body."""
 
-    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")]
+    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")] = (
+        quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder or box.")
+    )
     radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of all but a box."
     )
@@ -45,7 +46,7 @@ class Solid(Description):
     sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
     )
-    position: Annotated[Triple, _PLACE] = quantity(
+    position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
@@ -57,14 +58,14 @@ class Body(Description):
     """A rigid body, placed on another one or on the base."""
 
     parent: Name | None = Field(None, description="The body that carries it; the base if left out.")
-    position: Annotated[Triple, _PLACE] = quantity(
+    position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its frame, in the parent's."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
     )
     mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass.")
-    centre: Annotated[Triple, _PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre.")
+    centre: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre.")
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
@@ -89,7 +90,7 @@ class TreeJoint(Description):
     axis: Annotated[Triple, vector(3, -1.0, 1.0)] = quantity(
         (0.0, 0.0, 1.0), unit="1", source="design", doc="Unit vector in the body's frame."
     )
-    anchor: Annotated[Triple, _PLACE] = quantity(
+    anchor: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="A point of the axis, in the body's frame."
     )
     reference: Annotated[float, real(-MOST_ANGLE, MOST_ANGLE)] = quantity(
@@ -107,33 +108,11 @@ class TreeJoint(Description):
         return value
 
 
-class Waypoint(Description):
-    """A piece of a tendon's path: a point, a cylinder or sphere that it may wrap, or a pulley that divides it."""
-
-    kind: Annotated[Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")]
-    body: Name | None = Field(None, description="What carries it; the base if left out.")
-    position: Annotated[Triple, _PLACE] = quantity(
-        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
-    )
-    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
-        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
-    )
-    radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
-        0.0, unit="m", source="design", doc="Of a wrap."
-    )
-    side: Annotated[Triple, _PLACE] | None = quantity(
-        None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."
-    )
-    divisor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
-        1.0, unit="1", source="design", doc="Of a pulley: what follows counts as this much less."
-    )
-
-
 class TreeTendon(Description):
     """A tendon: a sum of joint positions, or a path through space; and what acts along it."""
 
-    joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = Field(
-        None, description="Length gained per joint position, m/rad."
+    joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = quantity(
+        None, unit="m/rad", source="design", doc="Length gained per joint position."
     )
     path: dict[Name, Waypoint] | None = Field(None, description="By name, in order.")
     stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="Of its spring.")
@@ -162,7 +141,7 @@ class TreeTendon(Description):
             raise problem("range", "the least length must be below the largest", list(self.range))
         if self.rest[0] > self.rest[1]:
             raise problem("rest", "the first length must not be above the second", list(self.rest))
-        _check_path(self.path or {})
+        check_path(self.path or {})
         return self
 
 
@@ -209,7 +188,7 @@ class Tip(Description):
     """The point whose motion is recorded, and where the fingertip force acts."""
 
     body: Name | None = Field(None, description="What carries it; the base if left out.")
-    position: Annotated[Triple, _PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
+    position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
 
 
 class Tree(Description):
@@ -276,19 +255,3 @@ def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> Non
         near = nearest(name, known)
         hint = f"; did you mean {near}?" if near else ""
         raise problem(entry, f"no such {what}; there are {', '.join(known) or 'none'}{hint}", name)
-
-
-def _check_path(path: dict[str, Waypoint]) -> None:
-    """Raise where a path does not begin, end and go on with points, pulleys apart."""
-    before: str | None = None
-    for name, each in path.items():
-        wraps = each.kind in ("cylinder", "sphere")
-        if wraps and before != "point":
-            raise problem(f"path.{name}", "a wrap stands between two points")
-        if each.kind == "pulley" and before not in (None, "point"):
-            raise problem(f"path.{name}", "a pulley follows a point")
-        if wraps and each.radius <= 0.0:
-            raise problem(f"path.{name}.radius", "must be above 0", each.radius)
-        before = each.kind
-    if path and before != "point":
-        raise problem("path", "must end with a point")

@@ -120,23 +120,21 @@ class Actuators:
         """Tendons that motors in position drive pull."""
         return self.tendons[np.any(self.spools[:, self.holds] != 0.0, axis=1)]
 
-    def angle(self, position: Array, tension: Array | None = None) -> Array:
+    def angle(self, position: Array, tension: Array | None = None, excursion: Array | None = None) -> Array:
         """Return theta_m, shape (..., m), rad, at which tendons have some tension, or come nearest where two share one.
 
         Args:
             position: theta, shape (..., n), rad.
             tension: f^m, shape (..., a), N; by default tendons are just taut.
+            excursion: l at theta, shape (..., a), m, where tendons run along paths; by default H_c theta.
         """
-        wanted = position @ self.routing.actuated_coupling.T[:, self.tendons] - self.slack
+        drawn = position @ self.routing.actuated_coupling.T if excursion is None else excursion
+        wanted = drawn[..., self.tendons] - self.slack
         if tension is not None:
             wanted = wanted + tension[..., self.tendons] / self.stiffness
         weights = self.stiffness[:, None] * self.spools
         angle: Array = wanted @ weights / np.sum(weights * self.spools, axis=0)
         return angle
-
-    def rate(self, velocity: Array) -> Array:
-        """Return theta_m', shape (..., m), rad/s, that goes with theta', shape (..., n), at constant tensions."""
-        return self.angle(velocity) - self.angle(np.zeros_like(velocity))
 
     def tendon_rows(self, width: int) -> Rows:
         """Return the table of elastic tendons, for coordinates (theta, p, theta_m)."""

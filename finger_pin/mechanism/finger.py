@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
-from finger_pin.description.loading import load_finger
+from finger_pin.description.loading import list_hands, load_finger, load_hand
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -165,8 +165,8 @@ class Finger:
         """Build a finger.
 
         Args:
-            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand is all
-                its fingers together, whose joints and tendons have dotted names.
+            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand, or the
+                name of one that ships, is all its fingers together, whose joints and tendons have dotted names.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
@@ -177,7 +177,7 @@ class Finger:
                 size, or an object the name of a joint.
         """
         if isinstance(description, str | Path):
-            description = load_finger(description)
+            description = load_hand(description) if description in list_hands() else load_finger(description)
         if isinstance(description, HandDescription):
             description = description.joined()
         self.description = description
@@ -334,8 +334,11 @@ class Finger:
         state.position[:] = position
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
-        state.motor_position[:] = self.actuators.angle(state.position, tension)
-        state.motor_velocity[:] = self.actuators.rate(state.velocity)
+        if self.actuators.names:
+            angle, taken = self.actuators.angle, self._excursion(state.position)
+            state.motor_position[:] = angle(state.position, tension, taken)
+            moved = (state.velocity @ self.coupling_at(state.position).T)[: self.routing.actuated]
+            state.motor_velocity[:] = angle(state.velocity, None, moved) - angle(state.velocity, None, 0.0 * moved)
         if self.surroundings is not None:
             assert state.object_pose is not None and state.object_velocity is not None
             state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
@@ -360,11 +363,11 @@ class Finger:
         joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
         delivered, motors = driven.force, None
-        torque = self._driven_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
+        torque = self._pulled_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
         if self.actuators.names:
             elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
             delivered = delivered + elastic.force @ self.actuators.pulled.T
-            torque = torque + (elastic.force @ elastic.rows.arm)[..., :joints]
+            torque = torque + self._pulled_torque(x, elastic)
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
@@ -414,13 +417,25 @@ class Finger:
             coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
         return coupling
 
-    def _driven_torque(self, x: Array, driven: RowSignals) -> Array:
-        """Return what the driven tendons exert, shape (..., n), N m."""
-        joints, actuated = len(self.routing.joints), self.routing.actuated
-        if not driven.rows.routed:
-            return (driven.force @ driven.rows.arm)[..., :joints]
-        coupling = self.coupling_at(x[..., :joints])[..., :actuated, :]
-        return np.asarray((driven.force[..., None, :] @ coupling)[..., 0, :])
+    def _excursion(self, position: Array) -> Array:
+        """Return l of the actuated tendons at theta, shape (n,), also of those along paths; shape (a,), m."""
+        drawn = position @ self.coupling.T
+        if self.paths is not None and self.description.tree is not None:
+            rest = np.array([joint.reference for joint in self.description.tree.joints.values()])
+            lengths = self.paths.length(rest) - self.paths.length(position)
+            shorter = dict(zip(self.paths.routes, lengths, strict=True))
+            for k, tendon in enumerate(self.description.tendons.values()):
+                drawn[k] = drawn[k] if tendon.along is None else shorter[tendon.along]
+        return np.asarray(drawn[: self.routing.actuated])
+
+    def _pulled_torque(self, x: Array, pulling: RowSignals) -> Array:
+        """Return what driven or elastic tendons exert, shape (..., n), N m."""
+        joints = len(self.routing.joints)
+        if not pulling.rows.routed:
+            return (pulling.force @ pulling.rows.arm)[..., :joints]
+        places = [self.routing.tendons.index(name) for name in pulling.rows.names]
+        coupling = self.coupling_at(x[..., :joints])[..., places, :]
+        return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

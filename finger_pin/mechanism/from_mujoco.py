@@ -5,7 +5,6 @@ MuJoCo resolves defaults, classes and includes; what is read here is its compile
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +14,12 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mujoco_names import Names, Table, distinct, entry_name, quaternion
 from finger_pin.mechanism.mujoco_rest import Rest
+from finger_pin.mechanism.mujoco_tendons import STOP, TendonReader
 from finger_pin.mechanism.routes import rotation
 
-Table = dict[str, Any]
-# Stiffness with which a tendon's range stops a joint, N m/rad, as the stroke limiters do.
-_STOP = 50.0
-# The same for joints that slide, N/m.
+# Stiffness with which the range of a joint stops it where it slides, N/m.
 _STOP_SLIDING = 1e4
 _LEAST_FRICTION = 1e-7
 # Time constant with which a coupled joint follows, critically damped, s.
@@ -67,14 +65,12 @@ class _Reader:
         if model.ntendon == 0:
             raise InputError("model", "has no tendons")
         self.rest = Rest(mujoco, model)
-        self.bodies = _names("body", [model.body(i).name for i in range(model.nbody)])
-        self.joints = _names("joint", [model.joint(i).name for i in range(model.njnt)])
-        self.tendons = _names("tendon", [model.tendon(i).name for i in range(model.ntendon)])
-        self.sites = _names("site", [model.site(i).name for i in range(model.nsite)])
-        self.geoms = _names("geom", [model.geom(i).name for i in range(model.ngeom)])
+        self.names = Names.of(model)
         kinds = mujoco.mjtJoint
         for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
-            raise InputError(f"joint {self.joints[i]}", "is a ball joint; joints have to turn or slide about one axis")
+            raise InputError(
+                f"joint {self.names.joints[i]}", "is a ball joint; joints have to turn or slide about one axis"
+            )
         self.affine = self.rest.affine_actuators()
         self.pulling = [i for i in self.affine if self._pulls(i)]
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
@@ -87,21 +83,22 @@ class _Reader:
         weightless = model.opt.disableflags & int(flags.mjDSBL_GRAVITY)
         dofs = model.jnt_dofadr[self.kept_joints]
         sliding = model.jnt_type[self.kept_joints] == self.mujoco.mjtJoint.mjJNT_SLIDE
-        tendons = {self.tendons[i]: self._tendon(i) for i in range(model.ntendon)}
+        reader = TendonReader(self.mujoco, model, self.names, self.rest)
+        tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
         return {
-            "name": _name(name),
+            "name": entry_name(name),
             "gravity": [0.0, 0.0, 0.0] if weightless else model.opt.gravity.tolist(),
-            "joints": {self.joints[i]: self._joint(i) for i in self.kept_joints},
+            "joints": {self.names.joints[i]: self._joint(i) for i in self.kept_joints},
             "tendons": self._pulled(),
             "joint_friction": {
                 "viscous": 0.0,
                 "floor": np.maximum(model.dof_frictionloss[dofs], _LEAST_FRICTION).tolist(),
             },
-            "stroke_limiter": {"stiffness": np.where(sliding, _STOP_SLIDING, _STOP).tolist()},
+            "stroke_limiter": {"stiffness": np.where(sliding, _STOP_SLIDING, STOP).tolist()},
             "tree": {
-                "bodies": {self.bodies[i]: self._body(i) for i in bodies},
-                "joints": {self.joints[i]: self._moving(i) for i in self.kept_joints},
+                "bodies": {self.names.bodies[i]: self._body(i) for i in bodies},
+                "joints": {self.names.joints[i]: self._moving(i) for i in self.kept_joints},
                 "tendons": tendons,
                 "couplings": self._couplings(),
                 "actuators": self._actuators(),
@@ -130,12 +127,12 @@ class _Reader:
 
     def _body(self, i: int) -> Table:
         model = self.model
-        turned = rotation(_quaternion(model.body_iquat[i]))
+        turned = rotation(quaternion(model.body_iquat[i]))
         moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
         return {
-            **self._carrier(int(model.body_parentid[i]), "parent"),
+            **self.names.carrier(int(model.body_parentid[i]), "parent"),
             "position": model.body_pos[i].tolist(),
-            "orientation": _quaternion(model.body_quat[i]),
+            "orientation": quaternion(model.body_quat[i]),
             "mass": float(model.body_mass[i]),
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
@@ -148,19 +145,19 @@ class _Reader:
         primitives, boxes = {}, {}
         for i in np.flatnonzero(model.geom_bodyid == body):
             kind, size = model.geom_type[i], model.geom_size[i]
-            place = {"position": model.geom_pos[i].tolist(), "orientation": _quaternion(model.geom_quat[i])}
+            place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
             radius, length = float(size[0]), 2.0 * float(size[1])
             if kind == kinds.mjGEOM_SPHERE:
-                primitives[self.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+                primitives[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
             elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
                 name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
-                primitives[self.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+                primitives[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
             elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
-                primitives[self.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+                primitives[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
             elif kind == kinds.mjGEOM_MESH:
                 middle, half = np.split(model.geom_aabb[i], 2)
                 place["position"] = (model.geom_pos[i] + rotation(place["orientation"]) @ middle).tolist()
-                boxes[self.geoms[i]] = {"kind": "box", "sides": (2.0 * half).tolist(), **place}
+                boxes[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * half).tolist(), **place}
         # What stands still is only in the way.
         return primitives or (boxes if model.body_weldid[body] else {})
 
@@ -181,7 +178,7 @@ class _Reader:
         model = self.model
         hinge = model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
         return {
-            "body": self.bodies[model.jnt_bodyid[i]],
+            "body": self.names.bodies[model.jnt_bodyid[i]],
             "kind": "hinge" if hinge else "slide",
             "axis": model.jnt_axis[i].tolist(),
             "anchor": model.jnt_pos[i].tolist(),
@@ -189,80 +186,23 @@ class _Reader:
             "armature": float(model.dof_armature[model.jnt_dofadr[i]]),
         }
 
-    def _tendon(self, i: int) -> Table:
-        model, types = self.model, self.mujoco.mjtWrap
-        pieces = range(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))
-        found: Table = {
-            "stiffness": float(model.tendon_stiffness[i]),
-            "rest": model.tendon_lengthspring[i].tolist(),
-            "damping": float(model.tendon_damping[i]),
-            "friction": float(model.tendon_frictionloss[i]),
-        }
-        if model.wrap_type[pieces[0]] == types.mjWRAP_JOINT:
-            found["joints"] = {self.joints[model.wrap_objid[k]]: float(model.wrap_prm[k]) for k in pieces}
-            share = sum(coefficient**2 for coefficient in found["joints"].values())
-            found["limit_stiffness"] = _STOP / share if share else 0.0
-        else:
-            names = _names("pulley", [self._piece_name(k) for k in pieces])
-            found["path"] = {name: self._piece(k) for name, k in zip(names, pieces, strict=True)}
-        if model.tendon_limited[i]:
-            found["range"] = model.tendon_range[i].tolist()
-        return found
-
-    def _piece_name(self, k: int) -> str:
-        kind, at, types = self.model.wrap_type[k], self.model.wrap_objid[k], self.mujoco.mjtWrap
-        if kind == types.mjWRAP_PULLEY:
-            return ""
-        return (self.sites if kind == types.mjWRAP_SITE else self.geoms)[int(at)]
-
-    def _piece(self, k: int) -> Table:
-        """Return a piece of a spatial tendon's path."""
-        model, types, kind = self.model, self.mujoco.mjtWrap, self.model.wrap_type[k]
-        at = int(model.wrap_objid[k])
-        if kind == types.mjWRAP_PULLEY:
-            return {"kind": "pulley", "divisor": float(model.wrap_prm[k])}
-        if kind == types.mjWRAP_SITE:
-            place = {"kind": "point", "position": model.site_pos[at].tolist()}
-            return place | self._carrier(int(model.site_bodyid[at]), "body")
-        wrap = {
-            "kind": "cylinder" if kind == types.mjWRAP_CYLINDER else "sphere",
-            "position": model.geom_pos[at].tolist(),
-            "orientation": _quaternion(model.geom_quat[at]),
-            "radius": float(model.geom_size[at, 0]),
-            **self._carrier(int(model.geom_bodyid[at]), "body"),
-        }
-        side = int(model.wrap_prm[k])
-        if side >= 0:
-            if model.site_bodyid[side] != model.geom_bodyid[at]:
-                self.rest.add(f"side point {self.sites[side]} of {self.geoms[at]}: moves with the wrap's body")
-            wrap["side"] = self._seen_from(at, side).tolist()
-        return wrap
-
-    def _seen_from(self, geom: int, site: int) -> Array:
-        """Return a site in the frame of a geom, at the model's reference."""
-        mujoco, model = self.mujoco, self.model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        turned = data.geom_xmat[geom].reshape(3, 3)
-        return np.asarray(turned.T @ (data.site_xpos[site] - data.geom_xpos[geom]))
-
     def _couplings(self) -> Table:
         model, found = self.model, {}
         for i in self.rest.joint_equalities():
             first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
             constant, ratio = (float(each) for each in model.eq_data[i, :2])
             q0 = model.qpos0[model.jnt_qposadr]
-            other = {"other": self.joints[second], "ratio": ratio} if second >= 0 else {}
+            other = {"other": self.names.joints[second], "ratio": ratio} if second >= 0 else {}
             offset = q0[first] + constant - (ratio * q0[second] if second >= 0 else 0.0)
             inertia = float(model.dof_M0[model.jnt_dofadr[first]])
             found[model.equality(i).name or f"equality_{i}"] = {
-                "joint": self.joints[first],
+                "joint": self.names.joints[first],
                 "offset": float(offset),
                 "stiffness": inertia / _COUPLED**2,
                 "damping": 2.0 * inertia / _COUPLED,
                 **other,
             }
-        return dict(zip(_names("equality", list(found)), found.values(), strict=True))
+        return dict(zip(distinct("equality", list(found)), found.values(), strict=True))
 
     def _actuators(self) -> Table:
         model, found = self.model, {}
@@ -274,7 +214,7 @@ class _Reader:
             affine = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_AFFINE
             offset, by_length, by_speed = model.actuator_biasprm[i, :3].tolist() if affine else (0.0, 0.0, 0.0)
             found[i] = {
-                **({"tendon": self.tendons[at]} if of_tendon else {"joint": self.joints[at]}),
+                **({"tendon": self.names.tendons[at]} if of_tendon else {"joint": self.names.joints[at]}),
                 "gear": float(model.actuator_gear[i, 0]),
                 "gain": float(model.actuator_gainprm[i, 0]),
                 "offset": offset,
@@ -285,7 +225,7 @@ class _Reader:
                 found[i]["input_range"] = model.actuator_ctrlrange[i].tolist()
             if model.actuator_forcelimited[i]:
                 found[i]["force_range"] = model.actuator_forcerange[i].tolist()
-        names = _names("actuator", [model.actuator(i).name for i in found])
+        names = distinct("actuator", [model.actuator(i).name for i in found])
         return dict(zip(names, found.values(), strict=True))
 
     def _pulls(self, i: int) -> bool:
@@ -306,8 +246,8 @@ class _Reader:
     def _pulled(self) -> Table:
         """Return the tendons that motors pull, by the names of these."""
         model = self.model
-        names = _names("actuator", [model.actuator(i).name for i in self.pulling])
-        along = [self.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
+        names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
+        along = [self.names.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
         return {name: {"along": path} for name, path in zip(names, along, strict=True)}
 
     def _tip_body(self) -> tuple[int, Array]:
@@ -320,30 +260,4 @@ class _Reader:
 
     def _tip(self) -> Table:
         body, position = self._tip_body()
-        return {**self._carrier(body, "body"), "position": position.tolist()}
-
-    def _carrier(self, body: int, entry: str) -> Table:
-        return {entry: self.bodies[body]} if body else {}
-
-
-def _quaternion(real_first: Array) -> tuple[float, float, float, float]:
-    """Return a quaternion x, y, z, w of one w, x, y, z."""
-    w, x, y, z = real_first.tolist()
-    return x, y, z, w
-
-
-def _name(text: str) -> str:
-    """Return a name of letters, digits and underscores."""
-    name = re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[:60]
-    return name if re.match(r"[A-Za-z]", name) else f"n{name}"
-
-
-def _names(what: str, given: list[str]) -> list[str]:
-    """Return names for elements, all different; those without one are numbered."""
-    found: list[str] = []
-    for index, each in enumerate(given):
-        name = _name(each) if each else f"{what}_{index}"
-        while name in found:
-            name = f"{name[:56]}_{index}"
-        found.append(name)
-    return found
+        return {**self.names.carrier(body, "body"), "position": position.tolist()}

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
@@ -52,7 +53,7 @@ _MASSLESS = """
 
 
 def to_mjcf(
-    description: FingerDescription,
+    description: FingerDescription | HandDescription,
     *,
     posture: Sequence[float] | None = None,
     timestep: float | None = None,
@@ -60,13 +61,13 @@ def to_mjcf(
     massless: bool = False,
     shapes: bool = True,
 ) -> str:
-    """Return the MJCF of a finger as text.
+    """Return the MJCF of a finger as text, or of a hand with its palm at rest.
 
     The coordinates are the joints in order, then one slide per passive tendon: its position p_5. Bodies and frames
     are named as in the URDF. Numbers are written so that reading them gives the same floats.
 
     Args:
-        description: The finger.
+        description: The finger or hand.
         posture: theta of the keyframe ``start``, shape (n,), rad, with the lumped masses where both halves are
             stretched alike; all joints at zero by default.
         timestep: Of MuJoCo, s; by default a step that the lumped masses are stable with.
@@ -78,8 +79,8 @@ def to_mjcf(
     Raises:
         InputError: If a joint has no link, the posture has the wrong size, or the time step is not positive.
     """
-    if description.hand is not None:
-        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
+    if isinstance(description, HandDescription):
+        description = description.joined()
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)
@@ -103,7 +104,10 @@ def to_mjcf(
         for name, colour in MATERIALS.items():
             ET.SubElement(assets, "material", name=name, rgba=_numbers(*colour))
         root.insert(list(root).index(world), assets)
-    _add_links(world, description, links, shapes)
+    if description.hand is not None:
+        _add_hand(world, description.hand, shapes)
+    else:
+        _add_links(ET.SubElement(world, "body", name=BASE_FRAME), description, links, shapes)
     if not massless:
         _add_masses(world, description, tendons)
     _add_tendons(root, tendons, massless)
@@ -131,24 +135,37 @@ def _stable_step(tendons: Tendons, massless: bool) -> float:
     return min(TIMESTEP, float(f"{0.8 / fastest:.0e}"))
 
 
-def _add_links(world: ET.Element, description: FingerDescription, links: dict[str, Link], shapes: bool) -> None:
+def _add_hand(world: ET.Element, hand: HandDescription, shapes: bool) -> None:
+    """Add the palm and, on it, the fingers; names of a finger begin with its own and a dot."""
+    palm = ET.SubElement(world, "body", name="palm")
+    if shapes and all(hand.palm.size):
+        _add_shapes(palm, [Shape("box", hand.palm.size, hand.palm.centre, material="palm")])
+    for name, finger in hand.built().items():
+        placed = hand.fingers[name]
+        place = {"pos": _numbers(*placed.position), "euler": _numbers(*placed.orientation)}
+        base = ET.SubElement(palm, "body", {"name": f"{name}.{BASE_FRAME}", **place})
+        _add_links(base, finger, _links(finger), shapes, f"{name}.")
+
+
+def _add_links(
+    body: ET.Element, description: FingerDescription, links: dict[str, Link], shapes: bool, prefix: str = ""
+) -> None:
     """Nest the links: a body's frame is its joint's, the axis is z and the link runs along x."""
     size = len(links)
     first, last = next(iter(links)), next(reversed(links.values()))
     drawn = link_shapes(description, links)
     damping = expand(description.joint_friction.viscous, size)
-    body = ET.SubElement(world, "body", name=BASE_FRAME)
     if shapes:
         _add_shapes(body, palm_shapes(description, first, links[first]))
     place, twist = (0.0, 0.0, 0.0), 0.0
     for index, (name, link) in enumerate(links.items()):
-        frame = {"name": f"{name}_link", "pos": _numbers(*place), "euler": _numbers(twist, 0, 0)}
+        frame = {"name": f"{prefix}{name}_link", "pos": _numbers(*place), "euler": _numbers(twist, 0, 0)}
         body = ET.SubElement(body, "body", frame)
         axial, transverse = link.inertia
         inertia = {"pos": _numbers(link.mass_centre, 0, link.offset), "mass": _numbers(link.mass)}
         ET.SubElement(body, "inertial", {**inertia, "diaginertia": _numbers(axial, transverse, transverse)})
         bounds = {"range": _numbers(*description.joints[name].range), "limited": "false"}
-        hinge = {"name": name, "type": "hinge", "axis": _numbers(0, 0, 1), **bounds}
+        hinge = {"name": f"{prefix}{name}", "type": "hinge", "axis": _numbers(0, 0, 1), **bounds}
         spring = description.joints[name].spring
         if spring is not None:
             hinge |= {"stiffness": _numbers(spring.stiffness), "springref": _numbers(spring.rest)}
@@ -159,7 +176,7 @@ def _add_links(world: ET.Element, description: FingerDescription, links: dict[st
         place, twist = (link.length, 0.0, link.offset), link.twist
     if shapes:
         _add_shapes(body, pad_shapes(last), place)
-    ET.SubElement(body, "site", name=TIP_FRAME, pos=_numbers(*place), euler=_numbers(twist, 0, 0))
+    ET.SubElement(body, "site", name=f"{prefix}{TIP_FRAME}", pos=_numbers(*place), euler=_numbers(twist, 0, 0))
 
 
 def _add_masses(world: ET.Element, description: FingerDescription, tendons: Tendons) -> None:

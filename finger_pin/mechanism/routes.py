@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.routing import Array
-from finger_pin.description.tree import Tree, Waypoint
+from finger_pin.description.tree import Tree
+from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT

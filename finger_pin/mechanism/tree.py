@@ -72,7 +72,7 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
 def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
     """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
     assert description.tree is not None
-    if table.group != "driven_tendons":
+    if table.group not in ("driven_tendons", "elastic_tendons"):
         return table
     arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
     rest = np.array([joint.reference for joint in description.tree.joints.values()])
@@ -81,7 +81,8 @@ def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> 
         along = description.tendons[name].along
         if along is not None:
             route = routes.routes[along].times(-1.0)
-            arm[k, : len(rest)], offset[k], paths[k] = route.coefficients, lengths[along], route.legs
+            arm[k, : len(rest)], paths[k] = route.coefficients, route.legs
+            offset[k] += lengths[along]
     return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(paths))
 
 

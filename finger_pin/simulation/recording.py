@@ -34,6 +34,9 @@ _STORED = {
     "passive_tendon": "elastic energy of the passive tendons",
     "limiter": "elastic energy of the stroke limiters",
     "joint_springs": "elastic energy of the joints' springs",
+    "tendon_spring": "elastic energy of the tendons' springs",
+    "tendon_limit": "elastic energy of the tendons' limits",
+    "coupling": "elastic energy of the couplings of joints",
     "tendon_bristles": "elastic energy of the tendons' bristles",
     "joint_bristles": "elastic energy of the joints' bristles",
     "contacts": "elastic energy of contacts",
@@ -64,6 +67,10 @@ _EXCHANGED = {
     "contacts_sliding": "lost in contacts sliding",
     "contacts_micro_damping": "lost in the bristles of contacts",
     "slack": "booked where a tension is cut at zero",
+    "tendon_spring_damping": "lost in the tendons' dampers",
+    "tendon_limit_limiter": "lost where tendons are at their limits",
+    "tendon_dry_friction_coulomb": "lost by tendons sliding dry",
+    "coupling_damping": "lost in the couplings of joints",
 }
 
 

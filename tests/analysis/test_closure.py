@@ -6,6 +6,8 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.routed import RoutedController
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import ClosureWarning
 
 HEIGHT, REACH = 0.01, 0.03
@@ -99,6 +101,37 @@ def test_statics_of_a_posed_finger_are_those_of_its_arms_there():
     # Moving up, friction M S of the sum of tensions takes all that the pulling tendon adds where M is its arm.
     critical = fp.analysis.critical_friction(posed, [0.2], velocity=[-1.0])
     assert critical.coefficient == pytest.approx(-upper, rel=1e-6)
+
+
+def test_motors_pull_tendons_along_paths_through_spools_and_stretch():
+    table = finger_table(limit=0.3)
+    table["actuators"] = {
+        f"M{k}": {"motor": "XL330-M288", "tendons": [name], "spool_radius": 0.005}
+        for k, name in enumerate(table["tendons"])
+    }
+    tensions = {"upper": {"offset": 3.0, "amplitude": 2.0, "frequency": 2.0}, "lower": {"offset": 3.0}}
+    pulled = read_scenario(
+        {
+            "name": "servos",
+            "finger": table,
+            "controller": {"kind": "tensions", "tensions": tensions},
+            "simulation": {"duration": 0.2, "initial": {"position": {"hinge": 0.1}}},
+        }
+    )
+    result = fp.simulate(pulled)
+    # At the start spools hold the tensions; then the finger moves, and the account closes.
+    np.testing.assert_allclose(result.spool_tension[0], [3.0, 3.0], rtol=1e-9)
+    assert np.ptp(result.joint_position.values) > 1e-3
+    assert np.abs(result.energy_residual).max() < 1e-7
+    hand = fp.Finger(pulled.finger)
+    x = hand.rest_state(np.array([0.2]), np.array([1.0]), np.array([3.0, 2.0]))
+    # Spools go with the joint at the arms of the posture.
+    expected = hand.coupling_at([0.2])[:, 0] / 0.005
+    np.testing.assert_allclose(hand.layout.unpack(x).motor_velocity, expected, rtol=1e-12)
+    found = hand.evaluate(x, np.array([3.0, 2.0]))
+    np.testing.assert_allclose(found.tendons.strands, [3.0, 2.0], atol=0.02)
+    np.testing.assert_allclose(found.tendon_torque, found.tendons.strands @ hand.coupling_at([0.2]), rtol=1e-9)
+    np.testing.assert_allclose(CompiledFinger(hand).evaluate(x, np.array([3.0, 2.0])).rate, found.rate, atol=1e-6)
 
 
 def test_what_needs_a_posture_says_so():

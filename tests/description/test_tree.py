@@ -17,7 +17,7 @@ FINGER = {
         "tendons": {
             "upper": {
                 "path": {
-                    "a": {"kind": "point"},
+                    "a": {"kind": "point", "position": [-0.02, 0.0, 0.005]},
                     "wrap": {"kind": "cylinder", "radius": 0.01},
                     "b": {"kind": "point", "body": "link", "position": [0.03, 0.0, 0.01]},
                 }
@@ -65,6 +65,7 @@ def test_the_tree_itself_is_taken():
         ("tree__tendons__upper__path__a", None, "a wrap stands between two points"),
         ("tree__tendons__upper__path__b", None, "must end with a point"),
         ("tree__tendons__upper__path__wrap__radius", 0.0, "must be above 0"),
+        ("tree__tendons__upper__path__wrap__radius", 0.5, "path.wrap: the point a lies inside of it"),
         ("tree__tendons__upper__joints", {"hinge": 1.0}, "needs joints or a path, and not both"),
         ("tree__tendons__sum__joints", {"elbow": 1.0}, "no such joint; there are hinge"),
         ("tree__tendons__sum__range", [1.0, 0.0], "the least length must be below the largest"),

@@ -210,6 +210,18 @@ def test_a_file_that_mujoco_refuses_is_refused_in_its_words_on_one_line(tmp_path
         fp.from_mujoco(tmp_path / "no_such.xml")
 
 
+def test_a_wrap_that_a_point_lies_inside_of_is_listed_and_left_out_as_it_never_wraps():
+    tendon = '<spatial name="t"><site site="w"/><geom geom="pin"/><site site="s"/></spatial>'
+    body = '<geom name="pin" type="cylinder" size="0.05 0.1" pos="0 0 1"/><site name="w" pos="0.02 0.02 3"/>' + LINK
+    model = model_of(body, f"<tendon>{tendon}</tendon>")
+    description = fp.from_mujoco(model)
+    assert "wrap pin: w lies inside of it, so that the path goes straight" in description.tree.left_out
+    data = mujoco.MjData(model)
+    data.qpos = [0.3]
+    mujoco.mj_forward(model, data)
+    assert fp.Hand(description).paths.length(data.qpos) == pytest.approx(data.ten_length, rel=1e-14)
+
+
 def test_a_side_point_on_another_body_is_listed_and_moves_with_the_wrap():
     tendon = '<spatial name="t"><site site="s"/><geom geom="pin" sidesite="s"/><site site="w"/></spatial>'
     body = '<geom name="pin" type="sphere" size="0.05" pos="0.3 0 0.3"/><site name="w" pos="0 0 1"/>' + LINK

@@ -238,3 +238,23 @@ def test_a_joint_offset_puts_mujoco_s_fingertip_and_mass_where_the_urdf_has_them
     data = forward(model, np.append(q, 0.0), np.zeros(5), np.zeros(4))
     np.testing.assert_allclose(data.site("fingertip").xpos, finger.rigid_body.tip_position(q), atol=1e-12)
     np.testing.assert_allclose(data.qfrc_bias[:4], finger.rigid_body.gravity_torque(q), atol=1e-12)
+
+
+def test_a_hand_has_the_inertia_the_tips_and_the_tendons_that_pinocchio_computes():
+    hand = fp.Finger("ub_hand")
+    model = mujoco.MjModel.from_xml_string(fp.to_mjcf(fp.load_hand("ub_hand")))
+    data, rng = mujoco.MjData(model), np.random.default_rng(9)
+    assert [model.joint(index).name for index in range(20)] == list(hand.routing.joints)
+    q = rng.uniform(0.0, 1.0, 20)
+    data.qpos[:20] = q
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    expected = hand.rigid_body.mass_matrix(q)
+    np.testing.assert_allclose(mass[:20, :20], np.triu(expected) + np.triu(expected, 1).T, rtol=1e-9, atol=1e-14)
+    gravity = hand.rigid_body.gravity_torque(q)
+    np.testing.assert_allclose(data.qfrc_bias[:20], gravity, rtol=1e-9, atol=1e-13)
+    tips = [data.site(f"{name}.fingertip").xpos for name in hand.description.hand.fingers]
+    np.testing.assert_allclose(tips, hand.motion(q, np.zeros(20)).tip, atol=1e-14)
+    lengths = [data.tendon(name).length[0] for name in hand.routing.tendons[:20]]
+    np.testing.assert_allclose(lengths, hand.routing.actuated_coupling @ q, atol=1e-15)

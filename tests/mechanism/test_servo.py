@@ -170,3 +170,21 @@ def test_a_finger_with_ideal_and_servo_tendons_gives_each_strand_to_the_joints()
     np.testing.assert_allclose(found.tendon_torque, alone.tendon_torque, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found.joints.reaction, alone.joints.reaction, rtol=1e-9)
     np.testing.assert_allclose(found.acceleration, alone.acceleration, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("by_load, viscous", [(0.3, 0.0), (0.0, 4e-3)])
+def test_friction_compensation_leaves_the_rest_of_the_sliding_friction(share, by_load, viscous):
+    """Without load gears carry what they take, N = c0 / (1 - m0), or c0 + b w; the tendon hangs."""
+    friction = {"coulomb": 0.01, "by_load": by_load, "viscous": viscous}
+    turning = finger({**SMOOTH, "friction": friction}, friction_compensation=share)
+    taken, speed = 0.01 / (1.0 - by_load), -6.0
+    x = turning.rest_state(np.zeros(1))
+    state = turning.layout.unpack(x)
+    state.motor_position[:], state.motor_velocity[:], state.gearbox_stiction[:] = -0.1, speed, -taken
+    found = turning.evaluate(x, np.zeros(1))
+    left = (1.0 - share) * (taken - viscous * speed)
+    assert found.mechanism.acceleration[-1] == pytest.approx(left / INERTIA, abs=1e-6)
+    # Sliding goes on as it is where all is compensated.
+    if share == 1.0:
+        assert found.rate[-1] == pytest.approx(0.0, abs=1e-6)

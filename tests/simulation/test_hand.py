@@ -191,6 +191,14 @@ def test_fingers_that_share_a_name_and_a_finger_that_is_missing_are_refused(tmp_
         assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
+def test_a_hand_is_built_by_its_name_and_steps_all_its_fingers():
+    hand = fp.Finger("ub_hand")
+    assert hand.routing.joints == tuple(fp.load_hand("ub_hand").joined().joints) and "20 joints" in repr(hand)
+    simulator = fp.Simulator(hand)
+    before = simulator.state.position
+    assert np.all(simulator.step(np.full(20, 1.0), 1e-3).position != before)
+
+
 def test_a_finger_in_place_of_a_hand_and_a_hand_in_place_of_a_finger():
     assert fp.load_scenario("fig6", {"hand": "ub_hand", "reference": {}}).hand.name == "ub_hand"
     with pytest.raises(InputError, match="no such joint"):

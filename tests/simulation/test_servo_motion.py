@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
@@ -191,3 +192,29 @@ def test_servos_start_with_their_tendons_stretched_by_what_is_commanded_there(co
     result = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.002, **settings}))
     internal = fp.Finger("ub").routing.force_closure().tension[:4]
     np.testing.assert_allclose(result.spool_tension.values[0, :4], internal / internal.min(), rtol=1e-6)
+
+
+def test_fingers_of_a_hand_hold_their_spools_each_as_it_does_alone(tmp_path):
+    """Islands with loops of their own: the first finger of the two moves as `servo_position`."""
+    alone = fp.load_scenario("servo_position", {"simulation.duration": 0.03})
+    text = tomli_w.dumps(
+        {
+            "hand": {
+                "name": "two",
+                "palm": {"size": [0.08, 0.05, 0.02]},
+                "fingers": {
+                    name: {"finger": "./one.toml", "position": [0.0, y, 0.0]} for name, y in (("a", -0.03), ("b", 0.03))
+                },
+            },
+            "reference": {"joints": {"a": alone.reference.model_dump(exclude_none=True)["joints"]}},
+            "simulation": {"duration": 0.03},
+        }
+    )
+    described = alone.finger.model_dump(mode="json", exclude_none=True)
+    (tmp_path / "one.toml").write_text(tomli_w.dumps(described))
+    (tmp_path / "two.toml").write_text(text)
+    both, one = fp.simulate(fp.load_scenario(tmp_path / "two.toml")), fp.simulate(alone)
+    for name, dimension in (("joint_position", "joint"), ("motor_voltage", "motor"), ("spool_tension", "tendon")):
+        own = [f"a.{each}" for each in one[dimension].values]
+        np.testing.assert_allclose(both[name].sel({dimension: own}), one[name], rtol=1e-7, atol=1e-9)
+    assert np.ptp(one.motor_voltage.values) > 0.0 and np.ptp(both.motor_voltage.sel(motor="b.M3").values) > 0.0

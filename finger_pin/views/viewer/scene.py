@@ -142,7 +142,8 @@ class Scene:
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
         seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
-        seen += [_corners(visual, poses) for visual in geometry.visuals if is_mesh(visual.shape)]
+        large = [each for each in geometry.visuals if is_mesh(each.shape) or each.name == "palm"]
+        seen += [_corners(visual, poses) for visual in large]
         if shown is not None:
             seen.append(shown.corners)
         if ghost is not None:
@@ -237,9 +238,13 @@ class Scene:
 
 
 def _corners(visual: Visual, poses: LinkPoses) -> Array:
-    """Return the corners of the box around a mesh in all poses of its link."""
-    corners = np.asarray(visual.shape.vertices())
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    """Return the corners of a box, or of that around a mesh, in all poses of its link."""
+    if is_mesh(visual.shape):
+        points = np.asarray(visual.shape.vertices())
+        low, high = points.min(axis=0), points.max(axis=0)
+    else:
+        high = np.asarray(visual.shape.halfSide)
+        low = -high
     box = np.array(list(product(*zip(low, high, strict=True)))) @ visual.placement.rotation.T
     rotation, translation = poses.rotation[..., visual.link, :, :], poses.translation[..., visual.link, None, :]
     return np.asarray((box + visual.placement.translation) @ np.swapaxes(rotation, -1, -2) + translation)

@@ -1,0 +1,78 @@
+"""The pieces of a tendon's path through space: points, wraps and pulleys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+
+_MILLIMETRES = " m (is it in millimetres?)"
+#: A place in a body's frame.
+PLACE = vector(3, -10.0, 10.0, _MILLIMETRES)
+Triple = tuple[float, float, float]
+
+
+class Waypoint(Description):
+    """A piece of a tendon's path: a point, a cylinder or sphere that it may wrap, or a pulley that divides it."""
+
+    kind: Annotated[
+        Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")
+    ] = quantity(..., unit="1", source="design", doc="point, cylinder, sphere or pulley.")
+    body: Name | None = Field(None, description="What carries it; the base if left out.")
+    position: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of a wrap in the body's frame; a cylinder's axis is z."
+    )
+    radius: Annotated[float, real(0.0, 1.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of a wrap."
+    )
+    side: Annotated[Triple, PLACE] | None = quantity(
+        None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."
+    )
+    divisor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        1.0, unit="1", source="design", doc="Of a pulley: what follows counts as this much less."
+    )
+
+    def holds(self, point: Waypoint) -> bool:
+        """Return whether a point that the same body carries lies inside of a wrap; False where another one does."""
+        if point.body != self.body:
+            return False
+        x, y, z, w = self.orientation
+        axis, away = np.array([x, y, z]), np.subtract(point.position, self.position)
+        # Turned back into the frame of the wrap.
+        seen = away - 2.0 * w * np.cross(axis, away) + 2.0 * np.cross(axis, np.cross(axis, away))
+        return bool(np.linalg.norm(seen[: 2 if self.kind == "cylinder" else 3]) < self.radius)
+
+
+def check_path(path: dict[str, Waypoint]) -> None:
+    """Raise where a path does not begin, end and go on with points, pulleys apart."""
+    before: str | None = None
+    for name, each in path.items():
+        wraps = each.kind in ("cylinder", "sphere")
+        if wraps and before != "point":
+            raise problem(f"path.{name}", "a wrap stands between two points")
+        if each.kind == "pulley" and before not in (None, "point"):
+            raise problem(f"path.{name}", "a pulley follows a point")
+        if wraps and each.radius <= 0.0:
+            raise problem(f"path.{name}.radius", "must be above 0", each.radius)
+        before = each.kind
+    if path and before != "point":
+        raise problem("path", "must end with a point")
+    for point, wrap in inside(path):
+        raise problem(f"path.{wrap}", f"the point {point} lies inside of it, where the path cannot wrap")
+
+
+def inside(path: dict[str, Waypoint]) -> Iterator[tuple[str, str]]:
+    """Yield points next to a wrap that the same body carries, and that they lie inside of, with the wrap."""
+    for pair in pairwise(path):
+        for point, wrap in (pair, pair[::-1]):
+            wraps = path[wrap].kind in ("cylinder", "sphere") and path[point].kind == "point"
+            if wraps and path[wrap].holds(path[point]):
+                yield point, wrap
