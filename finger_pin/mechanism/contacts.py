@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -41,6 +41,8 @@ class Solid:
         radius: Of the segment, m.
         points: Where it touches what is flat: spheres in the frame of the joint, shape (m, 3), m.
         rounding: Their radius, m.
+        home: Centre of a ball, base frame, shape (3,), m, that it never leaves.
+        range: Radius of that ball, m; infinite for what is free.
         surface: Its surface; None for links and where it is left out, which touch with that of what they touch.
     """
 
@@ -55,11 +57,20 @@ class Solid:
     radius: float
     points: Array
     rounding: float
+    home: Array
+    range: float
     surface: Surface | None = None
+
+    def never_meets(self, other: Solid) -> bool:
+        """Return whether it stays away from another solid, whatever both do."""
+        for one, two in ((self, other), (other, self)):
+            if np.isinf(two.reach):
+                return bool(two.rotation[:, 2] @ (one.home - two.position) > one.range)
+        return float(np.linalg.norm(self.home - other.home)) > self.range + other.range
 
 
 def contact_rows(solids: Sequence[Solid], width: int) -> Rows:
-    """Return the contacts of all pairs that can touch: not of one group, and not both fixed.
+    """Return the contacts of all pairs that can touch: not of one group, not both fixed, and within reach.
 
     Args:
         solids: Links and objects.
@@ -72,7 +83,7 @@ def contact_rows(solids: Sequence[Solid], width: int) -> Rows:
     numbers: list[tuple[float, ...]] = []
     paths: list[tuple[Leg, ...]] = []
     for one, other in itertools.combinations(solids, 2):
-        if one.group == other.group or one.joint == other.joint == 0:
+        if one.group == other.group or one.joint == other.joint == 0 or one.never_meets(other):
             continue
         found = list(_touching(one, other))
         for index, (a, w, ends, radius) in enumerate(found):
@@ -159,7 +170,19 @@ def link_solid(name: str, group: str, joint: int, link: Link, last: bool) -> Sol
     shape, middle = prism_parameters("capsule", (radius, length)), segment.mean(axis=0)
     # On a plane, the near end is where the link before it ends.
     return Solid(
-        name, group, joint, middle, rotation, shape, 0.5 * length + radius, segment, radius, segment[1:], radius
+        name,
+        group,
+        joint,
+        middle,
+        rotation,
+        shape,
+        0.5 * length + radius,
+        segment,
+        radius,
+        segment[1:],
+        radius,
+        np.zeros(3),
+        np.inf,
     )
 
 
@@ -167,10 +190,18 @@ def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
     """Return the links of a finger or a hand, given by the names of their joints, from the base to each tip."""
     fingers = {name: name.rpartition(".")[0] for name in links}
     last = {finger: name for name, finger in fingers.items()}
-    return [
-        link_solid(name, f"{fingers[name]}.", int(body.model.getJointId(name)), link, name == last[fingers[name]])
-        for name, link in links.items()
-    ]
+    found = []
+    for name, link in links.items():
+        joint = int(body.model.getJointId(name))
+        solid = link_solid(name, f"{fingers[name]}.", joint, link, name == last[fingers[name]])
+        # Joints that turn keep all beyond them in a ball about the first.
+        first, *others = [each for each in body.model.supports[joint] if each]
+        radius = float(np.linalg.norm(solid.position)) + solid.reach
+        radius += sum(float(np.linalg.norm(body.model.jointPlacements[each].translation)) for each in others)
+        slides = any("JointModelP" in body.model.joints[each].shortname() for each in (first, *others))
+        home = np.array(body.model.jointPlacements[first].translation)
+        found.append(replace(solid, home=home, range=np.inf if slides else radius))
+    return found
 
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:
@@ -222,6 +253,8 @@ def object_solid(name: str, described: Object, joint: int) -> Solid:
         rounding,
         placed(points),
         rounding,
+        np.array(place.translation),
+        np.inf if joint else reach,
         described.surface,
     )
 

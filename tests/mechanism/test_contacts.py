@@ -12,6 +12,8 @@ from finger_pin.mechanism.pieces import reach
 from finger_pin.mechanism.urdf import build_rigid_body
 
 TABLE = Object(shape="half_space", position=(0.0, 0.0, -0.1))
+#: Within reach of every link.
+NEAR = Object(shape="half_space", position=(0.0, 0.0, -0.025))
 BALL = Object(shape="sphere", radius=0.02, mass=0.05, position=(0.1, 0.0, -0.08))
 
 
@@ -41,23 +43,35 @@ def configuration(body, joints, **poses):
 
 
 def test_links_touch_objects_and_objects_each_other_but_neither_fixed_ones_nor_links_each_other():
-    box = Object(shape="box", sides=(0.02, 0.02, 0.02), position=(0.0, 0.1, 0.0))
-    _, links, contacts = scene(table=TABLE, ball=BALL, box=box)
+    box = Object(shape="box", sides=(0.02, 0.02, 0.02), position=(0.03, 0.02, 0.0))
+    _, links, contacts = scene(table=NEAR, ball=BALL, box=box)
     expected = {f"{link}-{thing}" for link in links for thing in ("table", "ball", "box")}
     assert sorted(contacts.names) == sorted(expected | {"ball-table", "ball-box"})
 
 
+def test_what_is_out_of_reach_in_every_posture_is_left_out():
+    """The paper's finger is 117 mm long: a wall at 75 mm is out of reach of its first link, one at 120 mm of all."""
+    near = Object(shape="half_space", position=(0.075, 0.0, 0.0), orientation=(0.0, -1.0, 0.0, 1.0))
+    far = Object(shape="half_space", position=(0.12, 0.0, 0.0), orientation=(0.0, -1.0, 0.0, 1.0))
+    behind = Object(shape="sphere", radius=0.01, position=(0.0, -0.1, 0.0))
+    _, _, contacts = scene(near=near, far=far, behind=behind)
+    assert contacts.names == ("medial-near", "medial-behind", "distal-near", "distal-behind")
+    rng, reached = np.random.default_rng(6), 0.0
+    body, links, everything = scene(ball=Object(shape="sphere", radius=1e-3, mass=1.0))
+    data, lengths = body.model.createData(), np.cumsum([link.length for link in links.values()])
+    for _ in range(200):
+        pin.forwardKinematics(body.model, data, configuration(body, rng.uniform(-1.5, 1.5, 4)))
+        tips = [data.oMi[i + 1].act(np.array([link.length, 0.0, 0.0])) for i, link in enumerate(links.values())]
+        reached = max(reached, *(np.linalg.norm(tip) / length for tip, length in zip(tips, lengths, strict=True)))
+    assert reached <= 1.0 + 1e-12 and len(everything.names) == 4
+
+
 def test_a_straight_finger_over_a_table_is_as_high_as_its_links_are_thick():
-    body, links, contacts = scene(table=TABLE, ball=BALL)
-    distance = dict(
-        zip(
-            contacts.names,
-            distances(contacts, body, configuration(body, np.zeros(4), ball=(BALL.position,))),
-            strict=True,
-        )
-    )
+    body, links, contacts = scene(table=NEAR, ball=BALL)
+    q = configuration(body, np.zeros(4), ball=((0.2, 0.0, -0.005),))
+    distance = dict(zip(contacts.names, distances(contacts, body, q), strict=True))
     for name, link in links.items():
-        assert distance[f"{name}-table"] == pytest.approx(0.1 - link.width / 2.0, abs=1e-12)
+        assert distance[f"{name}-table"] == pytest.approx(0.025 - link.width / 2.0, abs=1e-12)
     assert distance["ball-table"] == pytest.approx(0.0, abs=1e-12)
 
 
