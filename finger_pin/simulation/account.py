@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,10 +22,10 @@ _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 # other two, shape (3, 3).
 _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]])
 _CHUNK = 4096
-# Of all energy exchanged: what may stay open before stretches of the motion are integrated again, and how finely; at
-# most so many stretches, in so many seconds altogether.
-_CLOSED, _FINE = 1e-6, 1e-9
-_MOST_REFINED, _LONGEST = 20, 5.0
+# What may stay open, of all energy exchanged and in J, before stretches of the motion are integrated again, and how
+# finely; at most so many stretches, in so many steps altogether.
+_CLOSED, _NOTHING, _FINE = 1e-6, 1e-9, 1e-9
+_MOST_REFINED, _MOST_STEPS = 20, 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,15 +65,15 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     gained = total - total[0]
-    began = time.perf_counter()
+    steps = itertools.count()
     for begin, end in _open(gained - works.net, works.values, times, trajectory.breakpoints):
-        _refine(loop, trajectory, begin, end, times, works.values, lambda: time.perf_counter() - began > _LONGEST)
+        _refine(loop, trajectory, begin, end, times, works.values, lambda: next(steps) > _MOST_STEPS)
     return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
 
 
 def _open(residual: Array, works: Array, times: Array, breakpoints: Array) -> list[tuple[float, float]]:
     """Return the stretches of steps in which the account does not close; none where all of it is as good as closed."""
-    allowed = _CLOSED * float(np.sum(np.max(np.abs(works), axis=0, initial=0.0)))
+    allowed = max(_CLOSED * float(np.sum(np.max(np.abs(works), axis=0, initial=0.0))), _NOTHING)
     if len(breakpoints) < 2 or not allowed < float(np.max(np.abs(residual))) < np.inf:
         return []
     jumps = np.abs(np.diff(residual))
@@ -107,7 +107,7 @@ def _refine(
         atol=_FINE * loop.finger.layout.scales(),
         stop=stop,
     )
-    if fine.failure or fine.interrupted or stop():
+    if fine.failure or fine.interrupted:
         return
     inside = (times > begin) & (times < end)
     at, count = np.append(times[inside], end), works.shape[1]
