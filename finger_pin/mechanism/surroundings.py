@@ -43,13 +43,11 @@ class Surroundings:
     """Objects around a finger.
 
     Attributes:
-        objects: By name.
-        free: Those with a mass.
+        free: The objects with a mass, by name.
         body: The finger's rigid body, and the free objects after its joints.
         contacts: Between links and objects, links of different fingers, and objects.
     """
 
-    objects: Mapping[str, Object]
     free: Mapping[str, Object]
     body: RigidBody
     contacts: Rows
@@ -78,7 +76,7 @@ class Surroundings:
         solids = [*finger_solids(links, extended), *object_solids(objects, extended)]
         free = {name: each for name, each in objects.items() if each.mass is not None}
         width = int(extended.model.nv) + len(mechanism.lumps)
-        return cls(objects, free, extended, contact_rows(solids, width))
+        return cls(free, extended, contact_rows(solids, width))
 
     def around(self, mechanism: Mechanism) -> Mechanism:
         """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.

@@ -6,11 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-#: Columns of what ``value`` fills: distance, normal, point, two tangents.
-DISTANCE, NORMAL, POINT, TANGENT_1, TANGENT_2, FOUND = 0, 1, 4, 7, 10, 13
-#: Where in what ``slopes`` fills the slopes of the distance stand, and how many numbers there are.
-BY_DISTANCE, SLOPES = 72, 78
-
 
 @dataclass(frozen=True)
 class Gap:
