@@ -2,9 +2,6 @@ from . import analysis as analysis
 from . import control as control
 from . import studies as studies
 from . import views as views
-from .description.hand import HandDescription as HandDescription
-from .description.loading import list_fingers as list_fingers
-from .description.loading import list_hands as list_hands
 from .description.loading import list_scenarios as list_scenarios
 from .description.loading import load_finger as load_finger
 from .description.loading import load_hand as load_hand
@@ -12,13 +9,10 @@ from .description.loading import load_scenario as load_scenario
 from .description.loading import to_toml as to_toml
 from .description.parameters import FingerDescription as FingerDescription
 from .description.scenario import Scenario as Scenario
-from .exceptions import AccuracyWarning as AccuracyWarning
-from .exceptions import ClosureWarning as ClosureWarning
 from .exceptions import FingerPinError as FingerPinError
 from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError
 from .exceptions import Interrupted as Interrupted
-from .exceptions import MicroDampingWarning as MicroDampingWarning
 from .exceptions import ScenarioWarning as ScenarioWarning
 from .exceptions import SelfLockingWarning as SelfLockingWarning
 from .mechanism.finger import Finger as Finger

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.sampling import SampledController
 from finger_pin.core.textbook import Stop, Trajectory, integrate
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import Motion
@@ -22,10 +23,10 @@ _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 # other two, shape (3, 3).
 _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]])
 _CHUNK = 4096
-# What may stay open, of all energy exchanged and in J, before stretches of the motion are integrated again, and how
-# finely; at most so many stretches, in so many steps altogether.
-_CLOSED, _NOTHING, _FINE = 1e-6, 1e-9, 1e-9
-_MOST_REFINED, _MOST_STEPS = 20, 10_000
+# What may stay open, of all energy exchanged and in J, before the stretches of the motion where most of it stands open
+# are integrated again, and how finely; at most so many stretches, in so many steps altogether.
+_CLOSED, _NOTHING, _FINE = 1e-5, 1e-8, 1e-9
+_MOST_REFINED, _MOST_STEPS = 20, 5_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,9 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     total = np.sum(list(stored.values()), axis=0)
     gained = total - total[0]
     steps = itertools.count()
-    for begin, end in _open(gained - works.net, works.values, times, trajectory.breakpoints):
+    # A controller that acts in between is not asked again: there the account stays as it is.
+    sampled = loop.drives is not None or isinstance(loop.controller, SampledController)
+    for begin, end in [] if sampled else _open(gained - works.net, works.values, times, trajectory.breakpoints):
         _refine(loop, trajectory, begin, end, times, works.values, lambda: next(steps) > _MOST_STEPS)
     return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
 
@@ -78,7 +81,7 @@ def _open(residual: Array, works: Array, times: Array, breakpoints: Array) -> li
         return []
     jumps = np.abs(np.diff(residual))
     order = np.argsort(jumps)
-    worst = order[np.cumsum(jumps[order]) > allowed][-_MOST_REFINED:]
+    worst = order[np.cumsum(jumps[order]) > 0.1 * allowed][-_MOST_REFINED:]
     first = np.searchsorted(breakpoints, times[worst], side="right") - 1
     last = np.searchsorted(breakpoints, times[worst + 1], side="left")
     found: list[tuple[float, float]] = []

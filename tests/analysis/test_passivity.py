@@ -7,6 +7,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.analysis.passivity import micro_damping_advice
+from finger_pin.exceptions import MicroDampingWarning
 from finger_pin.laws.bristle import (
     friction_coefficient,
     friction_force,
@@ -45,7 +46,7 @@ def test_a_simulation_with_more_than_the_bound_warns_once_and_its_summary_says_s
     """Tendons: rho = 1.5 and b = 1 N s/m allow 2 N s/m."""
     scenario = fp.load_scenario("fig6", {"simulation.duration": 0.01, "finger.tendon_friction.micro_damping": 2.1})
     with pytest.warns(
-        fp.MicroDampingWarning, match=r"micro_damping = 2.1 can drive the motion of T1.* up to 2 "
+        MicroDampingWarning, match=r"micro_damping = 2.1 can drive the motion of T1.* up to 2 "
     ) as caught:
         result = fp.simulate(scenario)
     assert len(caught) == 1 and caught[0].filename == __file__

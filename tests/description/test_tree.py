@@ -5,6 +5,7 @@ import copy
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.validation import validate
 
 FINGER = {
@@ -103,4 +104,4 @@ def test_actuators_of_a_tree_are_driven_in_open_loop_alone():
 
 def test_a_tree_is_not_placed_on_a_palm():
     with pytest.raises(fp.InputError, match="a tree of bodies cannot be placed on a palm"):
-        validate(fp.HandDescription, {"name": "hand", "fingers": {"index": {"finger": FINGER}}}, ("hand",))
+        validate(HandDescription, {"name": "hand", "fingers": {"index": {"finger": FINGER}}}, ("hand",))
