@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import xarray as xr
-from scipy.spatial.transform import Rotation
 
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Array
@@ -83,9 +82,13 @@ class Things:
             turned = [np.einsum("mij,mcj->mci", palm.rotation, each) for each in (*parts, poses[..., :3])]
             open_ = ~np.any(parts[1], axis=-1, keepdims=True)
             parts = [turned[0] + palm.translation[:, None] * ~open_, *turned[1:3]]
-            attitudes = Rotation.from_matrix(palm.rotation)
-            columns = np.moveaxis(poses[..., 3:], 1, 0)
-            seen = np.stack([(attitudes * Rotation.from_quat(each)).as_quat() for each in columns], axis=1)
+            attitudes = [pin.Quaternion(each) for each in palm.rotation]
+            seen = np.array(
+                [
+                    [(attitude * pin.Quaternion(each)).coeffs() for each in row]
+                    for attitude, row in zip(attitudes, poses[..., 3:], strict=True)
+                ]
+            ).reshape(*poses.shape[:2], 4)
             poses = np.concatenate([turned[3] + palm.translation[:, None], seen], axis=-1)
         contacts = np.concatenate(parts, axis=-1)
         return cls(objects, tuple(placed), poses, contacts, steepness[steepness > 0.0], size, middle)
