@@ -16,7 +16,7 @@ from finger_pin.mechanism.mechanism import Mechanism
 #: Sixth-order central differences: where to look, in steps, and weights.
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
-SEEDS = range(16)
+SEEDS = range(10)
 
 
 @pytest.fixture(scope="module", params=SEEDS)
@@ -59,7 +59,7 @@ def test_the_compiled_evaluation_is_the_readable_one(drawn):
     assert_same(compiled.evaluate(x, command), mechanism.evaluate(x, command), mechanism)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_a_mechanism_with_a_free_body_evaluates_alike(seed):
     rng = np.random.default_rng(100 + seed)
     mechanism = random_mechanism(rng, free=True)
@@ -85,7 +85,7 @@ def linearised(drawn):
     mechanism, rng, command, force = drawn
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
-    states = random_states(mechanism, rng, 12)
+    states = random_states(mechanism, rng, 8)
     found = [(x, jacobian(mechanism, x, command, force)) for x in states]
     return Bound(mechanism, control, force), [each for each in found if each[1] is not None]
 
@@ -113,18 +113,18 @@ def test_the_condensed_solution_is_that_of_the_dense_system(linearised, g):
 
 
 def ends(mechanism, x, command, force):
-    """Where a mechanism is after 0.2 s, by scipy's Radau on the readable rates and by both compiled methods."""
+    """Where a mechanism is after 0.1 s, by scipy's Radau on the readable rates and by both compiled methods."""
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
     atol = np.full(len(x), 1e-9)
     found = [
         integrate(
-            lambda _, y: mechanism.evaluate(y, command, force).rate, x, 0.2, method="Radau", rtol=1e-8, atol=1e-9
-        ).interpolate(np.array([0.2]))[0]
+            lambda _, y: mechanism.evaluate(y, command, force).rate, x, 0.1, method="Radau", rtol=1e-8, atol=1e-9
+        ).interpolate(np.array([0.1]))[0]
     ]
     for method in TABLEAUS.values():
         stepper = Stepper(mechanism, control, x, method(), 1e-9, atol, force)
-        stepper.advance(0.2)
+        stepper.advance(0.1)
         found.append(stepper.x)
     return found
 
