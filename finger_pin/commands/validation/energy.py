@@ -17,7 +17,7 @@ TOLERANCES = (1e-4, 1e-6, 1e-8)
 #: The residual at the default tolerances over the work of actuators and electronics, and at a hundredth of them.
 LIMIT, TIGHT_LIMIT = 2e-6, 2e-8
 #: The same where bodies hit each other: the account of a step in which a contact closes is less exact.
-IMPACT_LIMITS = {"pinch": (5e-6, 1e-6)}
+IMPACT_LIMITS = {"pinch": (1e-5, 1e-6)}
 
 
 def run(name: str, tolerance: float) -> xr.Dataset:
