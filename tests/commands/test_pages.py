@@ -22,7 +22,7 @@ from harness import Quick
 import finger_pin as fp
 import finger_pin.studies as studies
 from finger_pin.commands import application
-from finger_pin.description import loading
+from finger_pin.description import reading
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
@@ -60,12 +60,12 @@ def shown(tmp_path_factory):
     (folder / "urdf").symlink_to(ROOT / "urdf")
     shipped = folder / "shipped"
     for kind in ("fingers", "hands", "scenarios", "motors"):
-        shutil.copytree(Path(loading.__file__).parent / kind, shipped / kind)
+        shutil.copytree(Path(reading.__file__).parent / kind, shipped / kind)
     for path in (shipped / "scenarios").iterdir():
         path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(loading, "resources", SimpleNamespace(files=lambda package: shipped))
+        patch.setattr(reading, "resources", SimpleNamespace(files=lambda package: shipped))
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.serving.Viewing.wait", lambda viewing: viewing.close())
         patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)

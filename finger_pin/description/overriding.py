@@ -1,0 +1,139 @@
+"""Overrides: values by dotted key, put into the tables that files have given."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, get_origin
+
+from finger_pin.description.reading import (
+    Table,
+    as_table,
+    expand,
+    is_other_kind,
+    is_path,
+    resolve_finger,
+    resolve_hand,
+    suggestion,
+    with_motors,
+)
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import find_field, nearest
+from finger_pin.exceptions import InputError
+
+# Keys that put another finger or hand in place of what there is.
+_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")
+# Tables by joint or tendon, and which of the two.
+_BY_NAME = {
+    ("reference", "joints"): "joint",
+    ("controller", "tensions"): "tendon",
+    ("simulation", "initial", "position"): "joint",
+    ("simulation", "initial", "velocity"): "joint",
+}
+
+
+def override(overrides: Table, table: Table, folder: Path) -> None:
+    """Resolve the fingers of a table, and apply overrides: other fingers before entries on top of them."""
+    whole = {key: value for key, value in overrides.items() if _OTHER_FINGER.fullmatch(key)}
+    for key in whole:
+        del overrides[key]
+    for kind, other in (("hand", "finger"), ("finger", "hand")):
+        given = {key: whole.pop(key) for key in (kind, f"{kind}.base") if key in whole}
+        if given:
+            table.pop(other, None)
+        _apply(given, table)
+    if "hand" in table:
+        table["hand"] = resolve_hand(table["hand"], folder)
+        _apply(whole, table)
+        table["hand"] = resolve_hand(table["hand"], folder)
+    elif "finger" not in table:
+        raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
+    else:
+        table["finger"] = resolve_finger(table["finger"], folder)
+    spelt_out = {each: value for key, value in overrides.items() for each in _each(key, table)}
+    # A kind comes before what belongs to it, and a motor before its entries.
+    first = (".kind", ".motor")
+    for early in (True, False):
+        _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
+        for finger in [each.get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
+            with_motors(as_table(finger), Path())
+
+
+def _each(key: str, table: Table) -> list[str]:
+    """Return the keys that a key stands for, in which a star stands for every name."""
+    head, star, tail = key.partition("*")
+    if not star:
+        return [key]
+    inner = table
+    for part in head.split(".")[:-1]:
+        inner = as_table(inner.get(part))
+    if not inner:
+        raise InputError(key, "there is nothing that the star could stand for")
+    return [found for name in inner for found in _each(f"{head}{name}{tail}", table)]
+
+
+def _apply(overrides: Mapping[str, Any], table: Table) -> None:
+    for key, value in overrides.items():
+        *path, last = key.split(".")
+        inner = table
+        for depth, part in enumerate(path):
+            _refuse_new([*path[:depth], part], inner, table)
+            below = inner.setdefault(part, {})
+            if isinstance(below, str) and part in ("finger", "hand"):
+                below = inner[part] = {"base": below}
+            if not isinstance(below, dict):
+                raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
+            inner = below
+        if last == "kind" and isinstance(value, str) and is_other_kind(inner, {"kind": value}):
+            inner.clear()
+        _refuse_new([*path, last], inner, table)
+        inner[last] = copy.deepcopy(value)
+
+
+def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
+    """Raise where an override would bring a joint, a tendon or the like into being: only a file does."""
+    *owner, name = path
+    finger = as_table(table.get("finger"))
+    hand = {key: as_table(each).get("finger") for key, each in _fingers(table).items()}
+    # A signal for a joint or a tendon that is there may have no entry of its own yet.
+    present: dict[tuple[str, ...], tuple[str, Iterable[str]]] = {}
+    for place, what in _BY_NAME.items():
+        present[place] = ("finger", hand) if hand else (what, as_table(finger.get(f"{what}s")))
+        for key, each in hand.items():
+            present[*place, key] = what, as_table(as_table(each).get(f"{what}s"))
+    if hand:
+        present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
+    field = find_field(Scenario, owner) if owner else None
+    if tuple(owner) not in present and (field is None or get_origin(field.annotation) is not dict):
+        return
+    what, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
+    if name not in names:
+        allowed = f"no such {what}; there are {', '.join(names) or 'none'}"
+        raise InputError(".".join(path), f"{allowed}{suggestion(name, names)}")
+
+
+def _fingers(table: Table) -> Table:
+    return as_table(as_table(table.get("hand")).get("fingers"))
+
+
+def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
+    """Return overrides whose keys begin with an allowed one, with the path of a finger's file made absolute."""
+    checked: Table = {}
+    for key, value in overrides.items():
+        first, *rest = key.split(".")
+        if first not in allowed:
+            near = nearest(first, allowed)
+            hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
+            raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
+        if _OTHER_FINGER.fullmatch(key):
+            value = _absolute(value)
+        if key.endswith("finger") and isinstance(value, dict) and "base" in value:
+            value = {**value, "base": _absolute(value["base"])}
+        checked[key] = value
+    return checked
+
+
+def _absolute(finger: Any) -> Any:
+    return str(expand(finger).absolute()) if isinstance(finger, str) and is_path(finger) else finger

@@ -1,0 +1,242 @@
+"""From files to tables: what ships, a user's TOML and CSV files, and what stands on top of what."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from finger_pin.description.columns import read_columns
+from finger_pin.description.validation import nearest
+from finger_pin.exceptions import InputError
+
+Table = dict[str, Any]
+# Sections that may name a CSV file, the key that does, and where its columns go.
+_SIGNAL_FILES = (
+    ("reference", "file", "joints"),
+    ("controller", "file", "tensions"),
+    ("environment", "fingertip_force_file", "fingertip_force_signal"),
+)
+# Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
+_KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
+_LARGEST = 10_000_000
+
+
+def shipped(kind: str) -> dict[str, str]:
+    """Return what ships of a kind, such as fingers, with a line about each."""
+    found = {}
+    for entry in sorted(resources.files("finger_pin.description").joinpath(kind).iterdir(), key=lambda item: item.name):
+        if entry.name.endswith(".toml"):
+            found[entry.name.removesuffix(".toml")] = str(tomllib.loads(entry.read_text("utf-8")).get("title", ""))
+    return found
+
+
+def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
+    """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
+    if is_path(name):
+        what, path = f"{kind} file {name}", folder / expand(name)
+        data = _read_bytes(what, path)
+    else:
+        what, path = f"{kind} {name}", Path(name)
+        names = shipped(f"{kind}s")
+        if name not in names:
+            allowed = (
+                f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{suggestion(name, names)}"
+            )
+            raise InputError(kind, allowed, name)
+        data = resources.files("finger_pin.description").joinpath(f"{kind}s/{name}.toml").read_bytes()
+    try:
+        return tomllib.loads(data.decode("utf-8-sig")), path
+    except UnicodeDecodeError:
+        raise InputError(what, "is not a text file in UTF-8") from None
+    except RecursionError:
+        raise InputError(what, "is nested too deeply") from None
+    except ValueError as error:
+        raise InputError(what, f"is not valid TOML: {error}") from None
+
+
+def is_path(name: str) -> bool:
+    """Return whether a name is the path of a file rather than something that ships."""
+    return name.endswith(".toml") or "/" in name or "\\" in name
+
+
+def expand(name: str) -> Path:
+    """Return a path with the home folder in place of ~, or as it is where there is no such home."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def _read_bytes(what: str, path: Path) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            data = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(what, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > _LARGEST:
+        raise InputError(what, f"is larger than {_LARGEST} bytes")
+    return data
+
+
+def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
+    """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in."""
+    table, path = _read("scenario", name, folder)
+    identity = path.resolve()
+    if identity in seen:
+        raise InputError("extends", "a scenario cannot start from itself", name)
+    folder = path.parent
+    resolve_signals(table, folder)
+    if "extends" not in table:
+        return table, folder
+    base = table.pop("extends")
+    if not isinstance(base, str):
+        raise InputError("extends", "must be the name or path of another scenario", base)
+    parent, parent_folder = read_scenario_file(base, folder, (*seen, identity))
+    parent.pop("name", None)
+    if "finger" in parent:
+        parent["finger"] = resolve_finger(parent["finger"], parent_folder)
+    if "hand" in parent:
+        parent["hand"] = resolve_hand(parent["hand"], parent_folder)
+    whole = isinstance(table.get("finger"), str) or "base" in as_table(table.get("finger"))
+    if "hand" in table or whole:
+        parent.pop("finger", None)
+    if "finger" in table or isinstance(table.get("hand"), str) or "base" in as_table(table.get("hand")):
+        parent.pop("hand", None)
+    if "hand" in parent and "hand" in table:
+        table["hand"] = _on_top(parent.pop("hand"), table["hand"], folder)
+    return _merge(parent, table), folder
+
+
+def _opened(kind: str, name: str, folder: Path, seen: tuple[Path, ...]) -> tuple[Table, Path, tuple[Path, ...]]:
+    """Return the table of a named finger or hand, the folder that its paths start from, and the files seen so far."""
+    table, path = _read(kind, name, folder)
+    identity = path.resolve()
+    if identity in seen:
+        raise InputError(f"{kind}.base", f"a {kind} cannot start from itself", name)
+    table.setdefault("name", as_name(Path(name).stem))
+    return table, path.parent, (*seen, identity)
+
+
+def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
+    """Return the table of a finger given by name, by path, or as a table that may start from a base."""
+    if isinstance(finger, str):
+        return resolve_finger(*_opened("finger", finger, folder, seen))
+    if isinstance(finger, dict) and "base" in finger:
+        rest = dict(finger)
+        base = rest.pop("base")
+        if not isinstance(base, str):
+            raise InputError("finger.base", "must be the name or path of a finger", base)
+        return with_motors(_merge(resolve_finger(base, folder, seen), rest), folder)
+    if not isinstance(finger, dict):
+        raise InputError("finger", "must be the name of a finger, the path of a .toml file, or a table", finger)
+    return with_motors(finger, folder)
+
+
+def with_motors(finger: Table, folder: Path) -> Table:
+    """Put the table of every motor of a finger where its name or path may stand; return the finger."""
+    for actuator in as_table(finger.get("actuators")).values():
+        if isinstance(actuator, dict) and "motor" in actuator:
+            actuator["motor"] = _resolve_motor(actuator["motor"], folder)
+    return finger
+
+
+def _resolve_motor(motor: Any, folder: Path) -> Any:
+    """Return the table of a motor given by name, by path, or as a table that may start from a base."""
+    if isinstance(motor, str):
+        table, path = _read("motor", motor, folder)
+        return _resolve_motor(table, path.parent)
+    if isinstance(motor, dict) and "base" in motor:
+        rest = dict(motor)
+        return _merge(as_table(_resolve_motor(rest.pop("base"), folder)), rest)
+    return motor
+
+
+def resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
+    """Return the table of a hand given by name, by path, or as a table that may start from a base."""
+    if isinstance(hand, str):
+        return resolve_hand(*_opened("hand", hand, folder, seen))
+    if not isinstance(hand, dict):
+        raise InputError("hand", "must be the name of a hand, the path of a .toml file, or a table", hand)
+    rest = dict(hand)
+    base = rest.pop("base", {})
+    if not isinstance(base, str | dict):
+        raise InputError("hand.base", "must be the name or path of a hand", base)
+    return _on_top(resolve_hand(base, folder, seen) if base else {}, rest, folder)
+
+
+def _on_top(base: Table, hand: Table, folder: Path) -> Table:
+    """Return the table of a hand with another on top, whose fingers may be other ones altogether."""
+    for name, placed in as_table(as_table(hand).get("fingers")).items():
+        finger = as_table(placed).get("finger")
+        if isinstance(finger, str) or "base" in as_table(finger):
+            with _named(f"hand.fingers.{name}."):
+                placed["finger"] = resolve_finger(finger, folder)
+            as_table(as_table(base.get("fingers")).get(name)).pop("finger", None)
+    return _merge(base, hand)
+
+
+@contextmanager
+def _named(owner: str) -> Iterator[None]:
+    """Put the owner of a finger before the entries that errors name."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(owner + error.entry, error.allowed, error.value) from None
+
+
+def resolve_signals(table: Table, folder: Path) -> None:
+    """Put the columns of CSV files where a file may say them itself: as samples of signals by name."""
+    for section, key, target in _SIGNAL_FILES:
+        settings = table.get(section)
+        if not isinstance(settings, dict) or key not in settings:
+            continue
+        name = settings.pop(key)
+        entry = f"{section}.{key}"
+        if not isinstance(name, str):
+            raise InputError(entry, "must be the path of a CSV file", name)
+        try:
+            text = _read_bytes(f"{entry} {name}", folder / expand(name)).decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{entry} {name}", "is not a text file in UTF-8") from None
+        times, *columns = read_columns(f"{entry} {name}", text).items()
+        samples = {name: {"kind": "samples", "times": times[1], "values": values} for name, values in columns}
+        settings[target] = {**as_table(settings.get(target)), **samples}
+
+
+def is_other_kind(base: Table, top: Table) -> bool:
+    """Return whether a signal or controller is of another kind than the one that it is put on."""
+    kinds = {base.get("kind"), top["kind"]} if "kind" in top else set()
+    return len(kinds) == 2 and not _KINDS_APART.isdisjoint(kinds)
+
+
+def _merge(base: Table, top: Table) -> Table:
+    merged = dict(base)
+    for key, value in top.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not is_other_kind(merged[key], value)
+        # A table that names its base starts from that one.
+        merged[key] = _merge(merged[key], value) if both and "base" not in value else value
+    return merged
+
+
+def suggestion(name: Any, names: Iterable[str]) -> str:
+    """Return the nearest valid name as the end of a message; empty if none is near."""
+    near = nearest(name, names)
+    return f"; did you mean {near}?" if near else ""
+
+
+def as_table(value: Any) -> Table:
+    """Return a table, empty for what is none: validation says what is wrong with it."""
+    return value if isinstance(value, dict) else {}
+
+
+def as_name(stem: str) -> str:
+    """Return a valid name made of that of a file."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem)[:60]
+    return name if re.match(r"[A-Za-z]", name) else f"scenario_{name}"
