@@ -26,7 +26,8 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger, FingerSignals
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 

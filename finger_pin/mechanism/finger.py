@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -17,13 +16,15 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.finger_signals import FingerSignals, JointForces, MotorForces, TendonForces
+from finger_pin.mechanism.foreign_model import on_model
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.mechanism import Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
-from finger_pin.mechanism.state import Layout, State
+from finger_pin.mechanism.state import Layout
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
@@ -31,108 +32,6 @@ from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
-
-
-@dataclass(frozen=True, eq=False)
-class TendonForces:
-    """What the tendons do; shapes (..., t) unless said otherwise.
-
-    Attributes:
-        curvature: phi, rad, (15).
-        coefficient: mu^d, (16).
-        velocity: v, m/s; (H_c theta')_i, and p_5' for a passive tendon.
-        friction: f^f, N, (9c).
-        normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
-        level: max(F^n M, g_min), N.
-        stiction_rate: F^s', N/s, (9a).
-        entering: f^a, what pulls at the canal's entrance, N; of a passive tendon its proximal half.
-        strands: f of (12), shape (..., s), N.
-        passive_acceleration: p_5'', shape (..., p), m/s2, (13).
-    """
-
-    curvature: Array
-    coefficient: Array
-    velocity: Array
-    friction: Array
-    normal: Array
-    level: Array
-    stiction_rate: Array
-    entering: Array
-    strands: Array
-    passive_acceleration: Array
-
-
-@dataclass(frozen=True, eq=False)
-class JointForces:
-    """What the joints' friction does; shapes (..., n).
-
-    Attributes:
-        reaction: R, N, (17).
-        friction: tau^f, N m, (9c).
-        level: max(R M, g_min), N m.
-        stiction_rate: F^s', N m/s, (9a).
-    """
-
-    reaction: Array
-    friction: Array
-    level: Array
-    stiction_rate: Array
-
-
-@dataclass(frozen=True, eq=False)
-class MotorForces:
-    """What the motors do; shapes (..., m).
-
-    Attributes:
-        current: i, A.
-        voltage: U, V.
-        torque: tau = K_t i, N m.
-        friction: tau_g, N m, (9c).
-        load: N, the torque that the gears carry, N m.
-    """
-
-    current: Array
-    voltage: Array
-    torque: Array
-    friction: Array
-    load: Array
-
-
-@dataclass(frozen=True, eq=False)
-class FingerSignals:
-    """Everything that (18) is made of, at one state or at many (leading dimensions are kept).
-
-    Attributes:
-        state: The state, unpacked.
-        command: f^a, shape (..., a), N.
-        fingertip_force: F, shape (3,) or (..., 3), of several fingers (f, 3) or (..., f, 3), N, base frame.
-        tendons: Tendon forces and friction.
-        joints: Joint reaction and friction.
-        limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
-        limiter_torque: tau^r, shape (..., n), N m.
-        spring_torque: tau^k of the joints' springs, shape (..., n), N m.
-        tendon_torque: H_c2^T f, shape (..., n), N m, (11).
-        external_torque: J^T F, shape (..., n), N m, (6).
-        acceleration: theta'', shape (..., n), rad/s2, (18).
-        rate: Time derivative of the packed state, shape (..., size).
-        mechanism: The same of the mechanism, with what every row does.
-        motors: What motors do; None without any.
-    """
-
-    state: State
-    command: Array
-    fingertip_force: Array
-    tendons: TendonForces
-    joints: JointForces
-    limiter_depth: Array
-    limiter_torque: Array
-    spring_torque: Array
-    tendon_torque: Array
-    external_torque: Array
-    acceleration: Array
-    rate: Array
-    mechanism: Evaluation
-    motors: MotorForces | None = None
 
 
 class Finger:
@@ -278,34 +177,7 @@ class Finger:
             InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates,
                 or the configuration has the wrong size.
         """
-        joined = description.joined() if isinstance(description, HandDescription) else description
-        fingers = tuple(description.fingers) if isinstance(description, HandDescription) else ("",)
-        named = _by_joint(joints)
-        tips, axes = (
-            _by_finger(each, fingers, what) for each, what in ((tip_frame, "tip_frame"), (base_axis, "base_axis"))
-        )
-        for name in joined.joints:
-            if name not in named:
-                raise InputError(f"joints.{name}", "is missing: name the model's joint")
-        chosen = [named[name] for name in joined.joints]
-        for name, wanted in named.items():
-            if name not in joined.joints or not model.existJointName(wanted):
-                raise InputError(f"joints.{name}", "no such joint in the description or the model", wanted)
-        indices = [int(model.getJointId(name)) for name in chosen]
-        if indices != sorted(set(indices)):
-            raise InputError("joints", "must follow the model's order, each joint once", chosen)
-        locked = [index for index in range(1, model.njoints) if index not in indices]
-        posture = pin.neutral(model) if configuration is None else np.asarray(configuration, dtype=float)
-        if posture.shape != (model.nq,):
-            raise InputError("configuration", f"must be {model.nq} numbers, one per coordinate of the model", posture)
-        solids = pin.GeometryModel() if visuals is None else visuals
-        reduced, shown = pin.buildReducedModel(model, solids, locked, posture)
-        reduced.gravity.linear[:] = joined.gravity
-        body = RigidBody(reduced, tips)
-        for index, name in enumerate(joined.joints, start=1):
-            if body.carriers[index] == 0:
-                own = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
-                body.proximal_axes[index] = np.asarray(axes[own], dtype=float)
+        joined, body, shown = on_model(description, model, joints, tip_frame, configuration, base_axis, visuals)
         finger = cls(joined, body)
         finger.visuals = shown
         return finger
@@ -463,23 +335,3 @@ class Finger:
 
 #: A hand is a finger whose joints form a tree.
 Hand = Finger
-
-
-def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    """Return names of a model's joints by those of a description, which have dots in a hand."""
-    found: dict[str, str] = {}
-    for name, given in joints.items():
-        found |= {name: given} if isinstance(given, str) else {f"{name}.{own}": each for own, each in given.items()}
-    return found
-
-
-def _by_finger(given: Any, fingers: tuple[str, ...], entry: str) -> list[Any]:
-    """Return one item for each finger, of one for all or of a table by finger."""
-    if not isinstance(given, Mapping):
-        if entry == "tip_frame" and len(fingers) > 1:
-            raise InputError(entry, f"must be a table with a frame for each of {', '.join(fingers)}", given)
-        return [given] * len(fingers)
-    for name in fingers:
-        if name not in given:
-            raise InputError(f"{entry}.{name}", f"is missing: there must be one for each of {', '.join(fingers)}")
-    return [given[name] for name in fingers]

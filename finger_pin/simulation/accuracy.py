@@ -14,7 +14,7 @@ from finger_pin.core.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import FingerSignals
+from finger_pin.mechanism.finger_signals import FingerSignals
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 256

@@ -18,7 +18,8 @@ from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.mechanism.finger import Finger, FingerSignals
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.accuracy import floor_advice
 from finger_pin.simulation.told import Told

@@ -11,7 +11,8 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.laws.law import Touch
-from finger_pin.mechanism.finger import Finger, FingerSignals
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
 
 Variables = dict[str, tuple[Any, Array, dict[str, str]]]

@@ -10,7 +10,7 @@ from finger_pin.core import rosenbrock, signals
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.inputs import held_control
 from finger_pin.core.stepper import TABLEAUS, Stepper
-from finger_pin.mechanism.finger import FingerSignals
+from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import Rows
 
 STATES = 100

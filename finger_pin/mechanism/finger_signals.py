@@ -1,0 +1,111 @@
+"""What a finger does at a state, by the names of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.mechanism import Evaluation
+from finger_pin.mechanism.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class TendonForces:
+    """What the tendons do; shapes (..., t) unless said otherwise.
+
+    Attributes:
+        curvature: phi, rad, (15).
+        coefficient: mu^d, (16).
+        velocity: v, m/s; (H_c theta')_i, and p_5' for a passive tendon.
+        friction: f^f, N, (9c).
+        normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
+        level: max(F^n M, g_min), N.
+        stiction_rate: F^s', N/s, (9a).
+        entering: f^a, what pulls at the canal's entrance, N; of a passive tendon its proximal half.
+        strands: f of (12), shape (..., s), N.
+        passive_acceleration: p_5'', shape (..., p), m/s2, (13).
+    """
+
+    curvature: Array
+    coefficient: Array
+    velocity: Array
+    friction: Array
+    normal: Array
+    level: Array
+    stiction_rate: Array
+    entering: Array
+    strands: Array
+    passive_acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class JointForces:
+    """What the joints' friction does; shapes (..., n).
+
+    Attributes:
+        reaction: R, N, (17).
+        friction: tau^f, N m, (9c).
+        level: max(R M, g_min), N m.
+        stiction_rate: F^s', N m/s, (9a).
+    """
+
+    reaction: Array
+    friction: Array
+    level: Array
+    stiction_rate: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MotorForces:
+    """What the motors do; shapes (..., m).
+
+    Attributes:
+        current: i, A.
+        voltage: U, V.
+        torque: tau = K_t i, N m.
+        friction: tau_g, N m, (9c).
+        load: N, the torque that the gears carry, N m.
+    """
+
+    current: Array
+    voltage: Array
+    torque: Array
+    friction: Array
+    load: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FingerSignals:
+    """Everything that (18) is made of, at one state or at many (leading dimensions are kept).
+
+    Attributes:
+        state: The state, unpacked.
+        command: f^a, shape (..., a), N.
+        fingertip_force: F, shape (3,) or (..., 3), of several fingers (f, 3) or (..., f, 3), N, base frame.
+        tendons: Tendon forces and friction.
+        joints: Joint reaction and friction.
+        limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
+        limiter_torque: tau^r, shape (..., n), N m.
+        spring_torque: tau^k of the joints' springs, shape (..., n), N m.
+        tendon_torque: H_c2^T f, shape (..., n), N m, (11).
+        external_torque: J^T F, shape (..., n), N m, (6).
+        acceleration: theta'', shape (..., n), rad/s2, (18).
+        rate: Time derivative of the packed state, shape (..., size).
+        mechanism: The same of the mechanism, with what every row does.
+        motors: What motors do; None without any.
+    """
+
+    state: State
+    command: Array
+    fingertip_force: Array
+    tendons: TendonForces
+    joints: JointForces
+    limiter_depth: Array
+    limiter_torque: Array
+    spring_torque: Array
+    tendon_torque: Array
+    external_torque: Array
+    acceleration: Array
+    rate: Array
+    mechanism: Evaluation
+    motors: MotorForces | None = None
