@@ -76,7 +76,7 @@ class PathWork(NamedTuple):
         push: Force of a contact on the first body, shape (E, 3), N.
         length: Of every row, shape (K,).
         turn: Of every row, shape (K,).
-        y: Points in a piece's frame, shape (6,).
+        seen: Both points as each piece's frame sees them, shape (E, 6), m.
         gather: Shape (N,).
         slopes: Of a shape, shape (SLOPES,).
         wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, COLUMNS, WRENCH).
@@ -91,7 +91,7 @@ class PathWork(NamedTuple):
     push: Matrix
     length: Vector
     turn: Vector
-    y: Vector
+    seen: Matrix
     gather: Vector
     slopes: Vector
     turn_slope: Vector
@@ -183,7 +183,7 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         push=np.zeros((pieces, 3)),
         length=np.zeros(count),
         turn=np.zeros(count),
-        y=np.zeros(6),
+        seen=np.zeros((pieces, 6)),
         gather=np.zeros(width),
         slopes=np.zeros(SLOPES),
         turn_slope=np.zeros(entries),

@@ -54,9 +54,9 @@ def _frame(paths: Any, e: int, work: Any) -> None:
                 for i in range(3):
                     ends[3 * p + r] += work.rotation[body, r, i] * paths.points[e, 3 * p + i]
         for c in range(3):
-            own.y[3 * p + c] = 0.0
+            own.seen[e, 3 * p + c] = 0.0
             for r in range(3):
-                own.y[3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
+                own.seen[e, 3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
 
 
 @compiled
@@ -71,7 +71,7 @@ def _measure(paths: Any, e: int, work: Any) -> None:
     """Fill what a piece says, and its wrenches."""
     own = work.paths
     _frame(paths, e, work)
-    out, y, columns = own.out[e], own.y, paths.columns[e]
+    out, y, columns = own.out[e], own.seen[e], paths.columns[e]
     beyond = 0.0
     for c in range(3):
         middle = 0.5 * (y[c] + y[3 + c])
@@ -210,15 +210,8 @@ def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
     """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
     own = work.paths
     rotation, ends, columns, slopes = own.frame[e], own.ends[e], paths.columns[e], own.slopes
-    y, dy = own.y, work.vectors[0]
-    # The points as the frame sees them are another piece's by now.
-    for p in range(2):
-        for c in range(3):
-            y[3 * p + c] = 0.0
-            for r in range(3):
-                y[3 * p + c] += rotation[r, c] * (ends[3 * p + r] - own.origin[e, r])
-    call_shape(paths.shapes[e, 1], y, paths.parameters[e], slopes)
-    moved, point = work.vectors[1], work.centre
+    dy, moved, point = work.vectors[0], work.vectors[1], work.centre
+    call_shape(paths.shapes[e, 1], own.seen[e], paths.parameters[e], slopes)
     _turned(rotation, own.out[e], 4, point)
     for r in range(3):
         point[r] += own.origin[e, r]

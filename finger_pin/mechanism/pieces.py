@@ -24,7 +24,6 @@ class Shape(Protocol):
     """What a piece is, seen from its own frame: a span of a tendon, or a gap between surfaces.
 
     Attributes:
-        name: For messages.
         parameters: Names of its numbers.
         value: (y, p, out) fills what the points y, six numbers, give; see `spans` and `gaps`.
         slopes: (y, p, out) fills its derivatives by y.
@@ -32,9 +31,6 @@ class Shape(Protocol):
     """
 
     columns: ClassVar[int]
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
 
     @property
     def parameters(self) -> tuple[str, ...]: ...  # noqa: D102
