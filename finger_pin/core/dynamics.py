@@ -12,7 +12,7 @@ from finger_pin.core.inputs import inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
 from finger_pin.core.paths import passes, push
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
-from finger_pin.core.tables import BENT, END, FED, FIRST, PRESSED, STATEFUL
+from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
 
 @compiled
@@ -72,38 +72,38 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
 
 
 @compiled
-def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
-    """Evaluate all rows in their order: their torques, and the rates of their states.
+def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
+    """Fill what the rows see of positions, velocities, states and inputs from outside.
 
-    What a group does not have stays as `build_work` has set it.
+    One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
     """
     rows = work.rows
-    for j in range(work.torque.size):
-        work.torque[j] = 0.0
+    for k in range(rows.shape[1]):
+        rows[LENGTH, k] = tables.offset[k] + work.paths.length[k]
+        rows[SPEED, k] = 0.0
+        rows[CURVATURE, k] = tables.curvature_offset[k] + work.paths.turn[k]
+    for e in range(tables.arm_at.size):
+        k, j = tables.arm_row[e], tables.arm_at[e]
+        rows[LENGTH, k] += tables.measure[e] * q[j]
+        rows[SPEED, k] += work.arm[e] * v[j]
+    for e in range(tables.bend_at.size):
+        rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
+    for i in range(tables.state_row.size):
+        rows[STATE, tables.state_row[i]] = z[i]
+    for i in range(tables.fed_row.size):
+        k = tables.fed_row[i]
+        rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
+
+
+@compiled
+def _exert(tables: Any, work: Any) -> None:
+    """Evaluate the laws of all rows in their order, each with the forces of those before, after `_see`."""
+    rows = work.rows
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        for k in range(begin, end):
-            length, speed = tables.offset[k] + work.paths.length[k], 0.0
-            for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-                j = tables.arm_at[e]
-                length += tables.measure[e] * q[j]
-                speed += work.arm[e] * v[j]
-            rows[LENGTH, k], rows[SPEED, k] = length, speed
-        if tables.groups[g, BENT]:
-            for k in range(begin, end):
-                curvature = tables.curvature_offset[k] + work.paths.turn[k]
-                for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-                    curvature += tables.bend[e] * abs(q[tables.bend_at[e]])
-                rows[CURVATURE, k] = curvature
-        if tables.groups[g, STATEFUL]:
-            for k in range(begin, end):
-                if tables.state[k] >= 0:
-                    rows[STATE, k] = z[tables.state[k]]
         if tables.groups[g, FED]:
             for k in range(begin, end):
-                command = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
-                given = _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
-                rows[COMMAND, k] = command + given
+                rows[COMMAND, k] += _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
         if tables.groups[g, PRESSED]:
             for k in range(begin, end):
                 load = _sum_of_terms(tables, tables.load_start[k], tables.load_start[k + 1], work)
@@ -113,16 +113,20 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
                     work.pull[k, 0] = load
                     rows[LOAD, k] = abs(load)
         call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
-        for k in range(begin, end):
-            force = rows[FORCE, k]
-            for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-                work.torque[tables.arm_at[e]] += work.arm[e] * force
-        if tables.groups[g, STATEFUL]:
-            for k in range(begin, end):
-                if tables.state[k] >= 0:
-                    rate[tables.state[k]] = rows[RATE, k]
         if tables.touch[begin] > 0:
             push(tables, work)
+
+
+@compiled
+def _drive(tables: Any, work: Any, rate: Any) -> None:
+    """Fill A^T phi, and the rates of the rows' states, after `_exert`."""
+    rows, torque = work.rows, work.torque
+    for j in range(torque.size):
+        torque[j] = 0.0
+    for e in range(tables.arm_at.size):
+        torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
+    for i in range(tables.state_row.size):
+        rate[i] = rows[RATE, tables.state_row[i]]
 
 
 @compiled
@@ -140,7 +144,9 @@ def evaluate(model: Any, address: int, time: float) -> None:
         _tips(tables, work)
     if model.measure != 0:
         call_at(model.measure, address, time)
-    _exert(tables, q, v, z, work, rate[2 * width :])
+    _see(tables, q, v, z, work)
+    _exert(tables, work)
+    _drive(tables, work, rate[2 * width :])
     mass_matrix(tables, work)
     factorise_mass(size, work)
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)
