@@ -96,7 +96,7 @@ def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
 
 
 @compiled
-def _exert(tables: Any, work: Any) -> None:
+def _act(tables: Any, work: Any) -> None:
     """Evaluate the laws of all rows in their order, each with the forces of those before, after `_see`."""
     rows = work.rows
     for g in range(tables.groups.shape[0]):
@@ -119,7 +119,7 @@ def _exert(tables: Any, work: Any) -> None:
 
 @compiled
 def _drive(tables: Any, work: Any, rate: Any) -> None:
-    """Fill A^T phi, and the rates of the rows' states, after `_exert`."""
+    """Fill A^T phi, and the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
     for j in range(torque.size):
         torque[j] = 0.0
@@ -130,23 +130,31 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
 
 
 @compiled
-def evaluate(model: Any, address: int, time: float) -> None:
-    """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
-    tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
-    size, width = tables.parents.size, work.torque.size
-    q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
-    inputs(control, time, q, v, work.command)
-    if model.carry != 0:
-        call_at(model.carry, address, time)
-    move(tables, q, v, work)
+def exert(model: Any, address: int, time: float) -> None:
+    """Fill what the rows see and do, where bodies are placed by `move` and inputs known, and their states' rates."""
+    tables, control, x, work = model.tables, model.control, model.state, model.work
+    width = work.torque.size
     if tables.loaded:
         tip_forces(control, time, tables)
         _tips(tables, work)
     if model.measure != 0:
         call_at(model.measure, address, time)
-    _see(tables, q, v, z, work)
-    _exert(tables, work)
-    _drive(tables, work, rate[2 * width :])
+    _see(tables, x[:width], x[width : 2 * width], x[2 * width :], work)
+    _act(tables, work)
+    _drive(tables, work, model.rate[2 * width :])
+
+
+@compiled
+def evaluate(model: Any, address: int, time: float) -> None:
+    """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
+    tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
+    size, width = tables.parents.size, work.torque.size
+    q, v = x[:width], x[width : 2 * width]
+    inputs(control, time, q, v, work.command)
+    if model.carry != 0:
+        call_at(model.carry, address, time)
+    move(tables, q, v, work)
+    call_at(model.exert, address, time)
     mass_matrix(tables, work)
     factorise_mass(size, work)
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)

@@ -44,7 +44,7 @@ class CompiledMechanism:
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
         mechanism, several = self.mechanism, np.ndim(x) > 1
-        packed, filled = self._filled(x, command, force, base, len(self._models[0].model.work.rows))
+        packed, filled = self._filled(x, command, force, base)
         rates, rows, torques, externals, booked = filled
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         acceleration, rate = rates[:, width : 2 * width], rates
@@ -83,13 +83,13 @@ class CompiledMechanism:
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
-        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, 0)
+        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, booked_only=True)
         return booked[:, len(self.mechanism.books.stored) :], externals
 
     def _filled(
-        self, x: Array, command: Array, force: Array | None, base: Array | None, columns: int
+        self, x: Array, command: Array, force: Array | None, base: Array | None, *, booked_only: bool = False
     ) -> tuple[Array, tuple[Array, ...]]:
-        """Return packed states, and what `evaluate_many` fills for them, with so many columns of the rows."""
+        """Return packed states, and what `evaluate_many` fills for them: all, or energies, powers and J^T F only."""
         mechanism, tables = self.mechanism, self._models[0].model.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
@@ -104,7 +104,8 @@ class CompiledMechanism:
         bases = _bases(base, count)
         states, attitudes = self._charts.to_core(packed)
         books = len(mechanism.books.stored) + len(mechanism.books.powers)
-        rates, rows = np.zeros_like(states), np.zeros((count, columns, len(tables.state)))
+        kept = 0 if booked_only else count
+        rates, rows = np.zeros((kept, states.shape[1])), np.zeros((kept, *self._models[0].model.work.rows.shape))
         torques, externals, booked = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, books))
 
         def fill(model: BoundModel, part: slice) -> None:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of, put
+from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of
 from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
@@ -176,17 +176,11 @@ def _carry(linear: Any, g: float, gamma: float, joints: int, drift: Any, differe
 
 
 @entry
-def bind(integration: Any, block: Any) -> None:
-    """Write into a block, made by `block_for(INTEGRATION)`, where all that an integration works on lies."""
-    put(block, integration, INTEGRATION)
-
-
-@entry
 def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, dense: Any) -> Any:
     """Take steps until the end, or until the record is full; return a status and the number of steps recorded.
 
     Args:
-        block: Filled by `bind`.
+        block: An `Integration`, bound.
         end: Time to reach, s.
         times: Record of the times at which steps end, shape (m,); of length zero to record nothing.
         states: Record of the states there, with the angles of free bodies since the step's start, shape (m, size).

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
-from finger_pin.core.binding import block_for
+from finger_pin.core.binding import bound
 from finger_pin.core.charts import Charts, place_all
 from finger_pin.core.drives import Drives, advance_driven
 from finger_pin.core.inputs import Control
@@ -107,8 +107,7 @@ class Part:
             drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
         )
-        self._block = block_for(core.INTEGRATION)
-        core.bind(self._bound, self._block)
+        self._block = bound(self._bound, core.INTEGRATION)
         place_all(tables, attitude)
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
