@@ -76,6 +76,12 @@ def place(frame: Any, q: Any, body: Any) -> None:
 @entry
 def place_all(tables: Any, attitude: Any) -> None:
     """Place all free bodies by their quaternions, shape (f, 4)."""
+    place_bodies(tables, attitude)
+
+
+@compiled
+def place_bodies(tables: Any, attitude: Any) -> None:
+    """Do the same from compiled code."""
     for f in range(tables.charts.size):
         place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
 
