@@ -79,6 +79,13 @@ def place_all(tables: Any, attitude: Array) -> None:
         place.py_func(frame, quaternion, tables.bodies[at])  # type: ignore[attr-defined]
 
 
+@compiled
+def place_bodies(tables: Any, attitude: Any) -> None:
+    """Do the same from compiled code."""
+    for f in range(tables.charts.size):
+        place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
+
+
 def angular_velocity(angles: Array, rates: Array) -> Array:
     """Return the angular velocity in the body's frame of turns about its x, y and z axes, shape (..., 3), rad/s."""
     (_, b, c), (da, db, dc) = np.moveaxis(angles, -1, 0), np.moveaxis(rates, -1, 0)

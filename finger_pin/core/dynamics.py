@@ -56,7 +56,8 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
         pull = -load * value
         for t in range(tables.tip_body.size):
             pull += tables.carried[t, body] * tables.tip_force[t, r]
-        for e in range(tables.paths.columns.size):
+        for index in range(work.paths.closed_count[0]):
+            e = work.paths.closed[index]
             pull += passes(tables.paths, e, body) * work.paths.push[e, r]
         work.pull[k, r] = pull
         total += pull * pull
@@ -73,22 +74,22 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
 
 @compiled
 def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
-    """Fill what the rows see of positions, velocities, states and inputs from outside.
+    """Fill what the rows but those of contacts see of positions, velocities, states and inputs from outside.
 
     One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
     """
-    rows = work.rows
-    for k in range(rows.shape[1]):
+    rows, first = work.rows, tables.touching
+    for k in range(first, rows.shape[1]):
         rows[LENGTH, k] = tables.offset[k] + work.paths.length[k]
         rows[SPEED, k] = 0.0
         rows[CURVATURE, k] = tables.curvature_offset[k] + work.paths.turn[k]
-    for e in range(tables.arm_at.size):
+    for e in range(tables.arm_start[first], tables.arm_at.size):
         k, j = tables.arm_row[e], tables.arm_at[e]
         rows[LENGTH, k] += tables.measure[e] * q[j]
         rows[SPEED, k] += work.arm[e] * v[j]
-    for e in range(tables.bend_at.size):
+    for e in range(tables.bend_start[first], tables.bend_at.size):
         rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
-    for i in range(tables.state_row.size):
+    for i in range(2 * first // 3, tables.state_row.size):
         rows[STATE, tables.state_row[i]] = z[i]
     for i in range(tables.fed_row.size):
         k = tables.fed_row[i]
@@ -96,11 +97,32 @@ def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
 
 
 @compiled
-def _act(tables: Any, work: Any) -> None:
+def _touch(tables: Any, g: int, v: Any, z: Any, work: Any) -> None:
+    """Evaluate the contacts of a group, but for those asleep, which exert nothing."""
+    rows, asleep = work.rows, work.paths.asleep
+    for k in range(tables.groups[g, FIRST], tables.groups[g, END], 3):
+        if asleep[k]:
+            continue
+        for m in range(k, k + 3):
+            speed = 0.0
+            for e in range(tables.arm_start[m], tables.arm_start[m + 1]):
+                speed += work.arm[e] * v[tables.arm_at[e]]
+            rows[LENGTH, m], rows[SPEED, m] = work.paths.length[m], speed
+            if m > k:
+                rows[STATE, m] = z[tables.state[m]]
+        call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)
+    push(tables, work)
+
+
+@compiled
+def _act(tables: Any, v: Any, z: Any, work: Any) -> None:
     """Evaluate the laws of all rows in their order, each with the forces of those before, after `_see`."""
     rows = work.rows
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        if begin < tables.touching:
+            _touch(tables, g, v, z, work)
+            continue
         if tables.groups[g, FED]:
             for k in range(begin, end):
                 rows[COMMAND, k] += _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
@@ -113,8 +135,6 @@ def _act(tables: Any, work: Any) -> None:
                     work.pull[k, 0] = load
                     rows[LOAD, k] = abs(load)
         call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
-        if tables.touch[begin] > 0:
-            push(tables, work)
 
 
 @compiled
@@ -123,7 +143,11 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
     rows, torque = work.rows, work.torque
     for j in range(torque.size):
         torque[j] = 0.0
-    for e in range(tables.arm_at.size):
+    for index in range(work.paths.closed_count[0]):
+        k = tables.paths.row[work.paths.closed[index]]
+        for e in range(tables.arm_start[k], tables.arm_start[k + 3]):
+            torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
+    for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
     for i in range(tables.state_row.size):
         rate[i] = rows[RATE, tables.state_row[i]]
@@ -139,8 +163,9 @@ def exert(model: Any, address: int, time: float) -> None:
         _tips(tables, work)
     if model.measure != 0:
         call_at(model.measure, address, time)
-    _see(tables, x[:width], x[width : 2 * width], x[2 * width :], work)
-    _act(tables, work)
+    v, z = x[width : 2 * width], x[2 * width :]
+    _see(tables, x[:width], v, z, work)
+    _act(tables, v, z, work)
     _drive(tables, work, model.rate[2 * width :])
 
 

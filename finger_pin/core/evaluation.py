@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.charts import Charts, place_all
+from finger_pin.core.charts import Charts
 from finger_pin.core.inputs import held_control
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.model import BoundModel
@@ -37,7 +37,7 @@ class CompiledMechanism:
     def _bound(self, loaded: bool) -> BoundModel:
         """Return a model with memory of its own, that minds forces at the tips or not."""
         mechanism, tables = self.mechanism, self._tables
-        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy())
+        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
         work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
         return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work, mechanism.moved)
 
@@ -120,14 +120,10 @@ class CompiledMechanism:
                 externals[part],
                 booked[part],
                 bases[part],
+                attitudes[part],
             )
 
-        if len(tables.charts):
-            # Free bodies are placed state by state.
-            for m in range(count):
-                place_all(tables, attitudes[m])
-                fill(self._models[loaded], slice(m, m + 1))
-        elif count < _FEW:
+        if count < _FEW:
             fill(self._models[loaded], slice(None))
         else:
             half = count // 2

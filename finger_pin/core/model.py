@@ -83,7 +83,7 @@ class BoundModel:
             *(_units_for_paths() if len(tables.paths.columns) else (0, 0, 0, 0)),
             *(_units_for_base() if moved else (0, 0, 0)),
         )
-        self.model = Model(tables, control, work, build_linear(tables), np.zeros(size), np.zeros(size), *units)
+        self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
         self._block = bound(self.model, MODEL)
         self.address = int(self._block.ctypes.data)
 
@@ -151,13 +151,13 @@ def _turn(address: int, _time: float) -> int:
 
 def _touch(address: int, g: float) -> int:
     model = bound_at(address, MODEL)
-    contacts.all_contact_gains(model.tables, g, model.work, model.linear)
+    contacts.block_contact_gains(model.tables, g, model.work, model.linear)
     return 1
 
 
 def _press(address: int, row: float) -> int:
     model = bound_at(address, MODEL)
-    contacts.add_pushes(model.tables, model.work, int(row), model.linear.gain, model.linear.load)
+    contacts.add_pushes(model.tables, model.work, int(row), model.linear)
     return 1
 
 

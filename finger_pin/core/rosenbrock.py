@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of
+from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
@@ -88,6 +89,8 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                 r[c] += of_coupling * k[j, c]
         if i == 0 and fresh:
             release(tables, rows)
+        elif tables.touching and i == tableau.nodes.size - 1:
+            wake(tables, model.work.paths, x, state)
         if i > 0 or fresh:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
@@ -295,6 +298,8 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 model.rate,
             )
             memory[DRIFT] += h * mean
+            if tables.touching:
+                settle(tables, rows, model.work.paths, x, reached)
             for c in range(size):
                 x[c] = reached[c]
             memory[TIME] = end if last else time + h

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.core.binding import bound_at, call_at
+from finger_pin.core.charts import place_bodies
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.model import MODEL
@@ -38,6 +39,7 @@ def evaluate_many(
     externals: Any,
     booked: Any,
     bases: Any,
+    attitudes: Any,
 ) -> None:
     """Evaluate states of one island under given inputs; its control must hold them.
 
@@ -52,6 +54,7 @@ def evaluate_many(
         externals: Filled with J^T F, shape (m, N).
         booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
         bases: Velocity, acceleration and gravity of the base, shape (m, 15), or (0, 15) at rest.
+        attitudes: Quaternions of free bodies, shape (m, f, 4).
     """
     model = bound_at(address, MODEL)
     tables, control, work = model.tables, model.control, model.work
@@ -64,6 +67,7 @@ def evaluate_many(
         for c in range(states.shape[1]):
             model.state[c] = states[m, c]
         _set_base(bases, m, tables, work)
+        place_bodies(tables, attitudes[m])
         if rates.shape[0] > 0 or bases.shape[0] > 0:
             call_at(model.evaluate, address, 0.0)
         else:

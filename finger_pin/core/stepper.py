@@ -135,6 +135,7 @@ class Part:
     def restart(self, x: Array, attitude: Array) -> None:
         """Go on from another state at the same time, with no memory of earlier steps."""
         self.x[:], self.attitude[:] = x, attitude
+        self.work.paths.asleep[:] = 0
         place_all(self.tables, self.attitude)
         self.memory[[core.LAST_STEP, core.LAST_ERROR, core.CULPRIT, core.HELD_STEP]] = 0.0
         self.memory[core.STEP] = _FIRST_STEP

@@ -69,7 +69,7 @@ class Tables(NamedTuple):
         state: Index of each row's state in z, -1 without one, shape (K,).
         state_row: The row of each state, shape (states,).
         touch: 1 for the first of the three rows of a contact, 2 for the others, 0 for all else, shape (K,).
-        touching: Whether any row is a contact's.
+        touching: Number of rows of contacts, which stand before all others.
         channel: Index of its input from outside, -1 without one, shape (K,).
         fed_row: Rows that have an input, from outside or from earlier rows, ascending.
         input_start: Where the terms of its input from earlier rows begin in ``terms``, shape (K + 1,).
@@ -112,7 +112,7 @@ class Tables(NamedTuple):
     state: Indices
     state_row: Indices
     touch: Indices
-    touching: bool
+    touching: int
     channel: Indices
     fed_row: Indices
     input_start: Indices
@@ -277,7 +277,9 @@ def _read(mechanism: Mechanism) -> Tables:
 
     arm, measure, bends = stacked("arm"), stacked("measure"), stacked("bends")
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
-    paths = read_paths([path for table in rows for path in table.paths], parents, last, turns)
+    distances = np.linalg.norm(bodies[:, TRANSLATION : TRANSLATION + 3], axis=1)
+    legs = [path for table in rows for path in table.paths]
+    paths = read_paths(legs, parents, last, turns, kinds == PRISMATIC, distances)
     routed = reached(paths, count, mechanism.coordinates)
     arm_start, arm_row, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
     bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
@@ -324,7 +326,7 @@ def _read(mechanism: Mechanism) -> Tables:
         state=state,
         state_row=np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
         touch=touch,
-        touching=bool(touch.any()),
+        touching=int(np.count_nonzero(touch)),
         channel=channel,
         fed_row=np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
         input_start=np.array(starts[0], dtype=np.int64),
