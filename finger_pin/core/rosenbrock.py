@@ -88,7 +88,8 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                 r[c] += of_coupling * k[j, c]
         if i == 0 and fresh:
             release(tables, rows)
-        if i > 0 or fresh:
+        # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
+        if i > 0 or fresh or tables.loaded or tables.touching:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
@@ -243,7 +244,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if fresh:
             memory[JACOBIANS] += 1
         memory[FACTORISATIONS] += 1
-        memory[EVALUATIONS] += count if fresh else count - 1
+        memory[EVALUATIONS] += count if fresh or tables.loaded or tables.touching else count - 1
         if outcome == 0:
             error = _error(x, reached, k[count - 1], rtol, atol)
         fresh = False
