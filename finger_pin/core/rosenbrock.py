@@ -91,7 +91,8 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
             release(tables, rows)
         elif tables.touching and i == tableau.nodes.size - 1:
             wake(tables, model.work.paths, x, state)
-        if i > 0 or fresh:
+        # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
+        if i > 0 or fresh or tables.loaded or tables.touching > 0:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
@@ -240,7 +241,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if fresh:
             memory[JACOBIANS] += 1
         memory[FACTORISATIONS] += 1
-        memory[EVALUATIONS] += count if fresh else count - 1
+        memory[EVALUATIONS] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
         if outcome == 0:
             error = _error(x, reached, k[count - 1], rtol, atol)
         fresh = False

@@ -191,8 +191,9 @@ class Stepper:
         rtol: float,
         atol: Array,
         force: Array | None = None,
+        time: float = 0.0,
     ) -> None:
-        """Start at time zero.
+        """Start from a state.
 
         Args:
             mechanism: The mechanism.
@@ -202,6 +203,7 @@ class Stepper:
             rtol: Relative tolerance.
             atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
+            time: When, s.
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
         tables = build_tables(mechanism)
@@ -219,7 +221,7 @@ class Stepper:
             # An island that nothing pushes computes as it does alone.
             own = own._replace(loaded=bool(len(inputs.force.harmonics) or np.any(own.tip_force)))
             memory = np.zeros(core.MEMORY_SIZE)
-            memory[core.STEP] = _FIRST_STEP
+            memory[[core.TIME, core.STEP]] = time, _FIRST_STEP
             at = self._places(island)
             free = np.isin(tables.charts, island.coordinates)
             self.parts.append(

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.compiled import compiled_control
 from finger_pin.control.sampling import SampledController
-from finger_pin.core.textbook import Stop, Trajectory, integrate
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.textbook import Trajectory, integrate
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
@@ -24,9 +28,10 @@ _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]])
 _CHUNK = 4096
 # What may stay open, of all energy exchanged and in J, before the stretches of the motion where most of it stands open
-# are integrated again, and how finely; at most so many stretches, in so many steps altogether.
-_CLOSED, _NOTHING, _FINE = 1e-5, 1e-8, 1e-9
-_MOST_REFINED, _MOST_STEPS = 20, 5_000
+# are integrated again, and how finely by Radau, and by the core, whose steps are longer; at most so many stretches, in
+# so many steps altogether.
+_CLOSED, _NOTHING, _FINE, _FINE_IN_CORE = 1e-5, 1e-8, 1e-9, 1e-11
+_MOST_REFINED, _MOST_STEPS, _LOOK = 20, 5_000, 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +71,11 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     gained = total - total[0]
-    steps = itertools.count()
+    steps = 0
     # A controller that acts in between is not asked again: there the account stays as it is.
     sampled = loop.drives is not None or isinstance(loop.controller, SampledController)
     for begin, end in [] if sampled else _open(gained - works.net, works.values, times, trajectory.breakpoints):
-        _refine(loop, trajectory, begin, end, times, works.values, lambda: next(steps) > _MOST_STEPS)
+        steps += _refine(loop, trajectory, begin, end, times, works.values, _MOST_STEPS - steps)
     return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
 
 
@@ -93,32 +98,60 @@ def _open(residual: Array, works: Array, times: Array, breakpoints: Array) -> li
 
 
 def _refine(
-    loop: ClosedLoop, trajectory: Trajectory, begin: float, end: float, times: Array, works: Array, stop: Stop
-) -> None:
+    loop: ClosedLoop, trajectory: Trajectory, begin: float, end: float, times: Array, works: Array, most: int
+) -> int:
     """Integrate a stretch again, finely, and put its works in place of those of the steps that passed it.
 
     A step may end well and yet pass in between too far from the motion for its powers, as where a joint that starts
-    deep in a stiff limiter is thrown back.
+    deep in a stiff limiter is thrown back. Returns the number of steps, of which there are about ``most`` at most.
     """
-    start = trajectory.interpolate(np.array([begin]))[0]
+    fine = _finely(loop, trajectory.interpolate(np.array([begin]))[0], begin, end, most)
+    if not fine.failure and not fine.interrupted:
+        inside = (times > begin) & (times < end)
+        at, count = np.append(times[inside], end), works.shape[1]
+        steps = trajectory.breakpoints[(trajectory.breakpoints >= begin) & (trajectory.breakpoints <= end)]
+        more = _works(loop, fine.breakpoints, fine.interpolate, at, count)
+        more -= _works(loop, steps, trajectory.interpolate, at, count)
+        works[inside] += more[:-1]
+        works[times >= end] += more[-1]
+    return fine.statistics.steps
+
+
+def _finely(loop: ClosedLoop, start: Array, begin: float, end: float, most: int) -> Trajectory:
+    """Integrate from a state at a time to another time, with the compiled core where the loop is all compiled."""
+    control = compiled_control(loop) if isinstance(loop.dynamics, CompiledFinger) else None
+    scales = loop.finger.layout.scales()
+    if control is not None:
+        looks = itertools.count(_LOOK, _LOOK)
+        stepper = Stepper(
+            loop.finger.mechanism,
+            control,
+            start,
+            TABLEAUS["Rodas5P"](),
+            _FINE_IN_CORE,
+            _FINE_IN_CORE * scales,
+            loop.fingertip_force,
+            begin,
+        )
+        names = loop.finger.layout.names
+        return integrate_compiled(
+            stepper, end, names, knots=loop.knots(), chunk=_LOOK, stop=lambda: next(looks) >= most
+        )
+    looks = itertools.count(1)
     fine = integrate(
         lambda instant, x: loop.rhs(begin + instant, x),
         start,
         end - begin,
         method="Radau",
         rtol=_FINE,
-        atol=_FINE * loop.finger.layout.scales(),
-        stop=stop,
+        atol=_FINE * scales,
+        stop=lambda: next(looks) >= most,
     )
-    if fine.failure or fine.interrupted:
-        return
-    inside = (times > begin) & (times < end)
-    at, count = np.append(times[inside], end), works.shape[1]
-    steps = trajectory.breakpoints[(trajectory.breakpoints >= begin) & (trajectory.breakpoints <= end)]
-    more = _works(loop, np.unique(begin + fine.breakpoints), lambda nodes: fine.interpolate(nodes - begin), at, count)
-    more -= _works(loop, steps, trajectory.interpolate, at, count)
-    works[inside] += more[:-1]
-    works[times >= end] += more[-1]
+    return replace(
+        fine,
+        breakpoints=np.unique(begin + fine.breakpoints),
+        interpolate=lambda at: fine.interpolate(at - begin),
+    )
 
 
 def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[tuple[ClosedLoop, Array, Callable[[Array], Array]]]:
