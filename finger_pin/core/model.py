@@ -35,7 +35,7 @@ class Model(NamedTuple):
         exert: Address of what it calls for the rows.
         linearise: Address of the function that fills all partial derivatives after it, at a time.
         condense: Address of the function that fills the solution of (g - J) u = r for a g; 0 where it is singular.
-        measure: Address of what `exert` calls for paths through space; 0 without any, as for the next three.
+        measure: Address of what `exert` calls for paths through space and contacts; 0 without, as for the next three.
         turn: Address of what `linearise` calls for them.
         touch: Address of what `condense` calls for contacts.
         press: Address of what it calls for the pin of a row that their forces may pass.
@@ -138,7 +138,10 @@ def _condense(address: int, g: float) -> int:
 
 def _measure(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
-    paths.measure_paths(model.tables, model.work)
+    tables, work, width = model.tables, model.work, model.work.torque.size
+    paths.measure_paths(tables, work)
+    if tables.touching:
+        contacts.exert_contacts(tables, model.state[width : 2 * width], model.state[2 * width :], work)
     return 1
 
 
