@@ -138,15 +138,15 @@ def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     finger = fp.Finger(scenario.finger)
     feedforward = fp.control.build_controller(scenario, finger).tendons
     planned = np.array([1.0, 2.5, 3.0, 4.0, 5.0])
-    for position, velocity in zip(*postures(4, 3), strict=True):
-        command = feedforward.command(planned, position, velocity)
-        x = finger.rest_state(position)
-        state = finger.layout.unpack(x)
-        state.velocity[:] = velocity
-        for _ in range(10000):
-            forces = finger.evaluate(x, command[:4]).tendons
-            state.tendon_stiction[:] += 1e-5 * forces.stiction_rate
-        np.testing.assert_allclose(forces.strands[:4], planned[:4], rtol=1e-7)
+    positions, velocities = postures(4, 3)
+    command = np.stack([feedforward.command(planned, *each) for each in zip(positions, velocities, strict=True)])
+    x = np.stack([finger.rest_state(position) for position in positions])
+    state = finger.layout.unpack(x)
+    state.velocity[:] = velocities
+    for _ in range(2000):
+        forces = finger.evaluate(x, command[:, :4]).tendons
+        state.tendon_stiction[:] += 5e-5 * forces.stiction_rate
+    np.testing.assert_allclose(forces.strands[:, :4], np.tile(planned[:4], (4, 1)), rtol=1e-7)
 
 
 def settled_state(finger, position, velocity, command, halves):
@@ -156,12 +156,12 @@ def settled_state(finger, position, velocity, command, halves):
     assert 1e5 * (passive - 5e-3 * position[3]) == pytest.approx(halves[1], rel=1e-9)
     speed = 0.5 * (3.5e-3 * velocity[2] + 5e-3 * velocity[3])
     state = replace(state, velocity=velocity, passive_position=np.array([passive]), passive_velocity=np.array([speed]))
-    for _ in range(10000):
+    for _ in range(2000):
         rate = finger.layout.unpack(finger.evaluate(finger.layout.pack(state), command).rate)
         state = replace(
             state,
-            tendon_stiction=state.tendon_stiction + 1e-5 * rate.tendon_stiction,
-            joint_stiction=state.joint_stiction + 2e-5 * rate.joint_stiction,
+            tendon_stiction=state.tendon_stiction + 5e-5 * rate.tendon_stiction,
+            joint_stiction=state.joint_stiction + 1e-4 * rate.joint_stiction,
         )
     return state
 
