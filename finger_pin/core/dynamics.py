@@ -172,7 +172,7 @@ def evaluate(model: Any, address: int, time: float) -> None:
     _exert(tables, v, z, work)
     _drive(tables, work, rate[2 * width :])
     mass_matrix(tables, work)
-    factorise_mass(size, work)
+    factorise_mass(tables, size, work)
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)
     for j in range(size):
         work.acceleration[j] = work.torque[j] + work.external[j] - work.bias[j]
