@@ -44,6 +44,17 @@ def wake(tables: Any, own: Any, before: Any, after: Any) -> None:
 
 
 @compiled
+def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
+    """Return whether the bristles of an open contact are straight; what is left of their bend then is nothing."""
+    for m in range(k + 1, k + 3):
+        if not abs(states[tables.state[m]]) < _STRAIGHT:
+            return False
+    for m in range(k + 1, k + 3):
+        states[tables.state[m]] = rows[RATE, m] = 0.0
+    return True
+
+
+@compiled
 def settle(tables: Any, rows: Any, own: Any, before: Any, after: Any) -> None:
     """Let contacts fall asleep or wake up after a step from one state to another, at whose end they were evaluated."""
     paths, width = tables.paths, tables.parents.size + tables.lumps.size
@@ -56,13 +67,7 @@ def settle(tables: Any, rows: Any, own: Any, before: Any, after: Any) -> None:
             own.clear[e] -= moved
             if not own.clear[e] > _AHEAD * moved:
                 _set_asleep(k, 0, own.asleep)
-        elif own.active[e] == 0 and own.out[e, 0] > _KNOWN + _AHEAD * moved:
-            bent = 0.0
-            for m in range(1, 3):
-                at = 2 * width + tables.state[k + m]
-                bent = max(bent, abs(after[at]))
-            if bent < _STRAIGHT:
-                for m in range(1, 3):
-                    after[2 * width + tables.state[k + m]] = rows[RATE, k + m] = 0.0
+        elif own.active[e] == 0 and _straighten(tables, rows, k, after[2 * width :]):
+            if own.out[e, 0] > _KNOWN + _AHEAD * moved:
                 own.clear[e] = own.out[e, 0] - _KNOWN
                 _set_asleep(k, 1, own.asleep)

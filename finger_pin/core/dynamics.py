@@ -157,7 +157,7 @@ def evaluate(model: Any, address: int, time: float) -> None:
     move(tables, q, v, work)
     call_at(model.exert, address, time)
     mass_matrix(tables, work)
-    factorise_mass(size, work)
+    factorise_mass(tables, size, work)
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)
     for j in range(size):
         work.acceleration[j] = work.torque[j] + work.external[j] - work.bias[j]

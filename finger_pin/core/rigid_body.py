@@ -185,13 +185,17 @@ def mass_matrix(tables: Any, work: Any) -> None:
 
 
 @compiled
-def factorise_mass(size: int, work: Any) -> None:
+def factorise_mass(tables: Any, size: int, work: Any) -> None:
     """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted."""
     factor = work.square[CHOLESKY]
     for i in range(size):
-        for j in range(i + 1):
+        # Trees on the base do not feel each other's inertia.
+        first = i
+        while tables.parents[first] >= 0:
+            first = tables.parents[first]
+        for j in range(first, i + 1):
             value = work.square[MASS_MATRIX, i, j]
-            for k in range(j):
+            for k in range(first, j):
                 value -= factor[i, k] * factor[j, k]
             factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
 

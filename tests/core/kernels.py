@@ -14,7 +14,7 @@ def rigid(tables, q, v, a, torque, work, bias, needed, acceleration):
     """Fill C v + G, the torque that a needs and its derivatives, and the acceleration that a torque gives."""
     move(tables, q, v, work)
     mass_matrix(tables, work)
-    factorise_mass(q.size, work)
+    factorise_mass(tables, q.size, work)
     inverse_dynamics(tables, v, a, work, bias, False)
     for j in range(q.size):
         acceleration[j] = torque[j] - bias[j]
