@@ -22,10 +22,12 @@ CHUNK = 256
 
 # A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
 _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
-# The estimate that is carried along is mostly too large: only from so many times the expected error on is it checked.
-_DOUBTED = 30.0
+# The estimate that is carried along is seldom below a third of the error and often far above it: it is checked from so
+# many times the expected error on.
+_DOUBTED = 3.0
 _TIGHTER = 10.0
-# Where joint friction is above two thirds of what locks the finger, small forces make large tensions.
+# Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
+# is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
 _PATIENCE = 5
