@@ -28,10 +28,11 @@ _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]])
 _CHUNK = 4096
 # What may stay open, of all energy exchanged and in J, before the stretches of the motion where most of it stands open
-# are integrated again, and how finely by Radau, and by the core, whose steps are longer; at most so many stretches, in
-# so many steps altogether.
-_CLOSED, _NOTHING, _FINE, _FINE_IN_CORE = 1e-5, 1e-8, 1e-9, 1e-11
+# are integrated again, and how finely; at most so many stretches, in so many steps altogether.
+_CLOSED, _NOTHING, _FINE = 1e-5, 1e-8, 1e-9
 _MOST_REFINED, _MOST_STEPS, _LOOK = 20, 5_000, 64
+# The core's steps are so long that powers are summed over parts of them.
+_PARTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,23 +121,17 @@ def _refine(
 def _finely(loop: ClosedLoop, start: Array, begin: float, end: float, most: int) -> Trajectory:
     """Integrate from a state at a time to another time, with the compiled core where the loop is all compiled."""
     control = compiled_control(loop) if isinstance(loop.dynamics, CompiledFinger) else None
-    scales = loop.finger.layout.scales()
+    names, atol = loop.finger.layout.names, _FINE * loop.finger.layout.scales()
     if control is not None:
         looks = itertools.count(_LOOK, _LOOK)
-        stepper = Stepper(
-            loop.finger.mechanism,
-            control,
-            start,
-            TABLEAUS["Rodas5P"](),
-            _FINE_IN_CORE,
-            _FINE_IN_CORE * scales,
-            loop.fingertip_force,
-            begin,
-        )
-        names = loop.finger.layout.names
-        return integrate_compiled(
+        method = TABLEAUS["Rodas5P"]()
+        stepper = Stepper(loop.finger.mechanism, control, start, method, _FINE, atol, loop.fingertip_force, begin)
+        fine = integrate_compiled(
             stepper, end, names, knots=loop.knots(), chunk=_LOOK, stop=lambda: next(looks) >= most
         )
+        ends = fine.breakpoints
+        parts = np.linspace(0.0, len(ends) - 1.0, _PARTS * (len(ends) - 1) + 1)
+        return replace(fine, breakpoints=np.interp(parts, np.arange(len(ends)), ends))
     looks = itertools.count(1)
     fine = integrate(
         lambda instant, x: loop.rhs(begin + instant, x),
@@ -144,7 +139,7 @@ def _finely(loop: ClosedLoop, start: Array, begin: float, end: float, most: int)
         end - begin,
         method="Radau",
         rtol=_FINE,
-        atol=_FINE * scales,
+        atol=atol,
         stop=lambda: next(looks) >= most,
     )
     return replace(
