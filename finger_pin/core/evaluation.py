@@ -31,15 +31,20 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self._charts = Charts.of(mechanism)
         self._tables = build_tables(mechanism)
-        # Each has work of its own: without loads, nothing writes where loads have left their torques.
-        self._models = [self._bound(loaded) for loaded in (False, True)]
+        self._models: dict[tuple[bool, int], BoundModel] = {}
 
-    def _bound(self, loaded: bool) -> BoundModel:
-        """Return a model with memory of its own, that minds forces at the tips or not."""
-        mechanism, tables = self.mechanism, self._tables
-        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
-        work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
-        return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work, mechanism.moved)
+    def _model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
+        """Return a thread's model that minds forces at the tips or not.
+
+        Each has memory of its own: without loads, nothing writes where loads have left their torques.
+        """
+        if (loaded, thread) not in self._models:
+            mechanism, tables = self.mechanism, self._tables
+            own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
+            work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
+            control = held_control(mechanism.channels, mechanism.coordinates)
+            self._models[loaded, thread] = BoundModel(own, control, work, mechanism.moved)
+        return self._models[loaded, thread]
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
@@ -90,7 +95,7 @@ class CompiledMechanism:
         self, x: Array, command: Array, force: Array | None, base: Array | None, *, booked_only: bool = False
     ) -> tuple[Array, tuple[Array, ...]]:
         """Return packed states, and what `evaluate_many` fills for them: all, or energies, powers and J^T F only."""
-        mechanism, tables = self.mechanism, self._models[0].model.tables
+        mechanism, tables = self.mechanism, self._tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
         packed = _rows(x, np.atleast_2d(x).shape)
@@ -105,7 +110,7 @@ class CompiledMechanism:
         states, attitudes = self._charts.to_core(packed)
         books = len(mechanism.books.stored) + len(mechanism.books.powers)
         kept = 0 if booked_only else count
-        rates, rows = np.zeros((kept, states.shape[1])), np.zeros((kept, *self._models[0].model.work.rows.shape))
+        rates, rows = np.zeros((kept, states.shape[1])), np.zeros((kept, *self._model().model.work.rows.shape))
         torques, externals, booked = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, books))
 
         def fill(model: BoundModel, part: slice) -> None:
@@ -124,10 +129,10 @@ class CompiledMechanism:
             )
 
         if count < _FEW:
-            fill(self._models[loaded], slice(None))
+            fill(self._model(loaded), slice(None))
         else:
             half = count // 2
-            models = (self._models[loaded], self._bound(loaded))
+            models = (self._model(loaded), self._model(loaded, 1))
             in_threads(lambda each: fill(*each), list(zip(models, (slice(half), slice(half, None)), strict=True)))
         return packed, (rates, np.moveaxis(rows, 1, 0), torques, externals, booked)
 
@@ -136,11 +141,11 @@ class CompiledMechanism:
 
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
-        tables = self._models[0].model.tables
+        tables = self._tables
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
         given = _rows(position, shape), _rows(velocity, shape)
-        motion_many(self._models[0].address, *given, tips, kinetic, potential, _bases(base, shape[0]))
+        motion_many(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0]))
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
 
