@@ -20,38 +20,38 @@ from finger_pin.core.compilation import compiled, compiled_loosely
 
 
 @compiled
-def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, out: Any) -> None:
+def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int, out: Any) -> None:
     """Fill the change of a weighted sum of earlier forces, times a slope."""
-    for c in range(out.size):
+    for c in range(wide):
         out[c] = 0.0
     for e in range(begin, end):
         weight, source = slope * tables.weights[e], gain[tables.terms[e]]
-        for c in range(out.size):
+        for c in range(wide):
             out[c] += weight * source[c]
 
 
 @compiled
-def _gains(model: Any, address: int, g: float) -> None:
-    """Fill the gains of all rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
+def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
+    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
     tables, control, work, linear = model.tables, model.control, model.work, model.linear
-    count, width = tables.state.size, linear.mass.shape[0]
     load, command, force, slopes = linear.load, linear.command, linear.force, work.slopes
-    wide = load.size
+    blocks = linear.blocks
+    place, own_places = blocks.place, blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
     last = wide - 1
     for j in range(width):
         for c in range(wide):
             force[j, c] = 0.0
-        force[j, last] -= linear.bias_rate[j]
+        force[j, last] -= linear.bias_rate[own_places[j]]
     if tables.loaded:
         for t in range(tables.tip_body.size):
             for j in range(width):
                 for r in range(3):
-                    force[j, last] += work.jacobian[t, r, j] * work.force_rate[t, r]
+                    force[j, last] += work.jacobian[t, r, own_places[j]] * work.force_rate[t, r]
     if tables.touching:
+        blocks.current[0] = b
         call_at(model.touch, address, g)
-    for k in range(count):
-        if tables.touch[k] > 0:
-            continue
+    for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
+        k = blocks.rows[index]
         row, state = linear.gain[k], tables.state[k]
         of_length, of_speed, of_curvature = slopes[at.F_LENGTH, k], slopes[at.F_SPEED, k], slopes[at.F_CURVATURE, k]
         of_load, of_command = slopes[at.F_LOAD, k], slopes[at.F_COMMAND, k]
@@ -70,10 +70,12 @@ def _gains(model: Any, address: int, g: float) -> None:
                 own[c] = 0.0
         pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.touching and tables.pins[k] >= 0)
         if pressed and (of_load != 0.0 or by_load != 0.0):
-            _terms(tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, load)
+            _terms(
+                tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load
+            )
             if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
                 for c in range(width):
-                    load[c] += linear.load_by_position[k, c]
+                    load[c] += linear.load_by_position[k, own_places[c]]
                 load[last] += linear.load_by_time[k]
                 if tables.touching:
                     call_at(model.press, address, float(k))
@@ -84,12 +86,12 @@ def _gains(model: Any, address: int, g: float) -> None:
                     own[c] = by_load * load[c]
         fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
         if fed and (of_command != 0.0 or by_command != 0.0):
-            _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, command)
+            _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, wide, command)
             channel = tables.channel[k]
             if channel >= 0:
                 for c in range(width):
-                    command[c] += control.by_position[channel, c]
-                    command[width + c] += control.by_velocity[channel, c]
+                    command[c] += control.by_position[channel, own_places[c]]
+                    command[width + c] += control.by_velocity[channel, own_places[c]]
                 command[last] += control.by_time[channel]
             for c in range(wide):
                 row[c] += of_command * command[c]
@@ -101,34 +103,33 @@ def _gains(model: Any, address: int, g: float) -> None:
             by_length, by_speed = factor * slopes[at.R_LENGTH, k], factor * slopes[at.R_SPEED, k]
             by_curvature = factor * slopes[at.R_CURVATURE, k]
             for e in range(begin, end):
-                own[tables.arm_at[e]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
-                own[width + tables.arm_at[e]] += by_speed * linear.arm[e]
+                own[place[tables.arm_at[e]]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
+                own[width + place[tables.arm_at[e]]] += by_speed * linear.arm[e]
             for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-                own[tables.bend_at[e]] += by_curvature * linear.bend[e]
+                own[place[tables.bend_at[e]]] += by_curvature * linear.bend[e]
             for c in range(wide):
                 row[c] += total * own[c]
             # The column of r_z itself, without the difference g dz - r_z.
-            itself = 2 * width + state
+            itself = 2 * width + blocks.state_place[state]
             own[itself] += factor
             row[itself] += factor * (slopes[at.F_STATE, k] + slopes[at.F_RATE, k] * slopes[at.R_STATE, k])
         elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed):
             # An idle row, such as a limiter inside its range.
             continue
         for e in range(begin, end):
-            row[tables.arm_at[e]] += of_length * linear.measure[e] + of_speed * linear.turning[e]
-            row[width + tables.arm_at[e]] += of_speed * linear.arm[e]
+            row[place[tables.arm_at[e]]] += of_length * linear.measure[e] + of_speed * linear.turning[e]
+            row[width + place[tables.arm_at[e]]] += of_speed * linear.arm[e]
         for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-            row[tables.bend_at[e]] += of_curvature * linear.bend[e]
+            row[place[tables.bend_at[e]]] += of_curvature * linear.bend[e]
         for e in range(begin, end):
-            arm, target = linear.arm[e], force[tables.arm_at[e]]
+            arm, target = linear.arm[e], force[place[tables.arm_at[e]]]
             for c in range(wide):
                 target[c] += arm * row[c]
 
 
 @compiled
-def _factorise(matrix: Any, pivots: Any) -> bool:
-    """Factorise a matrix in place with row exchanges; false if it is singular."""
-    size = matrix.shape[0]
+def _factorise(matrix: Any, size: int, pivots: Any) -> bool:
+    """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
     for c in range(size):
         best = c
         for r in range(c + 1, size):
@@ -149,9 +150,8 @@ def _factorise(matrix: Any, pivots: Any) -> bool:
 
 
 @compiled
-def _substitute(matrix: Any, pivots: Any, right: Any) -> None:
+def _substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
     """Replace right-hand sides, one a column, by solutions."""
-    size, wide = right.shape
     for r in range(size):
         best = pivots[r]
         if best != r:
@@ -175,33 +175,49 @@ def _substitute(matrix: Any, pivots: Any, right: Any) -> None:
 @compiled
 def condense(model: Any, address: int, g: float) -> bool:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
-    linear = model.linear
-    width = linear.mass.shape[0]
-    states = linear.state_gain.shape[0]
-    wide = linear.load.size
-    _gains(model, address, g)
+    linear, blocks = model.linear, model.linear.blocks
+    for s in range(blocks.loose.size):
+        linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
+    for b in range(blocks.number[0]):
+        if not _condense_block(model, address, g, b):
+            return False
+    return True
+
+
+@compiled
+def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
+    """Fill the rows of the solution that belong to a block."""
+    linear, blocks = model.linear, model.linear.blocks
+    places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+    states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+    width, whole = places.size, linear.mass.shape[0]
+    wide = 2 * width + states.size + 1
+    _gains(model, address, g, b, width, wide)
     force, velocity, reduced = linear.force, linear.velocity, linear.reduced
     inverse = 1.0 / g
     for i in range(width):
+        at_row = places[i]
+        of_mass, of_position, of_velocity = linear.mass[at_row], linear.by_position[at_row], linear.by_velocity[at_row]
         for j in range(width):
-            by_position = (linear.by_position[i, j] - force[i, j]) * inverse
-            reduced[i, j] = g * linear.mass[i, j] + linear.by_velocity[i, j] - force[i, width + j] + by_position
+            by_position = (of_position[places[j]] - force[i, j]) * inverse
+            reduced[i, j] = g * of_mass[places[j]] + of_velocity[places[j]] - force[i, width + j] + by_position
             velocity[i, j] = -by_position
-            velocity[i, width + j] = linear.mass[i, j]
+            velocity[i, width + j] = of_mass[places[j]]
         for c in range(2 * width, wide):
             velocity[i, c] = force[i, c]
-    if not _factorise(reduced, linear.pivots):
+    if not _factorise(reduced, width, linear.pivots):
         return False
-    _substitute(reduced, linear.pivots, velocity)
+    _substitute(reduced, width, linear.pivots, velocity, wide)
     solution = linear.solution
     for i in range(width):
+        position, moving = solution[places[i]], solution[whole + places[i]]
         for c in range(wide):
-            solution[width + i, c] = velocity[i, c]
-            solution[i, c] = velocity[i, c] * inverse
-        solution[i, i] += inverse
+            moving[c] = velocity[i, c]
+            position[c] = velocity[i, c] * inverse
+        position[i] += inverse
     # Gains multiply dq = (r_q + dv) / g and dv.
-    for s in range(states):
-        own, row = linear.state_gain[s], solution[2 * width + s]
+    for s in states:
+        own, row = linear.state_gain[s], solution[2 * whole + s]
         for c in range(width):
             row[c] = own[c] * inverse
             row[width + c] = 0.0
@@ -218,8 +234,36 @@ def condense(model: Any, address: int, g: float) -> bool:
 @compiled_loosely
 def solve(linear: Any, r: Any, u: Any) -> None:
     """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i."""
-    for i in range(u.size):
-        row, value = linear.solution[i], 0.0
-        for c in range(r.size):
-            value += row[c] * r[c]
-        u[i] = value
+    blocks, right, solution = linear.blocks, linear.right, linear.solution
+    whole = linear.mass.shape[0]
+    if blocks.touches.size == 0:
+        # One block for good, all in its order.
+        for i in range(u.size):
+            row, value = solution[i], 0.0
+            for c in range(r.size):
+                value += row[c] * r[c]
+            u[i] = value
+        return
+    for s in range(linear.loose.size):
+        u[2 * whole + s] = linear.loose[s] * r[2 * whole + s]
+    for b in range(blocks.number[0]):
+        places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+        states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+        width = places.size
+        wide = 2 * width + states.size + 1
+        for c in range(width):
+            right[c], right[width + c] = r[places[c]], r[whole + places[c]]
+        for c in range(states.size):
+            right[2 * width + c] = r[2 * whole + states[c]]
+        right[wide - 1] = r[r.size - 1]
+        for i in range(wide - 1):
+            if i < width:
+                at_row = places[i]
+            elif i < 2 * width:
+                at_row = whole + places[i - width]
+            else:
+                at_row = 2 * whole + states[i - 2 * width]
+            row, value = solution[at_row], 0.0
+            for c in range(wide):
+                value += row[c] * right[c]
+            u[at_row] = value

@@ -1,4 +1,4 @@
-"""Contacts in the linear systems of `condensation`: three rows and two states at once, and what they do to pins."""
+"""Contacts, of three rows and two states each: what they exert, and their part in the systems of `condensation`."""
 
 from __future__ import annotations
 
@@ -6,26 +6,51 @@ from typing import Any
 
 from finger_pin.core import law_code as at
 from finger_pin.core.compilation import compiled
-from finger_pin.core.paths import passes
+from finger_pin.core.law_code import call_value
+from finger_pin.core.paths import passes, push
+from finger_pin.core.tables import END, FIRST
 
 
 @compiled
-def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, out: Any) -> None:
+def exert_contacts(tables: Any, v: Any, z: Any, work: Any) -> None:
+    """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
+    rows, asleep = work.rows, work.paths.asleep
+    for g in range(tables.groups.shape[0]):
+        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        for k in range(begin, end if begin < tables.touching else begin, 3):
+            if asleep[k]:
+                continue
+            for m in range(k, k + 3):
+                speed = 0.0
+                for e in range(tables.arm_start[m], tables.arm_start[m + 1]):
+                    speed += work.arm[e] * v[tables.arm_at[e]]
+                rows[at.LENGTH, m], rows[at.SPEED, m] = work.paths.length[m], speed
+                if m > k:
+                    rows[at.STATE, m] = z[tables.state[m]]
+            call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)
+    push(tables, work)
+    for index in range(work.paths.closed_count[0]):
+        k = tables.paths.row[work.paths.closed[index]]
+        for e in range(tables.arm_start[k], tables.arm_start[k + 3]):
+            work.torque[tables.arm_at[e]] += work.arm[e] * rows[at.FORCE, tables.arm_row[e]]
+
+
+@compiled
+def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out: Any) -> None:
     """Add the change of a contact's gap, speed and slips, with a weight each."""
-    width = linear.mass.shape[0]
+    place = linear.blocks.place
     for m in range(3):
         by_length, by_speed = (weights[0] if m == 0 else 0.0), weights[m + 1]
         for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
-            j = tables.arm_at[e]
+            j = place[tables.arm_at[e]]
             out[j] += by_length * linear.measure[e] + by_speed * linear.turning[e]
             out[width + j] += by_speed * linear.arm[e]
 
 
 @compiled
-def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any) -> None:
-    """Fill the gains of the three rows of a contact and of its two states."""
-    width, slopes = linear.mass.shape[0], work.slopes
-    wide = linear.load.size
+def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width: int, wide: int) -> None:
+    """Fill the gains of the three rows of a contact and of its two states, in the columns of its block."""
+    slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
     first, second = tables.state[k + 1], tables.state[k + 2]
     # (g - A) dz = r_z + B (what the contact sees): A is two by two.
     a, b = g - slopes[at.R_LENGTH + 4, k + 1], -slopes[at.R_LENGTH + 5, k + 1]
@@ -42,43 +67,50 @@ def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any) -> Non
             by_first * slopes[at.R_LENGTH + 2, k + 1] + by_second * slopes[at.R_LENGTH + 2, k + 2],
             by_first * slopes[at.R_LENGTH + 3, k + 1] + by_second * slopes[at.R_LENGTH + 3, k + 2],
         )
-        _add_inputs(tables, k, weights, linear, own)
-        own[2 * width + first] += by_first
-        own[2 * width + second] += by_second
+        _add_inputs(tables, k, weights, linear, width, own)
+        own[2 * width + state_place[first]] += by_first
+        own[2 * width + state_place[second]] += by_second
     for m in range(3):
         row = linear.gain[k + m]
         of_first, of_second = slopes[4, k + m], slopes[5, k + m]
         for column in range(wide):
             row[column] = of_first * linear.state_gain[first, column] + of_second * linear.state_gain[second, column]
         weights = slopes[0, k + m], slopes[1, k + m], slopes[2, k + m], slopes[3, k + m]
-        _add_inputs(tables, k, weights, linear, row)
+        _add_inputs(tables, k, weights, linear, width, row)
         for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
-            arm, target = linear.arm[e], linear.force[tables.arm_at[e]]
+            arm, target = linear.arm[e], linear.force[place[tables.arm_at[e]]]
             if arm != 0.0:
                 for column in range(wide):
                     target[column] += arm * row[column]
 
 
 @compiled
-def all_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
-    """Fill the gains of all contacts, which depend on no other rows, and add them to A^T d phi."""
-    for k in range(tables.touch.size):
-        if tables.touch[k] == 1:
-            _contact_gains(tables, g, k, work, linear)
+def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
+    """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
+    blocks = linear.blocks
+    b = blocks.current[0]
+    width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
+    wide = 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
+    for index in range(blocks.touch_start[b], blocks.touch_start[b + 1]):
+        _contact_gains(tables, g, blocks.touches[index], work, linear, width, wide)
 
 
 @compiled
-def add_pushes(tables: Any, work: Any, k: int, gain: Any, load: Any) -> None:
-    """Add to the change of a pin's load that of the forces of contacts; ``gain`` is theirs."""
-    paths, own = tables.paths, work.paths
-    for e in range(paths.columns.size):
+def add_pushes(tables: Any, work: Any, k: int, linear: Any) -> None:
+    """Add to the change of a pin's load that of the forces of the closed contacts of its block."""
+    paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
+    b = blocks.current[0]
+    width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
+    wide = 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
         passing = passes(paths, e, tables.pins[k])
-        if passing == 0.0 or own.active[e] == 0:
+        if passing == 0.0 or work.rows[at.SIDE, paths.row[e]] < 0.0:
             continue
         size = max(work.rows[at.LOAD, k], 1e-100)
         for m in range(3):
             share = 0.0
             for r in range(3):
                 share += passing * work.pull[k, r] * own.wrench[e, m, 3 + r] / size
-            for c in range(load.size):
-                load[c] += share * gain[paths.row[e] + m, c]
+            for c in range(wide):
+                load[c] += share * linear.gain[paths.row[e] + m, c]

@@ -10,9 +10,9 @@ from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled
 from finger_pin.core.inputs import inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
-from finger_pin.core.paths import passes, push
+from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
-from finger_pin.core.tables import BENT, END, FED, FIRST, PRESSED, STATEFUL
+from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
 
 @compiled
@@ -56,7 +56,8 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
         pull = -load * value
         for t in range(tables.tip_body.size):
             pull += tables.carried[t, body] * tables.tip_force[t, r]
-        for e in range(tables.paths.columns.size):
+        for index in range(work.paths.closed_count[0]):
+            e = work.paths.closed[index]
             pull += passes(tables.paths, e, body) * work.paths.push[e, r]
         work.pull[k, r] = pull
         total += pull * pull
@@ -72,38 +73,40 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
 
 
 @compiled
-def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
-    """Evaluate all rows in their order: their torques, and the rates of their states.
+def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
+    """Fill what the rows but those of contacts see of positions, velocities, states and inputs from outside.
 
-    What a group does not have stays as `build_work` has set it.
+    One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
     """
+    rows, first = work.rows, tables.touching
+    for k in range(first, rows.shape[1]):
+        rows[LENGTH, k] = tables.offset[k] + work.paths.length[k]
+        rows[SPEED, k] = 0.0
+        rows[CURVATURE, k] = tables.curvature_offset[k] + work.paths.turn[k]
+    for e in range(tables.arm_start[first], tables.arm_at.size):
+        k, j = tables.arm_row[e], tables.arm_at[e]
+        rows[LENGTH, k] += tables.measure[e] * q[j]
+        rows[SPEED, k] += work.arm[e] * v[j]
+    for e in range(tables.bend_start[first], tables.bend_at.size):
+        rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
+    for i in range(2 * first // 3, tables.state_row.size):
+        rows[STATE, tables.state_row[i]] = z[i]
+    for i in range(tables.fed_row.size):
+        k = tables.fed_row[i]
+        rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
+
+
+@compiled
+def _act(tables: Any, work: Any) -> None:
+    """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
-    for j in range(work.torque.size):
-        work.torque[j] = 0.0
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        for k in range(begin, end):
-            length, speed = tables.offset[k] + work.paths.length[k], 0.0
-            for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-                j = tables.arm_at[e]
-                length += tables.measure[e] * q[j]
-                speed += work.arm[e] * v[j]
-            rows[LENGTH, k], rows[SPEED, k] = length, speed
-        if tables.groups[g, BENT]:
-            for k in range(begin, end):
-                curvature = tables.curvature_offset[k] + work.paths.turn[k]
-                for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-                    curvature += tables.bend[e] * abs(q[tables.bend_at[e]])
-                rows[CURVATURE, k] = curvature
-        if tables.groups[g, STATEFUL]:
-            for k in range(begin, end):
-                if tables.state[k] >= 0:
-                    rows[STATE, k] = z[tables.state[k]]
+        if begin < tables.touching:
+            continue
         if tables.groups[g, FED]:
             for k in range(begin, end):
-                command = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
-                given = _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
-                rows[COMMAND, k] = command + given
+                rows[COMMAND, k] += _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
         if tables.groups[g, PRESSED]:
             for k in range(begin, end):
                 load = _sum_of_terms(tables, tables.load_start[k], tables.load_start[k + 1], work)
@@ -113,16 +116,33 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
                     work.pull[k, 0] = load
                     rows[LOAD, k] = abs(load)
         call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
-        for k in range(begin, end):
-            force = rows[FORCE, k]
-            for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
-                work.torque[tables.arm_at[e]] += work.arm[e] * force
-        if tables.groups[g, STATEFUL]:
-            for k in range(begin, end):
-                if tables.state[k] >= 0:
-                    rate[tables.state[k]] = rows[RATE, k]
-        if tables.touch[begin] > 0:
-            push(tables, work)
+
+
+@compiled
+def _drive(tables: Any, work: Any, rate: Any) -> None:
+    """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
+    rows, torque = work.rows, work.torque
+    for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
+        torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
+    for i in range(tables.state_row.size):
+        rate[i] = rows[RATE, tables.state_row[i]]
+
+
+@compiled
+def exert(model: Any, address: int, time: float) -> None:
+    """Fill what the rows see and do, where bodies are placed by `move` and inputs known, and their states' rates."""
+    tables, control, x, work = model.tables, model.control, model.state, model.work
+    width = work.torque.size
+    if tables.loaded:
+        tip_forces(control, time, tables)
+        _tips(tables, work)
+    for j in range(width):
+        work.torque[j] = 0.0
+    if model.measure != 0:
+        call_at(model.measure, address, time)
+    _see(tables, x[:width], x[width : 2 * width], x[2 * width :], work)
+    _act(tables, work)
+    _drive(tables, work, model.rate[2 * width :])
 
 
 @compiled
@@ -130,19 +150,14 @@ def evaluate(model: Any, address: int, time: float) -> None:
     """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
     tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
     size, width = tables.parents.size, work.torque.size
-    q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
+    q, v = x[:width], x[width : 2 * width]
     inputs(control, time, q, v, work.command)
     if model.carry != 0:
         call_at(model.carry, address, time)
     move(tables, q, v, work)
-    if tables.loaded:
-        tip_forces(control, time, tables)
-        _tips(tables, work)
-    if model.measure != 0:
-        call_at(model.measure, address, time)
-    _exert(tables, q, v, z, work, rate[2 * width :])
+    call_at(model.exert, address, time)
     mass_matrix(tables, work)
-    factorise_mass(size, work)
+    factorise_mass(tables, size, work)
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)
     for j in range(size):
         work.acceleration[j] = work.torque[j] + work.external[j] - work.bias[j]

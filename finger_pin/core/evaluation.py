@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.charts import Charts, place_all
+from finger_pin.core.charts import Charts
 from finger_pin.core.inputs import held_control
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.model import BoundModel
@@ -37,14 +37,14 @@ class CompiledMechanism:
     def _bound(self, loaded: bool) -> BoundModel:
         """Return a model with memory of its own, that minds forces at the tips or not."""
         mechanism, tables = self.mechanism, self._tables
-        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy())
+        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
         work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
         return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work, mechanism.moved)
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
         mechanism, several = self.mechanism, np.ndim(x) > 1
-        packed, filled = self._filled(x, command, force, base, len(self._models[0].model.work.rows))
+        packed, filled = self._filled(x, command, force, base)
         rates, rows, torques, externals, booked = filled
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         acceleration, rate = rates[:, width : 2 * width], rates
@@ -83,13 +83,13 @@ class CompiledMechanism:
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
-        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, 0)
+        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, booked_only=True)
         return booked[:, len(self.mechanism.books.stored) :], externals
 
     def _filled(
-        self, x: Array, command: Array, force: Array | None, base: Array | None, columns: int
+        self, x: Array, command: Array, force: Array | None, base: Array | None, *, booked_only: bool = False
     ) -> tuple[Array, tuple[Array, ...]]:
-        """Return packed states, and what `evaluate_many` fills for them, with so many columns of the rows."""
+        """Return packed states, and what `evaluate_many` fills for them: all, or energies, powers and J^T F only."""
         mechanism, tables = self.mechanism, self._models[0].model.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
@@ -104,7 +104,8 @@ class CompiledMechanism:
         bases = _bases(base, count)
         states, attitudes = self._charts.to_core(packed)
         books = len(mechanism.books.stored) + len(mechanism.books.powers)
-        rates, rows = np.zeros_like(states), np.zeros((count, columns, len(tables.state)))
+        kept = 0 if booked_only else count
+        rates, rows = np.zeros((kept, states.shape[1])), np.zeros((kept, *self._models[0].model.work.rows.shape))
         torques, externals, booked = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, books))
 
         def fill(model: BoundModel, part: slice) -> None:
@@ -119,14 +120,10 @@ class CompiledMechanism:
                 externals[part],
                 booked[part],
                 bases[part],
+                attitudes[part],
             )
 
-        if len(tables.charts):
-            # Free bodies are placed state by state.
-            for m in range(count):
-                place_all(tables, attitudes[m])
-                fill(self._models[loaded], slice(m, m + 1))
-        elif count < _FEW:
+        if count < _FEW:
             fill(self._models[loaded], slice(None))
         else:
             half = count // 2

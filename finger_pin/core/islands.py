@@ -30,8 +30,8 @@ class Island:
     tips: Indices
 
 
-def find_islands(tables: Tables, control: Control) -> list[Island]:
-    """Return the islands of a mechanism under its inputs."""
+def find_islands(tables: Tables, control: Control, touching: bool = True) -> list[Island]:
+    """Return the islands of a mechanism under its inputs: of what may touch, or of what is joined without contacts."""
     count, bodies = len(tables.state), len(tables.parents)
     width = bodies + len(tables.lumps)
     planned = len(control.minimum) if control.kind == PLANNED else 0
@@ -42,7 +42,9 @@ def find_islands(tables: Tables, control: Control) -> list[Island]:
     moved = np.flatnonzero(tables.parents >= 0)
     links.append((moved, tables.parents[moved]))
     for start, at in ((tables.arm_start, tables.arm_at), (tables.bend_start, tables.bend_at)):
-        links.append((row_at + np.repeat(np.arange(count), np.diff(start)), at))
+        owners = np.repeat(np.arange(count), np.diff(start))
+        kept = touching | (tables.touch[owners] == 0)
+        links.append((row_at + owners[kept], at[kept]))
     for start in (tables.input_start, tables.load_start):
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
@@ -121,12 +123,15 @@ def select(tables: Tables, island: Island) -> Tables:
         offset=tables.offset[rows],
         arm_start=arm_start,
         arm_at=coordinate[tables.arm_at[arms]],
+        arm_row=row[tables.arm_row[arms]],
         arm=tables.arm[arms],
         measure=tables.measure[arms],
         state=state,
+        state_row=row[tables.state_row[island.states]],
         touch=tables.touch[rows],
-        touching=bool(tables.touch[rows].any()),
+        touching=int(np.count_nonzero(tables.touch[rows])),
         channel=_mapped(channel, tables.channel[rows]),
+        fed_row=row[np.intersect1d(tables.fed_row, rows)],
         input_start=input_start,
         load_start=len(inputs) + load_start,
         terms=row[tables.terms[terms]],
@@ -135,6 +140,7 @@ def select(tables: Tables, island: Island) -> Tables:
         carried=np.ascontiguousarray(tables.carried[np.ix_(island.tips, bodies)]),
         bend_start=bend_start,
         bend_at=coordinate[tables.bend_at[bends]],
+        bend_row=row[tables.bend_row[bends]],
         bend=tables.bend[bends],
         curvature_offset=tables.curvature_offset[rows],
         paths=select_paths(tables.paths, rows, bodies, lambda old: _mapped(body, old), _entries),

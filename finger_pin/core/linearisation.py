@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.binding import Indices, Matrix, Vector, call_at
+from finger_pin.core.blocks import Blocks, build_blocks, partition
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import input_slopes, tip_force_rates
+from finger_pin.core.inputs import Control, input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
@@ -19,8 +20,9 @@ from finger_pin.core.tables import END, FIRST, Tables
 class Linear(NamedTuple):
     """Partial derivatives at one state, and the solution of (g - J) u = r; K rows, N coordinates, Z states.
 
-    Columns of what is wide are (r of positions, N | r of velocities, N | r of states, Z | h d_i of a stage, 1);
-    before the reduced system is solved, velocities stand in place of their r.
+    Columns of what is wide are (r of positions, N | r of velocities, N | r of states, Z | h d_i of a stage, 1) of one
+    block; before the reduced system is solved, velocities stand in place of their r. Of what blocks have in common
+    the rows are those of the whole.
 
     Attributes:
         mass: M with the lumps, shape (N, N).
@@ -37,11 +39,14 @@ class Linear(NamedTuple):
         gain: d phi, shape (K, wide).
         state_gain: d z, shape (Z, wide).
         load, command: Of one row, shape (wide,).
-        force: Sum of A^T d phi, shape (N, wide).
-        reduced: Shape (N, N), factorised in place.
+        force: Sum of A^T d phi of a block, shape (N, wide).
+        reduced: Of a block, shape (N, N), factorised in place.
         pivots: Row exchanges, shape (N,).
-        velocity: The solution's velocities, shape (N, wide).
+        velocity: The solution's velocities of a block, shape (N, wide).
         solution: The solution u, shape (2 N + Z, wide).
+        loose: Of the states of open contacts, u / r, shape (Z,).
+        right: The right-hand side of a block, shape (wide,).
+        blocks: What is coupled.
     """
 
     mass: Matrix
@@ -64,9 +69,12 @@ class Linear(NamedTuple):
     pivots: Indices
     velocity: Matrix
     solution: Matrix
+    loose: Vector
+    right: Vector
+    blocks: Blocks
 
 
-def build_linear(tables: Tables) -> Linear:
+def build_linear(tables: Tables, control: Control) -> Linear:
     """Allocate the linearisation of tables."""
     count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
     states = int(tables.state.max(initial=-1)) + 1
@@ -95,6 +103,9 @@ def build_linear(tables: Tables) -> Linear:
         pivots=np.zeros(width, dtype=np.int64),
         velocity=np.zeros((width, wide)),
         solution=np.zeros((wide - 1, wide)),
+        loose=np.zeros(states),
+        right=np.zeros(wide),
+        blocks=build_blocks(tables, control),
     )
 
 
@@ -140,7 +151,8 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
             x -= tables.carried[t, body] * tables.tip_force[t, 0]
             y -= tables.carried[t, body] * tables.tip_force[t, 1]
             z -= tables.carried[t, body] * tables.tip_force[t, 2]
-        for c in range(tables.paths.columns.size):
+        for index in range(work.paths.closed_count[0]):
+            c = work.paths.closed[index]
             passing = passes(tables.paths, c, body)
             x -= passing * work.paths.push[c, 0]
             y -= passing * work.paths.push[c, 1]
@@ -183,9 +195,16 @@ def linearise(model: Any, address: int, time: float) -> None:
         tip_force_rates(control, time, work.force_rate)
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
+        if tables.touch[begin] == 0:
+            call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
+            continue
+        for k in range(begin, end, 3):
+            if work.paths.asleep[k] == 0:
+                call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + 3)
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
     _load_slopes(tables, work, linear)
     if model.turn != 0:
         call_at(model.turn, address, time)
+    if tables.touching:
+        partition(tables, work, linear.blocks)

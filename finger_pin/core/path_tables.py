@@ -15,6 +15,8 @@ from finger_pin.mechanism.pieces import Leg, Piece
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
 COLUMNS, WRENCH = 3, 12
+# Farther than anything slides, m.
+_ANYWHERE = 1e3
 
 
 class Paths(NamedTuple):
@@ -32,6 +34,8 @@ class Paths(NamedTuple):
         start: Where the coordinates that move a piece begin, shape (E + 1,).
         at: Coordinates, shape (entries,).
         moves: One where a coordinate moves the first, the second, and the frame's body, shape (entries, 3).
+        levers: How far a unit of each of them moves a point of a contact's bodies against the other body at most, shape
+            (entries,), m.
         row: First row that uses each, shape (E,).
         carries: One where a body carries another, shape (n, n).
         rows: Rows with paths, shape (R,).
@@ -53,6 +57,7 @@ class Paths(NamedTuple):
     start: Indices
     at: Indices
     moves: IndexTable
+    levers: Vector
     row: Indices
     carries: IndexTable
     rows: Indices
@@ -69,6 +74,11 @@ class PathWork(NamedTuple):
     Attributes:
         out: What the shapes say, shape (E, OUT).
         active: Zero for gaps that are open, shape (E,).
+        closed: Gaps that are not, in order, shape (E,).
+        closed_count: How many, shape (1,).
+        asleep: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
+            step, as the next.
+        clear: Of every piece asleep, less than its gap, shape (E,), m.
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
         origin: Its origin, shape (E, 3), m.
         ends: Both points, base frame, shape (E, 6), m.
@@ -84,6 +94,10 @@ class PathWork(NamedTuple):
 
     out: Matrix
     active: Indices
+    closed: Indices
+    closed_count: Indices
+    asleep: Indices
+    clear: Vector
     frame: Layers
     origin: Matrix
     ends: Matrix
@@ -99,7 +113,12 @@ class PathWork(NamedTuple):
 
 
 def read_paths(
-    paths: Sequence[Sequence[Leg]], parents: NDArray[np.int64], last: Sequence[int], turns: Sequence[Array]
+    paths: Sequence[Sequence[Leg]],
+    parents: NDArray[np.int64],
+    last: Sequence[int],
+    turns: Sequence[Array],
+    slides: NDArray[np.bool_],
+    distances: Array,
 ) -> Paths:
     """Return the arrays of the paths of all rows.
 
@@ -108,6 +127,8 @@ def read_paths(
         parents: Of the core's bodies.
         last: The core's body of every joint of the model, the base first.
         turns: Rotation of that body's frame in the joint's.
+        slides: Whether each of the core's bodies slides.
+        distances: Of each from the one before it, m.
     """
     pieces: list[Piece] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
     number = {piece: e for e, piece in enumerate(pieces)}
@@ -120,6 +141,10 @@ def read_paths(
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
+    levers = [
+        _levers(p, row, at, parents, slides, distances)
+        for p, row, (at, _) in zip(pieces, carriers, entries, strict=True)
+    ]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
     for body, parent in enumerate(parents):
@@ -138,6 +163,7 @@ def read_paths(
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
+        levers=np.concatenate([np.zeros(0), *levers]),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
         carries=carries,
         rows=rows,
@@ -170,12 +196,40 @@ def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[ND
     return moved, np.ascontiguousarray(moves[moved])
 
 
+def _levers(
+    piece: Piece,
+    carriers: NDArray[np.int64],
+    coordinates: NDArray[np.int64],
+    parents: NDArray[np.int64],
+    slides: NDArray[np.bool_],
+    distances: Array,
+) -> Array:
+    """Return how far a unit of some coordinates moves points of a contact's first body, or of that of its frame."""
+    found = np.zeros(len(parents))
+    first = max(float(np.linalg.norm(end.point)) for end in piece.ends)
+    for body, far in (
+        (carriers[0], first),
+        (carriers[2], float(np.linalg.norm(piece.frame.translation)) + piece.reach),
+    ):
+        at, reach = int(body), far
+        while at >= 0:
+            found[at] += 1.0 if slides[at] else reach
+            # What slides may be anywhere.
+            reach += _ANYWHERE if slides[at] else distances[at]
+            at = int(parents[at])
+    return found[coordinates]
+
+
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
     """Allocate the memory for the pieces of K rows."""
     pieces, entries = len(paths.columns), len(paths.at)
     return PathWork(
         out=np.zeros((pieces, OUT)),
         active=np.ones(pieces, dtype=np.int64),
+        closed=np.zeros(pieces, dtype=np.int64),
+        closed_count=np.zeros(1, dtype=np.int64),
+        asleep=np.zeros(count, dtype=np.int64),
+        clear=np.zeros(pieces),
         frame=np.zeros((pieces, 3, 3)),
         origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 6)),
@@ -223,6 +277,7 @@ def select_paths(
         start=start,
         at=body(paths.at[at]),
         moves=paths.moves[at],
+        levers=paths.levers[at],
         row=np.searchsorted(rows, paths.row[pieces]),
         carries=np.ascontiguousarray(paths.carries[np.ix_(bodies, bodies)]),
         rows=np.searchsorted(rows, paths.rows[kept]),

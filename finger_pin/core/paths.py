@@ -125,11 +125,19 @@ def _angle(first: Any, second: Any) -> Any:
 def measure_paths(tables: Any, work: Any) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`."""
     paths, own = tables.paths, work.paths
+    closed = 0
     for e in range(paths.columns.size):
-        _measure(paths, e, work)
+        if own.asleep[paths.row[e]] == 0:
+            _measure(paths, e, work)
+            if paths.columns[e] > 1 and own.active[e]:
+                own.closed[closed] = e
+                closed += 1
+    own.closed_count[0] = closed
     axes, gather, net = work.spatial[AXIS], own.gather, work.vectors[0]
     for index in range(paths.rows.size):
         k = paths.rows[index]
+        if own.asleep[k]:
+            continue
         length, turn = 0.0, 0.0
         begin, end = tables.arm_start[k], tables.arm_start[k + 1]
         for a in range(begin, end):
@@ -162,12 +170,12 @@ def measure_paths(tables: Any, work: Any) -> None:
 def push(tables: Any, work: Any) -> None:
     """Fill the forces of all contacts, after their law."""
     paths, own = tables.paths, work.paths
-    for e in range(paths.columns.size):
-        if paths.columns[e] > 1:
-            for r in range(3):
-                own.push[e, r] = 0.0
-                for m in range(3):
-                    own.push[e, r] += work.rows[FORCE, paths.row[e] + m] * own.wrench[e, m, 3 + r]
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
+        for r in range(3):
+            own.push[e, r] = 0.0
+            for m in range(3):
+                own.push[e, r] += work.rows[FORCE, paths.row[e] + m] * own.wrench[e, m, 3 + r]
 
 
 @compiled
@@ -179,7 +187,7 @@ def passes(paths: Any, e: int, body: int) -> float:
         beyond += 1.0
     if second >= 0 and (second == body or paths.carries[body, second]):
         beyond -= 1.0
-    return beyond if paths.columns[e] > 1 else 0.0
+    return beyond
 
 
 @compiled
@@ -253,8 +261,6 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
     k, gather = paths.rows[index], own.gather
     for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
         e = paths.piece[leg]
-        if paths.columns[e] > 1:
-            continue
         for s in range(paths.start[e], paths.start[e + 1]):
             gather[paths.at[s]] += own.turn_slope[s]
         if not paths.follows[leg]:
@@ -283,9 +289,10 @@ def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
     """Add to a pin's load what contacts do that turn with the posture at constant forces."""
     paths, own = tables.paths, work.paths
     size = max(work.rows[LOAD, k], 1e-100)
-    for e in range(paths.columns.size):
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
         share = passes(paths, e, tables.pins[k]) / size
-        if share == 0.0 or own.active[e] == 0:
+        if share == 0.0:
             continue
         for s in range(paths.start[e], paths.start[e + 1]):
             for m in range(3):
@@ -304,7 +311,10 @@ def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
     axes, gather, net, crossed = work.spatial[AXIS], own.gather, work.vectors[0], work.vectors[1]
     for index in range(paths.rows.size):
         k = paths.rows[index]
-        _add_turns(tables, work, linear, index)
+        if tables.touch[k] == 0:
+            _add_turns(tables, work, linear, index)
+        elif own.active[paths.piece[paths.leg_start[index]]] == 0:
+            continue
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
             if own.active[e] == 0:

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.core.law_code import CURVATURE, SIGNALS, SLOPES, addresses, widest
+from finger_pin.core.law_code import SIGNALS, SLOPES, addresses, widest
 from finger_pin.core.path_tables import Paths, PathWork, build_path_work, reached, read_paths
 from finger_pin.core.rigid_body import (
     ARMATURE,
@@ -32,7 +32,7 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import FREE_JOINTS
 
 # Columns of the table of groups.
-FIRST, END, STATEFUL, BENT, FED, PRESSED, KINK = range(7)
+FIRST, END, FED, PRESSED, KINK = range(5)
 
 
 class Tables(NamedTuple):
@@ -55,20 +55,23 @@ class Tables(NamedTuple):
         loaded: Whether forces at the tips count.
         carriers: Body that has the link before each joint, -1 for the base, shape (n,).
         directions: That link's unit vector in its frame, shape (n, 3).
-        groups: First and last + 1 row of each, whether it has states, bends, inputs, loads,
-            and the column of its rows' kink, -1 for none, shape (G, 7).
+        groups: First and last + 1 row of each, whether it has inputs from earlier rows, or loads, and the column of
+            its rows' kink, -1 for none, shape (G, 5).
         laws: Addresses of value, slopes and account, shape (G, 3).
         books: Where stored energy and powers of each group are booked, -1 for none, shape (G, 1 + most powers).
         parameters: Shape (most parameters, K).
         offset: Shape (K,).
         arm_start: Where the row's arm begins among what follows, shape (K + 1,).
         arm_at: Coordinates that a row acts on or measures, shape (arms,).
+        arm_row: The row, shape (arms,).
         arm: Torque per force there, shape (arms,).
         measure: dl/dq there, shape (arms,).
         state: Index of each row's state in z, -1 without one, shape (K,).
+        state_row: The row of each state, shape (states,).
         touch: 1 for the first of the three rows of a contact, 2 for the others, 0 for all else, shape (K,).
-        touching: Whether any row is a contact's.
+        touching: Number of rows of contacts, which stand before all others.
         channel: Index of its input from outside, -1 without one, shape (K,).
+        fed_row: Rows that have an input, from outside or from earlier rows, ascending.
         input_start: Where the terms of its input from earlier rows begin in ``terms``, shape (K + 1,).
         load_start: Where those of its load begin, shape (K + 1,).
         terms: Earlier rows, shape (terms,).
@@ -77,6 +80,7 @@ class Tables(NamedTuple):
         carried: One where a force at a tip passes the pin of a body, shape (t, n).
         bend_start: Where the row's bends begin, shape (K + 1,).
         bend_at: Coordinates that bend its path, shape (bends,).
+        bend_row: The row, shape (bends,).
         bend: Curvature per |q| there, shape (bends,).
         curvature_offset: Shape (K,).
         paths: Pieces of paths through space.
@@ -102,12 +106,15 @@ class Tables(NamedTuple):
     offset: Vector
     arm_start: Indices
     arm_at: Indices
+    arm_row: Indices
     arm: Vector
     measure: Vector
     state: Indices
+    state_row: Indices
     touch: Indices
-    touching: bool
+    touching: int
     channel: Indices
+    fed_row: Indices
     input_start: Indices
     load_start: Indices
     terms: Indices
@@ -116,6 +123,7 @@ class Tables(NamedTuple):
     carried: Matrix
     bend_start: Indices
     bend_at: Indices
+    bend_row: Indices
     bend: Vector
     curvature_offset: Vector
     paths: Paths
@@ -144,7 +152,6 @@ class Work(NamedTuple):
 
     rotation: Layers
     origin: Matrix
-    frame: Matrix
     centre: Vector
     base_velocity: Vector
     base_acceleration: Vector
@@ -268,10 +275,13 @@ def _read(mechanism: Mechanism) -> Tables:
         return np.concatenate([*none, *(getattr(table, name) for table in rows)])
 
     arm, measure, bends = stacked("arm"), stacked("measure"), stacked("bends")
-    paths = read_paths([path for table in rows for path in table.paths], parents, last, turns)
+    channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
+    distances = np.linalg.norm(bodies[:, TRANSLATION : TRANSLATION + 3], axis=1)
+    legs = [path for table in rows for path in table.paths]
+    paths = read_paths(legs, parents, last, turns, kinds == PRISMATIC, distances)
     routed = reached(paths, count, mechanism.coordinates)
-    arm_start, arm_rows, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
-    bend_start, bend_rows, bend_at = _sparse((bends != 0.0) | routed)
+    arm_start, arm_row, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
+    bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
     return Tables(
         parents=parents,
         kinds=kinds,
@@ -295,28 +305,29 @@ def _read(mechanism: Mechanism) -> Tables:
                 (
                     begin,
                     end,
-                    table.states > 0,
-                    np.any(table.bends) or table.routed,
-                    bool(table.inputs) or np.any(table.channels >= 0),
+                    bool(table.inputs),
                     bool(table.loads) or np.any(table.pins >= 0),
                     SIGNALS + table.law.signals.index(table.law.kink) if table.law.kink else -1,
                 )
                 for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
             ],
             dtype=np.int64,
-        ).reshape(-1, 7),
+        ).reshape(-1, 5),
         laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
         books=_books(mechanism),
         parameters=parameters,
         offset=np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
         arm_start=arm_start,
         arm_at=arm_at,
-        arm=arm[arm_rows, arm_at],
-        measure=measure[arm_rows, arm_at],
+        arm_row=arm_row,
+        arm=arm[arm_row, arm_at],
+        measure=measure[arm_row, arm_at],
         state=state,
+        state_row=np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
         touch=touch,
-        touching=bool(touch.any()),
-        channel=np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64),
+        touching=int(np.count_nonzero(touch)),
+        channel=channel,
+        fed_row=np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
         input_start=np.array(starts[0], dtype=np.int64),
         load_start=np.array(starts[1], dtype=np.int64),
         terms=np.array(terms, dtype=np.int64),
@@ -325,7 +336,8 @@ def _read(mechanism: Mechanism) -> Tables:
         carried=np.ascontiguousarray(body.supports[:, joint_of - 1]),
         bend_start=bend_start,
         bend_at=bend_at,
-        bend=bends[bend_rows, bend_at],
+        bend_row=bend_row,
+        bend=bends[bend_row, bend_at],
         curvature_offset=np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
         paths=paths,
     )
@@ -339,12 +351,9 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
     columns, powers = widest(laws)
     base = np.zeros(6)
     base[3:] = -tables.gravity
-    rows = np.zeros((columns, count))
-    rows[CURVATURE] = tables.curvature_offset
     return Work(
         rotation=np.zeros((size, 3, 3)),
         origin=np.zeros((size, 3)),
-        frame=np.zeros((3, 3)),
         centre=np.zeros(3),
         base_velocity=np.zeros(6),
         base_power=np.zeros(1),
@@ -356,7 +365,7 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         coriolis=np.zeros((size, 12)),
         vectors=np.zeros((2, 6)),
         square=np.zeros((SQUARE_LAYERS, size, size)),
-        rows=rows,
+        rows=np.zeros((columns, count)),
         slopes=np.zeros((SLOPES, count)),
         powers=np.zeros((powers, count)),
         arm=tables.arm.copy(),
@@ -388,7 +397,7 @@ def _books(mechanism: Mechanism) -> NDArray[np.int64]:
 def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return where each row begins among the entries that are wanted, and the entries' rows and columns."""
     rows, columns = np.nonzero(wanted)
-    return np.append(0, np.cumsum(wanted.sum(axis=1))), rows, np.ascontiguousarray(columns)
+    return np.append(0, np.cumsum(wanted.sum(axis=1))), np.ascontiguousarray(rows), np.ascontiguousarray(columns)
 
 
 def _coordinates(model: pin.Model, index: int) -> list[_Body]:

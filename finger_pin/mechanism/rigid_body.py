@@ -160,18 +160,16 @@ class RigidBody:
         """Return q' = E(q) v, shape (..., nq)."""
         if self.model.nq == self.model.nv:
             return v
-        if q.ndim > 1:
-            return np.array([self.position_rate(*each) for each in zip(q, v, strict=True)])
-        rate = np.zeros(self.model.nq)
+        rate = np.zeros(q.shape)
         for joint in self.model.joints[1:]:
-            at, part = joint.idx_q, v[joint.idx_v : joint.idx_v + joint.nv]
+            at, part = joint.idx_q, v[..., joint.idx_v : joint.idx_v + joint.nv]
             if joint.nq == joint.nv:
-                rate[at : at + joint.nq] = part
+                rate[..., at : at + joint.nq] = part
             else:
                 # Half the product of the quaternion with the angular velocity in the body's frame.
-                vector, scalar = q[at : at + 3], q[at + 3]
-                rate[at : at + 3] = 0.5 * (scalar * part + np.cross(vector, part))
-                rate[at + 3] = -0.5 * vector @ part
+                vector, scalar = q[..., at : at + 3], q[..., at + 3]
+                rate[..., at : at + 3] = 0.5 * (scalar[..., None] * part + np.cross(vector, part))
+                rate[..., at + 3] = -0.5 * np.sum(vector * part, axis=-1)
         return rate
 
     def external_torque(self, q: Array, forces: Array) -> Array:

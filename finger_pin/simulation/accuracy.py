@@ -14,6 +14,7 @@ from finger_pin.core.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger_signals import FingerSignals
 
 #: Steps between two looks at a compiled simulation.
@@ -21,10 +22,12 @@ CHUNK = 256
 
 # A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
 _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
-# The estimate that is carried along is mostly too large: only from so many times the expected error on is it checked.
-_DOUBTED = 30.0
+# The estimate that is carried along is seldom below a third of the error and often far above it: it is checked from so
+# many times the expected error on.
+_DOUBTED = 3.0
 _TIGHTER = 10.0
-# Where joint friction is above two thirds of what locks the finger, small forces make large tensions.
+# Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
+# is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
 _PATIENCE = 5
@@ -33,6 +36,8 @@ _OPEN, _NOTHING = 1e-4, 1e-12
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
+# A contact is too stiff where a newton presses it in by so small a part of what positions are computed to.
+_SEEN = 1e-4
 # Stiction so many times above the level that sliding settles at is being let go.
 _LETTING_GO = 30.0
 
@@ -134,6 +139,29 @@ def floor_advice(signals: FingerSignals) -> str:
     for kind, (stiction, level) in kinds.items():
         if np.any(np.abs(stiction) > _LETTING_GO * level):
             return f"a larger finger.{kind}_friction.floor: stretched bristles are let go without load"
+    return ""
+
+
+def stiff_advice(signals: FingerSignals, tolerance: float) -> str:
+    """Return what to try where a run ends at a contact too stiff for its tolerance; else empty.
+
+    Args:
+        signals: Where it ended.
+        tolerance: Of the positions, rad; at the end of a finger about a tenth of that, m.
+    """
+    for found in signals.mechanism.rows.values():
+        if found.rows.law is not CONTACT:
+            continue
+        stiffness, exponent = (
+            found.rows.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent")
+        )
+        near, depth = np.abs(found.row.gap) < 0.1 * tolerance, stiffness ** (-1.0 / exponent)
+        for index in np.flatnonzero(near & (depth < _SEEN * 0.1 * tolerance)):
+            pressed = f"{found.rows.names[index]} is pressed in by {depth[index]:.1g} m under 1 N"
+            return (
+                f"softer surfaces: with a stiffness of {stiffness[index]:g}, {pressed}, far less than positions are "
+                "computed to"
+            )
     return ""
 
 

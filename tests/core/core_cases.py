@@ -174,8 +174,9 @@ class Bound:
     def solve(self, time, x, g):
         """Return the rate, the matrix that solves (g - J) u = r + f_t s, by columns (r | s), and if there is one."""
         rate = np.zeros(len(x))
-        solved = kernels.condensed(self._bound.address, time, x, g, rate)
-        return rate, self.model.linear.solution.copy(), solved
+        columns = np.zeros((len(x) + 1, len(x)))
+        solved = kernels.condensed(self._bound.address, time, x, g, rate, np.zeros(len(x) + 1), columns)
+        return rate, np.ascontiguousarray(columns.T), solved
 
 
 @dataclass(frozen=True, eq=False)

@@ -174,3 +174,14 @@ def test_two_fingers_hold_a_ball_until_friction_can_no_longer_carry_it():
     assert float(np.abs(found.energy_residual).max()) < 1e-4 * moved
     level = pads.contact_level.sum("contact")
     assert float(level[lost - 60 : lost].min()) < 0.03 * 9.81 < float(level[3000])
+
+
+def test_a_contact_too_stiff_for_its_tolerance_is_named_where_the_run_ends():
+    stiff = {"simulation.duration": 1.0, "environment.objects.plate.surface.stiffness": 1e12}
+    with pytest.raises(
+        fp.IntegrationError, match=r"try softer surfaces: with a stiffness of 1e\+12, distal-plate is"
+    ) as caught:
+        fp.simulate(fp.load_scenario("press", stiff))
+    assert "\n" not in str(caught.value)
+    # What came before is kept: it ends where the pad meets the plate.
+    assert abs(float(caught.value.result.contact_gap.sel(contact="distal-plate")[-1])) < 1e-4

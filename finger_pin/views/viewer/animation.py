@@ -81,12 +81,9 @@ def animation_page(
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
         chunk["ghost"] = beside.chunk()
-    scene = motion.scene
-    tips = scene.tips(scene.geometry.poses(motion.position[every])).reshape(-1, 3)
-    things = Things.of(result, motion.time, scene.size, tips.mean(axis=0), motion.palm)
-    if things is not None:
-        header |= things.header(scene.view())
-        chunk |= things.chunk()
+    if motion.things is not None:
+        header |= motion.things.header(motion.scene.view())
+        chunk |= motion.things.chunk()
     return render({**header, "chunks": [chunk]})
 
 
@@ -118,6 +115,7 @@ class Motion:
         position: theta, shape (m, n), rad.
         tension: Of every strand, shape (m, s), N.
         palm: Where the palm is, m poses, if it moves.
+        things: What the finger may touch, if there is anything.
     """
 
     scene: Scene
@@ -126,6 +124,7 @@ class Motion:
     position: Array
     tension: Array
     palm: LinkPoses | None = None
+    things: Things | None = None
 
     @property
     def largest(self) -> float:
@@ -164,7 +163,10 @@ class Motion:
             if not np.isfinite(values).all():
                 raise InputError(f"result.{name}", "must be finite")
         title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
-        return cls(scene, title, time[frames], position, tension, _palm(result, frames))
+        palm, few = _palm(result, frames), slice(None, None, max(1, len(frames) // _POSITIONS_IN_VIEW))
+        tips = scene.tips(scene.geometry.poses(position[few])).reshape(-1, 3)
+        things = Things.of(result, time[frames], scene.size, tips.mean(axis=0), palm)
+        return cls(scene, title, time[frames], position, tension, palm, things)
 
 
 def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:

@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 
 _SIDES = 8
 _LOOSE = (0.62, 0.64, 0.67)
+#: Of the arrow of a contact's force, at both ends.
+FORCE_COLOUR = np.tile([1.0, 0.82, 0.4], (2, 1))
 
 
 def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1.0, rate: float = 30.0) -> None:
     """Play a result in a ``meshcat.Visualizer``, in real time, and leave the finger in its last posture.
 
-    Nothing but the finger is touched: it stands below the visualizer's path in ``finger_pin``, in its base frame. To
-    move it, set the transform of a path and draw there: ``draw(visualizer["left"], result)``.
+    Nothing but the finger and the objects around it is touched: they stand below the visualizer's path in
+    ``finger_pin``, in its base frame. To move it, set the transform of a path and draw there:
+    ``draw(visualizer["left"], result)``.
 
     Args:
         visualizer: The user's own.
@@ -44,7 +47,8 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
     motion = Motion.of(result, rate / speed)
     root = visualizer.path.lower()
     scene, tube, scale = motion.scene, motion.scene.tube_radius, scale_above(motion.largest)
-    for command in solid_commands(scene.geometry, tube):
+    things = motion.things
+    for command in (*solid_commands(scene.geometry, tube), *(things.commands() if things else ())):
         _send(visualizer, {**command, "path": root + command["path"]})
     started, last = time.monotonic(), len(motion.time) - 1
     for index, due in enumerate((motion.time - motion.time[0]) / speed):
@@ -54,7 +58,11 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
             continue
         time.sleep(max(0.0, ahead))
         palm = motion.palm and LinkPoses(motion.palm.rotation[index], motion.palm.translation[index])
-        for command in _frame(scene, motion.position[index], motion.tension[index], scale, palm):
+        shown = _frame(scene, motion.position[index], motion.tension[index], scale, palm)
+        if things:
+            arrows = enumerate(things.arrows()[index])
+            shown += [*things.frame(index), *(_tube(f"contact{c}", ends, tube, FORCE_COLOUR) for c, ends in arrows)]
+        for command in shown:
             _send(visualizer, {**command, "path": root + command["path"]})
 
 

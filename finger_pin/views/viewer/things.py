@@ -16,7 +16,7 @@ import xarray as xr
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.geometry import LinkPoses
-from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command, cylinder, mesh
+from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command, cylinder, mesh, placed
 
 _FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
@@ -69,15 +69,15 @@ class Things:
         at = result.isel(time=np.searchsorted(result["time"].values, time))
         closed = at.isel(contact=np.flatnonzero(steepness > 0.0))
         parts = [closed[f"contact_{name}"].values for name in ("point", "force", "normal")]
-        placed = {
+        found = {
             name: np.broadcast_to(np.append(each.position, each.quaternion), (len(time), 7))
             for name, each in objects.items()
             if palm is not None
         }
         for name in result["object"].values if "object_position" in result else ():
             own = at.sel(object=name)
-            placed[str(name)] = np.concatenate([own["object_position"], own["object_orientation"]], axis=-1)
-        poses = np.stack(list(placed.values()), axis=1) if placed else np.zeros((len(time), 0, 7))
+            found[str(name)] = np.concatenate([own["object_position"], own["object_orientation"]], axis=-1)
+        poses = np.stack(list(found.values()), axis=1) if found else np.zeros((len(time), 0, 7))
         if palm is not None:
             turned = [np.einsum("mij,mcj->mci", palm.rotation, each) for each in (*parts, poses[..., :3])]
             open_ = ~np.any(parts[1], axis=-1, keepdims=True)
@@ -91,28 +91,27 @@ class Things:
             ).reshape(*poses.shape[:2], 4)
             poses = np.concatenate([turned[3] + palm.translation[:, None], seen], axis=-1)
         contacts = np.concatenate(parts, axis=-1)
-        return cls(objects, tuple(placed), poses, contacts, steepness[steepness > 0.0], size, middle)
+        return cls(objects, tuple(found), poses, contacts, steepness[steepness > 0.0], size, middle)
 
     def header(self, turn: Array) -> dict[str, Any]:
         """Return what the page needs before the first frame; ``turn`` is the rotation of the scene."""
-        strongest = float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
-        length = _length(_ARROW * self.size, strongest)
+        length = self._newton()
         return {
             "things": {
-                "commands": list(self._commands()),
+                "commands": list(self.commands()),
                 "free": [f"object_{name}" for name in self.moving],
                 "steepness": np.round(self.steepness, 4).tolist(),
                 "length": length,
                 "note": f"contact forces, {1e3 * length:.4g} mm per N, in their friction cones",
             },
-            "alsoInView": np.round(self._seen() @ turn.T, 5).tolist(),
+            "alsoInView": np.round(self.seen() @ turn.T, 5).tolist(),
         }
 
     def chunk(self) -> dict[str, str]:
         """Return the frames for the page."""
         return {name: _encode(values) for name, values in (("object", self.poses), ("contact", self.contacts))}
 
-    def _seen(self) -> Array:
+    def seen(self) -> Array:
         """Return where free objects are and where bodies touch, as far as that is near the finger, shape (m, 3)."""
         free = [index for index, name in enumerate(self.moving) if self.objects[name].mass is not None]
         places = self.poses[:, free, :3].reshape(-1, 3)
@@ -120,30 +119,60 @@ class Things:
         found = np.concatenate([places, points])
         return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size][::10])
 
-    def _commands(self) -> Iterator[Command]:
+    def commands(self) -> Iterator[Command]:
+        """Yield meshcat's commands for all objects, each where it starts."""
         for name, each in self.objects.items():
-            path, sizes = f"{ROOT}/object_{name}", each.sizes
-            colour = _FIXED if each.mass is None else _FREE
-            rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
-            place = np.array(each.position)
-            if each.shape == "half_space":
-                # The part of it that is nearest to the finger.
-                side, thick = 2.0 * _WIDE * self.size, _THICK * self.size
-                below = rotation.T @ (self.middle - place) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thick]
-                parts = [(_box(side, side, thick), np.eye(3), below)]
-            elif each.shape == "box":
-                parts = [(_box(*sizes), np.eye(3), np.zeros(3))]
-            elif each.shape == "sphere":
-                parts = [(_ball(sizes[0]), np.eye(3), np.zeros(3))]
-            else:
-                parts = [(cylinder(*sizes), Y_TO_Z, np.zeros(3))]
-                if each.shape == "capsule":
-                    ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
-                    parts += [(_ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
-            for index, (shape, turned, offset) in enumerate(parts):
+            path = f"{ROOT}/object_{name}"
+            for index, (shape, turned, offset, colour) in enumerate(self.parts(name)):
                 yield mesh(f"{path}/part{index}", shape, turned, offset, colour, 1.6 * SOLID_OPACITY)
-            matrix = pin.SE3(rotation, place).homogeneous
-            yield {"type": "set_transform", "path": path, "matrix": [float(entry) for entry in matrix.T.ravel()]}
+            yield self._placement(name, np.append(each.position, each.quaternion))
+
+    def frame(self, index: int) -> Iterator[Command]:
+        """Yield meshcat's commands that move objects to where they are in a frame."""
+        for name, pose in zip(self.moving, self.poses[index], strict=True):
+            yield self._placement(name, pose)
+
+    def placed(self, name: str) -> Array:
+        """Return poses of an object in all frames, shape (m, 7)."""
+        if name in self.moving:
+            return np.asarray(self.poses[:, self.moving.index(name)])
+        each = self.objects[name]
+        return np.tile(np.append(each.position, each.quaternion), (len(self.poses), 1))
+
+    def arrows(self) -> Array:
+        """Return where the arrow of every contact's force begins and ends in all frames, shape (m, c, 2, 3), m."""
+        points, force = self.contacts[..., :3], self.contacts[..., 3:6]
+        return np.stack([points, points + self._newton() * force], axis=-2)
+
+    def _newton(self) -> float:
+        return _length(_ARROW * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0)))
+
+    @staticmethod
+    def _placement(name: str, pose: Array) -> Command:
+        rotation = pin.Quaternion(pose[3:]).toRotationMatrix()
+        return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": placed(rotation, pose[:3])}
+
+    def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
+        """Yield what draws an object: meshcat's geometry, its rotation and place in the object, and its colour."""
+        each = self.objects[name]
+        sizes, colour = each.sizes, _FIXED if each.mass is None else _FREE
+        rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
+        place = np.array(each.position)
+        if each.shape == "half_space":
+            # The part of it that is nearest to the finger.
+            side, thick = 2.0 * _WIDE * self.size, _THICK * self.size
+            below = rotation.T @ (self.middle - place) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thick]
+            parts = [(_box(side, side, thick), np.eye(3), below)]
+        elif each.shape == "box":
+            parts = [(_box(*sizes), np.eye(3), np.zeros(3))]
+        elif each.shape == "sphere":
+            parts = [(_ball(sizes[0]), np.eye(3), np.zeros(3))]
+        else:
+            parts = [(cylinder(*sizes), Y_TO_Z, np.zeros(3))]
+            if each.shape == "capsule":
+                ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
+                parts += [(_ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
+        yield from ((*part, colour) for part in parts)
 
 
 def _length(longest: float, strongest: float) -> float:

@@ -17,6 +17,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import FingerPinError, InputError
@@ -24,9 +25,10 @@ from finger_pin.files import replacing
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Motion
-from finger_pin.views.viewer.drawing import tension_colours
+from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
-from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, is_mesh
+from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, is_mesh
+from finger_pin.views.viewer.things import Things
 
 _BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -105,7 +107,17 @@ class _Film:
         scene = motion.scene
         self.motion = motion
         self.poses = scene.geometry.poses(motion.position, motion.palm)
-        self.solids = tuple(_solids(scene))
+        self.solids, things = tuple(_solids(scene)), motion.things
+        # Objects are further links; what is seen of them does not move the camera far away.
+        own = self.solids
+        if things is not None:
+            self.solids += tuple(_things(things, self.poses.translation.shape[1]))
+            placed = np.stack([things.placed(name) for name in things.objects], axis=1)
+            turned = Rotation.from_quat(placed[..., 3:].reshape(-1, 4)).as_matrix().reshape(*placed.shape[:2], 3, 3)
+            self.poses = LinkPoses(
+                np.concatenate([self.poses.rotation, turned], axis=1),
+                np.concatenate([self.poses.translation, placed[..., :3]], axis=1),
+            )
         self.scale = scale_above(motion.largest)
         away = np.array(_AWAY) / np.linalg.norm(_AWAY)
         right = np.cross([0.0, 0.0, 1.0], away)
@@ -117,7 +129,11 @@ class _Film:
         axes.set_axis_off()
         few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
         seen = np.concatenate(
-            [self.tips.reshape(-1, 2), *(self._outline(solid, frame) for frame in few for solid in self.solids)]
+            [
+                self.tips.reshape(-1, 2),
+                np.zeros((0, 2)) if things is None else things.seen() @ self.camera[:2].T,
+                *(self._outline(solid, frame) for frame in few for solid in own),
+            ]
         )
         low, high = seen.min(axis=0), seen.max(axis=0)
         # Room for the legend at the left, and for the title above.
@@ -134,6 +150,8 @@ class _Film:
         width = 2.0 * 72.0 * scene.tube_radius / unit
         self.tubes = LineCollection([], linewidths=width, capstyle="round")
         axes.add_collection(self.tubes)
+        self.arrows = LineCollection([], linewidths=width, colors=[tuple(FORCE_COLOUR[0])], zorder=3)
+        axes.add_collection(self.arrows)
 
     def show(self, frame: int) -> None:
         """Move everything to where it is in a frame."""
@@ -154,6 +172,8 @@ class _Film:
         self.tubes.set_color(tension_colours(tension, self.scale)[strands])
         for index, trace in enumerate(self.traces):
             trace.set_data(*self.tips[: frame + 1, index].T)
+        if motion.things is not None:
+            self.arrows.set_segments(list(motion.things.arrows()[frame] @ self.camera[:2].T))
         self.clock.set_text(f"{motion.time[frame]:.2f} s")
 
     def _placed(self, solid: _Solid, frame: int) -> Array:
@@ -185,6 +205,24 @@ def _solids(scene: Scene) -> Iterator[_Solid]:
         yield _Solid(pulley.joint, ring + np.array([0.0, 0.0, pulley.offset]), (*GROOVE_COLOUR, SOLID_OPACITY))
 
 
+def _things(things: Things, first: int) -> Iterator[_Solid]:
+    for index, name in enumerate(things.objects):
+        for shape, turned, offset, colour in things.parts(name):
+            corners = _corners_of(shape) @ turned.T + offset
+            yield _Solid(first + index, corners, (*colour, SOLID_OPACITY))
+
+
+def _corners_of(shape: Command) -> Array:
+    """Return points whose hull is, or looks like, a geometry of meshcat."""
+    if shape["type"] == "BoxGeometry":
+        return np.array(
+            list(product(*((-0.5 * shape[side], 0.5 * shape[side]) for side in ("width", "height", "depth"))))
+        )
+    if shape["type"] == "CylinderGeometry":
+        return np.asarray(_ring(shape["radiusTop"], shape["height"]) @ Y_TO_Z)
+    return _round(shape["radius"])
+
+
 def _corners(shape: Any) -> Array:
     """Return points whose hull is, or looks like, a shape that `solids` knows."""
     kind = type(shape).__name__
@@ -194,9 +232,14 @@ def _corners(shape: Any) -> Array:
         return np.asarray(shape.vertices())
     if kind == "Box":
         return np.array(list(product(*((-half, half) for half in shape.halfSide))))
+    return _round(shape.radius)
+
+
+def _round(radius: float) -> Array:
+    """Return points of a sphere, shape (p, 3)."""
     turns = np.linspace(0.0, np.pi, 13)
     points = np.array([_ring(np.sin(turn), 2.0 * np.cos(turn))[: len(_ROUND)] for turn in turns])
-    return np.asarray(shape.radius * points.reshape(-1, 3))
+    return np.asarray(radius * points.reshape(-1, 3))
 
 
 def _ring(radius: float, height: float) -> Array:

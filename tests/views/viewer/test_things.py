@@ -3,12 +3,16 @@
 import base64
 import json
 import re
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.views.viewer.animation import animation_page
+from finger_pin.views import draw
+from finger_pin.views.plots.style import new_figure
+from finger_pin.views.viewer.animation import Motion, animation_page
+from finger_pin.views.viewer.video import _Film
 
 
 def played(result):
@@ -58,3 +62,40 @@ def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_
 def test_a_result_without_objects_has_no_things():
     found, _ = played(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1})))
     assert "things" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
+
+
+class Window:
+    """What a `meshcat.Visualizer` sends."""
+
+    sent: ClassVar = {}
+
+    def send(self, command):
+        found = command.lower()
+        self.sent.setdefault(found["path"].removeprefix("/meshcat/finger_pin/"), []).append(found)
+
+
+def test_a_meshcat_window_shows_objects_where_they_end_and_the_forces_on_them(pinched):
+    meshcat = pytest.importorskip("meshcat")
+    window = Window()
+    draw(meshcat.Visualizer(window=window), pinched, speed=np.inf)
+    last = pinched.isel(time=-1)
+    assert {"object_ball/part0", "object_tray/part0"} <= set(window.sent)
+    matrix = np.reshape(window.sent["object_ball"][-1]["matrix"], (4, 4)).T
+    assert matrix[:3, 3] == pytest.approx((last.palm_position + last.object_position[0]).values, abs=1e-9)
+    shape = window.sent["tendons/contact0"][-1]["object"]["geometries"][0]["data"]["attributes"]["position"]["array"]
+    points = np.frombuffer(shape.data, "<f4").reshape(2, -1, 3).mean(axis=1)
+    force = last.contact_force.sel(contact="left.distal-ball").values
+    along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
+    assert along == pytest.approx(force / np.linalg.norm(force), abs=1e-5)
+
+
+def test_a_film_shows_the_ball_round_and_where_it_is(pinched):
+    motion = Motion.of(pinched, 10.0)
+    film, frame = _Film(new_figure(4.0, 3.0), motion), 3
+    film.show(frame)
+    at = pinched.sel(time=motion.time[frame])
+    centre = film.camera[:2] @ (at.palm_position + at.object_position[0]).values
+    outlines = [path.vertices for path in film.bodies.get_paths()]
+    distances = [np.linalg.norm(outline - centre, axis=1) for outline in outlines]
+    assert any(each.max() < 0.01501 and each.min() > 0.0145 for each in distances)
+    assert len(film.arrows.get_segments()) == 2
