@@ -28,6 +28,8 @@ SLACK_TENSION = 0.05
 _TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
 #: Points per span and per radian of the tendons drawn, so that sags and arcs look smooth.
 _RESOLUTION = 11
+# Beyond so many times the hand's own extent, the camera does not follow.
+_LOST = 3.0
 _LARGEST = 32767
 _GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
 
@@ -149,6 +151,12 @@ class Scene:
         if ghost is not None:
             seen.append(ghost.seen())
         corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
+        if palm is None:
+            # What a hand has lost, such as a pen of a model's that falls, leaves the view.
+            first = seen[0].reshape(-1, *seen[0].shape[-2:])[0] @ turn.T
+            middle = first.mean(axis=0)
+            reach = max(np.linalg.norm(first - middle, axis=1).max(), *self._widths)
+            corners = corners[np.linalg.norm(corners - middle, axis=1) < _LOST * reach]
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
