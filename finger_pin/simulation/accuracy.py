@@ -30,7 +30,7 @@ _TIGHTER = 10.0
 # is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
-_PATIENCE = 5
+_PATIENCE = 3
 # The share of the energy exchanged to which an account has to close, and what is too little to count, J.
 _OPEN, _NOTHING = 1e-4, 1e-12
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
