@@ -58,7 +58,7 @@ class Drawing:
         """Draw no more: nothing is written after this."""
         with suppress(ProcessLookupError):
             if hasattr(os, "killpg"):
-                # With the copy of itself that it may have made.
+                # With the copies of itself that it may have made.
                 os.killpg(self.process.pid, signal.SIGKILL)
             self.process.kill()
 
@@ -101,11 +101,11 @@ def serve() -> None:
     with suppress(EOFError):
         result, folder = pickle.load(sys.stdin.buffer)
         names = list(saving.figures_of(result))
-        print(json.dumps(_drawn_by_two(partial(saving.draw_all, result, folder), names)), flush=True)
+        print(json.dumps(_drawn_side_by_side(partial(saving.draw_all, result, folder), names)), flush=True)
 
 
-def _drawn_by_two(draw: Callable[[list[str]], object], names: list[str]) -> Answer:
-    """Draw figures side by side, half of them in a copy of this process where there are copies."""
+def _drawn_side_by_side(draw: Callable[[list[str]], object], names: list[str]) -> Answer:
+    """Draw figures, each in a copy of this process where there are copies."""
 
     def drawn(own: list[str]) -> Answer:
         try:
@@ -118,17 +118,21 @@ def _drawn_by_two(draw: Callable[[list[str]], object], names: list[str]) -> Answ
     if "fork" not in multiprocessing.get_all_start_methods():
         return drawn(names)
     context = multiprocessing.get_context("fork")
-    ours, theirs = context.Pipe(duplex=False)
-    other = context.Process(target=lambda: theirs.send(drawn(names[1::2])))
-    other.start()
-    theirs.close()
-    answer = drawn(names[::2])
-    try:
-        second: Answer = ours.recv()
-    except EOFError:
-        second = (0, "a process that draws was killed")
-    other.join()
-    return second if second != (0, "") else answer
+    others = []
+    for name in names[1:]:
+        ours, theirs = context.Pipe(duplex=False)
+        other = context.Process(target=lambda pipe, own: pipe.send(drawn(own)), args=(theirs, [name]))
+        other.start()
+        theirs.close()
+        others.append((other, ours))
+    answers = [drawn(names[:1])]
+    for other, ours in others:
+        try:
+            answers.append(ours.recv())
+        except EOFError:
+            answers.append((0, "a process that draws was killed"))
+        other.join()
+    return next((each for each in answers if each != (0, "")), (0, ""))
 
 
 if __name__ == "__main__":

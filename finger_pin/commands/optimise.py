@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from finger_pin.commands.console import Interrupts, Unsuccessful, noted, print_text, runs_bar, talks
+from finger_pin.commands.console import Unsuccessful
 from finger_pin.commands.options import (
     Figures,
     Quiet,
@@ -22,10 +21,12 @@ from finger_pin.commands.options import (
     pool,
     wrong,
 )
-from finger_pin.commands.sweep import KEPT
+from finger_pin.commands.study import conduct
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from finger_pin.studies.runs import Progress, Stop
 
 
 def optimise(
@@ -77,41 +78,34 @@ def optimise(
         raise wrong("--no-constraints", "contradicts --constraint")
     given = {"population": population, "generations": generations, "seed": seed}
     effort = {name: value for name, value in given.items() if value is not None}
-    changed, shown = overrides(settings), talks(quiet)
-    with Interrupts() as interrupts, noted(KEPT):
-        executor = pool(workers, scheduler)
-        from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
-        from finger_pin.studies.keys import Starting
+    changed, executor = overrides(settings), pool(workers, scheduler)
+    from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
+    from finger_pin.studies.keys import Starting
 
-        name = Starting.load(scenario, changed).scenario.name
-        goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint]
-        goals += ["no-constraints"] * no_constraints + [f"{name}={value}" for name, value in effort.items()]
-        output = output or Path("results", folder_name(f"optimise-{name}", *settings, *goals))
-        with runs_bar("search") if shown else nullcontext() as progress, interrupts.patient():
-            result = optimise(
-                scenario,
-                over or None,
-                minimise=minimise or (() if maximise else DEFAULT_OBJECTIVES),
-                maximise=maximise,
-                constraints=constraint or (() if no_constraints else DEFAULT_CONSTRAINTS),
-                effort=Effort(**effort),
-                overrides=changed,
-                output=output,
-                executor=executor,
-                restart=restart,
-                progress=progress,
-                stop=lambda: interrupts.requested,
-            )
-        if figures and not interrupts.requested:
-            from finger_pin.views.plots import plot_pareto, save_figure
+    name = Starting.load(scenario, changed).scenario.name
+    goals = [*over, *minimise, *(f"max.{each}" for each in maximise), *constraint]
+    goals += ["no-constraints"] * no_constraints + [f"{name}={value}" for name, value in effort.items()]
+    folder = output or Path("results", folder_name(f"optimise-{name}", *settings, *goals))
 
-            save_figure(plot_pareto(result), output / "figures" / "pareto.png")
-        if not quiet:
-            print_text(f"{summary(result)}\n\nResults are in {output}")
-        if interrupts.requested:
-            raise KeyboardInterrupt
-        if not result["feasible"].any():
-            raise Unsuccessful("no design keeps all constraints")
+    def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
+        return optimise(
+            scenario,
+            over or None,
+            minimise=minimise or (() if maximise else DEFAULT_OBJECTIVES),
+            maximise=maximise,
+            constraints=constraint or (() if no_constraints else DEFAULT_CONSTRAINTS),
+            effort=Effort(**effort),
+            overrides=changed,
+            output=folder,
+            executor=executor,
+            restart=restart,
+            progress=progress,
+            stop=stop,
+        )
+
+    result = conduct("search", run, summary, "pareto", folder, figures=figures, quiet=quiet)
+    if not result["feasible"].any():
+        raise Unsuccessful("no design keeps all constraints")
 
 
 def summary(result: xr.Dataset) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from finger_pin.commands.console import Interrupts, Unsuccessful, noted, print_text, runs_bar, talks
+from finger_pin.commands.console import Unsuccessful, print_text
 from finger_pin.commands.options import (
     Figures,
     Quiet,
@@ -22,13 +21,13 @@ from finger_pin.commands.options import (
     pool,
     wrong,
 )
+from finger_pin.commands.study import conduct
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from finger_pin.studies.designs import Design
-
-KEPT = "the same command continues from what is recorded"
+    from finger_pin.studies.runs import Progress, Stop
 
 
 def sweep(
@@ -77,44 +76,42 @@ def sweep(
         raise wrong("--samples", "is needed by --design latin, and by no other")
     if seed is not None and design != "latin":
         raise wrong("--seed", "is for --design latin")
-    changed, shown = overrides(settings), talks(quiet)
-    with Interrupts() as interrupts, noted(KEPT):
-        executor = pool(workers, scheduler)
-        from finger_pin.exceptions import StudyError
-        from finger_pin.studies import DEFAULT_METRICS, sweep
-        from finger_pin.studies.keys import Starting
+    changed, executor = overrides(settings), pool(workers, scheduler)
+    from finger_pin.exceptions import StudyError
+    from finger_pin.studies import DEFAULT_METRICS, sweep
+    from finger_pin.studies.keys import Starting
 
-        points = build_design(design, over, samples, seed or 0)
-        name = Starting.load(scenario, changed).scenario.name
-        chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
-        output = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
-        with runs_bar("sweep") if shown else nullcontext() as progress, interrupts.patient():
-            try:
-                result = sweep(
-                    scenario,
-                    points,
-                    metrics=metric or DEFAULT_METRICS,
-                    overrides=changed,
-                    output=output,
-                    executor=executor,
-                    restart=restart,
-                    retry_failed=retry_failed,
-                    progress=progress,
-                    stop=lambda: interrupts.requested,
-                )
-            except StudyError as error:
-                # The summary says why runs failed.
-                result = error.result
-        if figures and not interrupts.requested:
-            from finger_pin.views.plots import plot_sweep, save_figure
+    points = build_design(design, over, samples, seed or 0)
+    name = Starting.load(scenario, changed).scenario.name
+    chosen = [*over, *metric, *([] if design == "grid" else [design, f"{samples}", f"{seed or 0}"])]
+    folder = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
 
-            save_figure(plot_sweep(result), output / "figures" / "sweep.png")
-        if not quiet:
-            print_text(f"{summary(result)}\n\nResults are in {output}")
-        if interrupts.requested and (result["status"] == "missing").any():
-            raise KeyboardInterrupt
-        if (result["status"] == "failed").all():
-            raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
+    def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
+        try:
+            return sweep(
+                scenario,
+                points,
+                metrics=metric or DEFAULT_METRICS,
+                overrides=changed,
+                output=folder,
+                executor=executor,
+                restart=restart,
+                retry_failed=retry_failed,
+                progress=progress,
+                stop=stop,
+            )
+        except StudyError as error:
+            # The summary says why runs failed.
+            return error.result
+
+    result = conduct("sweep", run, summary, "sweep", folder, figures=figures, quiet=quiet, unfinished=misses)
+    if (result["status"] == "failed").all():
+        raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
+
+
+def misses(result: xr.Dataset) -> bool:
+    """Return whether some runs were not made."""
+    return bool((result["status"] == "missing").any())
 
 
 def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> Design:

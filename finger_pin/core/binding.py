@@ -1,6 +1,6 @@
 """Arguments handed to compiled code once: unpacking some eighty arrays costs as much as a small step does.
 
-Compiled code sees an array as a few machine words: its address, its sizes, its strides. `put` writes those of a whole
+Compiled code sees an array as a few machine words: its address, its sizes, its strides. `bound` writes those of a whole
 table of arrays into one block, from which `get` reads them back at no cost at every later call.
 """
 
@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 from llvmlite import ir
-from numba import errors, types
+from numba import types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
@@ -45,9 +45,33 @@ def kind_of(table: Any) -> Any:
     return types.NamedTuple(kinds, table)  # type: ignore[no-untyped-call]
 
 
-def block_for(kind: Any) -> NDArray[np.uint8]:
-    """Return an empty block that is large enough for what `put` writes of a value of a type."""
-    return np.zeros(_WORD * _words(kind), dtype=np.uint8)
+def bound(table: Any, kind: Any) -> NDArray[np.uint8]:
+    """Return a block that holds a table for `get`; its arrays must be kept alive as long as the block.
+
+    Raises:
+        TypeError: If the table is not of the type that `get` will read: another layout would be misread.
+    """
+    words: list[int] = []
+    _write(table, kind, words)
+    return np.array(words, dtype=np.int64).view(np.uint8)
+
+
+def _write(value: Any, kind: Any, words: list[int]) -> None:
+    if isinstance(kind, types.NamedTuple):
+        for part, own in zip(value, kind, strict=True):
+            _write(part, own, words)
+    elif isinstance(kind, types.Array):
+        fitting = isinstance(value, np.ndarray) and value.ndim == kind.ndim and value.flags.c_contiguous
+        if not fitting or value.dtype != np.dtype(str(kind.dtype)):
+            raise TypeError(f"{value!r} cannot be bound as {kind}")
+        # The words of an array: owner, parent, number of items, size of an item, address, sizes, strides.
+        words += (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+    elif isinstance(value, bool | int) and kind in (types.int64, types.boolean):
+        words.append(int(value))
+    elif isinstance(value, float) and kind == types.float64:
+        words.append(int(np.float64(value).view(np.int64)))
+    else:
+        raise TypeError(f"{value!r} cannot be bound as {kind}")
 
 
 def _words(kind: Any) -> int:
@@ -56,30 +80,8 @@ def _words(kind: Any) -> int:
     return sum(_words(part) for part in kind) if isinstance(kind, types.NamedTuple) else 1
 
 
-def _pointer(context: Any, builder: Any, block: Any, value: Any, kind: Any) -> Any:
-    data = context.make_array(block)(context, builder, value).data
-    return builder.bitcast(data, context.get_value_type(kind).as_pointer())
-
-
-@_built_in
-def put(_typing: Any, block: Any, value: Any, kind: Any) -> Any:
-    """Write a value into a block; its arrays must be kept alive as long as the block.
-
-    Raises:
-        TypingError: If the value is not of the type that `get` will read: another layout would be misread.
-    """
-    if value != kind.instance_type:
-        raise errors.TypingError(f"a value of type {value} cannot be bound as {kind.instance_type}")
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        builder.store(arguments[1], _pointer(context, builder, signature.args[0], arguments[0], value))
-        return context.get_dummy_value()
-
-    return types.void(block, value, kind), generate
-
-
 class Bound(types.Type):
-    """Where a table that `put` has written lies: a pointer whose attributes are the fields of the table.
+    """Where a table that `bound` has written lies: a pointer whose attributes are the fields of the table.
 
     Passing a pointer instead of some hundred numbers is what compiling quickly depends on.
     """
@@ -139,7 +141,7 @@ def _field(context: Any, builder: Any, bound: Any, value: Any, name: str) -> Any
 
 @_built_in
 def get(_typing: Any, block: Any, kind: Any) -> Any:
-    """Return the table in a block that `put` has filled; its attributes are read where they are used."""
+    """Return the table in a block that `bound` has filled; its attributes are read where they are used."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -149,7 +151,7 @@ def get(_typing: Any, block: Any, kind: Any) -> Any:
 
 @_built_in
 def bound_at(_typing: Any, address: Any, kind: Any) -> Any:
-    """Return the table at the address of a block that `put` has filled."""
+    """Return the table at the address of a block that `bound` has filled."""
     target = Bound(kind.instance_type)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.compilation import compiled
 from finger_pin.core.rigid_body import ROTATION
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
@@ -73,10 +73,10 @@ def place(frame: Any, q: Any, body: Any) -> None:
         body[ROTATION + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
 
 
-@entry
-def place_all(tables: Any, attitude: Any) -> None:
+def place_all(tables: Any, attitude: Array) -> None:
     """Place all free bodies by their quaternions, shape (f, 4)."""
-    place_bodies(tables, attitude)
+    for frame, quaternion, at in zip(tables.chart_frames, attitude, tables.charts, strict=True):
+        place.py_func(frame, quaternion, tables.bodies[at])  # type: ignore[attr-defined]
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Contacts in the linear systems of `condensation`: three rows and two states at once, and what they do to pins."""
+"""Contacts, of three rows and two states each: what they exert, and their part in the systems of `condensation`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,33 @@ from typing import Any
 
 from finger_pin.core import law_code as at
 from finger_pin.core.compilation import compiled
-from finger_pin.core.paths import passes
+from finger_pin.core.law_code import call_value
+from finger_pin.core.paths import passes, push
+from finger_pin.core.tables import END, FIRST
+
+
+@compiled
+def exert_contacts(tables: Any, v: Any, z: Any, work: Any) -> None:
+    """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
+    rows, asleep = work.rows, work.paths.asleep
+    for g in range(tables.groups.shape[0]):
+        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        for k in range(begin, end if begin < tables.touching else begin, 3):
+            if asleep[k]:
+                continue
+            for m in range(k, k + 3):
+                speed = 0.0
+                for e in range(tables.arm_start[m], tables.arm_start[m + 1]):
+                    speed += work.arm[e] * v[tables.arm_at[e]]
+                rows[at.LENGTH, m], rows[at.SPEED, m] = work.paths.length[m], speed
+                if m > k:
+                    rows[at.STATE, m] = z[tables.state[m]]
+            call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)
+    push(tables, work)
+    for index in range(work.paths.closed_count[0]):
+        k = tables.paths.row[work.paths.closed[index]]
+        for e in range(tables.arm_start[k], tables.arm_start[k + 3]):
+            work.torque[tables.arm_at[e]] += work.arm[e] * rows[at.FORCE, tables.arm_row[e]]
 
 
 @compiled

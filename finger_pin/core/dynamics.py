@@ -10,7 +10,7 @@ from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled
 from finger_pin.core.inputs import guide, inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
-from finger_pin.core.paths import passes, push
+from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
@@ -97,31 +97,12 @@ def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
 
 
 @compiled
-def _touch(tables: Any, g: int, v: Any, z: Any, work: Any) -> None:
-    """Evaluate the contacts of a group, but for those asleep, which exert nothing."""
-    rows, asleep = work.rows, work.paths.asleep
-    for k in range(tables.groups[g, FIRST], tables.groups[g, END], 3):
-        if asleep[k]:
-            continue
-        for m in range(k, k + 3):
-            speed = 0.0
-            for e in range(tables.arm_start[m], tables.arm_start[m + 1]):
-                speed += work.arm[e] * v[tables.arm_at[e]]
-            rows[LENGTH, m], rows[SPEED, m] = work.paths.length[m], speed
-            if m > k:
-                rows[STATE, m] = z[tables.state[m]]
-        call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)
-    push(tables, work)
-
-
-@compiled
-def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
-    """Evaluate the laws of all rows in their order, each with the forces of those before, after `_see`."""
+def _act(tables: Any, work: Any) -> None:
+    """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         if begin < tables.touching:
-            _touch(tables, g, v, z, work)
             continue
         if tables.groups[g, FED]:
             for k in range(begin, end):
@@ -139,14 +120,8 @@ def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
 
 @compiled
 def _drive(tables: Any, work: Any, rate: Any) -> None:
-    """Fill A^T phi, and the rates of the rows' states, after `_exert`."""
+    """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
-    for j in range(torque.size):
-        torque[j] = 0.0
-    for index in range(work.paths.closed_count[0]):
-        k = tables.paths.row[work.paths.closed[index]]
-        for e in range(tables.arm_start[k], tables.arm_start[k + 3]):
-            torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
     for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
     for i in range(tables.state_row.size):
@@ -154,23 +129,33 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
 
 
 @compiled
+def exert(model: Any, address: int, time: float) -> None:
+    """Fill what the rows see and do, where bodies are placed by `move` and inputs known, and their states' rates."""
+    tables, control, x, work = model.tables, model.control, model.state, model.work
+    width = work.torque.size
+    if tables.loaded:
+        tip_forces(control, time, tables)
+        _tips(tables, work)
+    for j in range(width):
+        work.torque[j] = 0.0
+    if model.measure != 0:
+        call_at(model.measure, address, time)
+    _see(tables, x[:width], x[width : 2 * width], x[2 * width :], work)
+    _act(tables, work)
+    _drive(tables, work, model.rate[2 * width :])
+
+
+@compiled
 def evaluate(model: Any, address: int, time: float) -> None:
     """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
     tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
     size, width = tables.parents.size, work.torque.size
-    q, v, z = x[:width], x[width : 2 * width], x[2 * width :]
+    q, v = x[:width], x[width : 2 * width]
     inputs(control, time, q, v, work.command)
     if model.carry != 0:
         call_at(model.carry, address, time)
     move(tables, q, v, work)
-    if tables.loaded:
-        tip_forces(control, time, tables)
-        _tips(tables, work)
-    if model.measure != 0:
-        call_at(model.measure, address, time)
-    _see(tables, q, v, z, work)
-    _exert(tables, v, z, work)
-    _drive(tables, work, rate[2 * width :])
+    call_at(model.exert, address, time)
     mass_matrix(tables, work)
     factorise_mass(tables, size, work)
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)

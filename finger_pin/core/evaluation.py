@@ -31,20 +31,25 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self._charts = Charts.of(mechanism)
         self._tables = build_tables(mechanism)
-        # Each has work of its own: without loads, nothing writes where loads have left their torques.
-        self._models = [self._bound(loaded) for loaded in (False, True)]
+        self._models: dict[tuple[bool, int], BoundModel] = {}
 
-    def _bound(self, loaded: bool) -> BoundModel:
-        """Return a model with memory of its own, that minds forces at the tips or not."""
-        mechanism, tables = self.mechanism, self._tables
-        own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
-        work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
-        return BoundModel(own, held_control(mechanism.channels, mechanism.coordinates), work, mechanism.moved)
+    def _model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
+        """Return a thread's model that minds forces at the tips or not.
+
+        Each has memory of its own: without loads, nothing writes where loads have left their torques.
+        """
+        if (loaded, thread) not in self._models:
+            mechanism, tables = self.mechanism, self._tables
+            own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
+            work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
+            control = held_control(mechanism.channels, mechanism.coordinates)
+            self._models[loaded, thread] = BoundModel(own, control, work, mechanism.moved)
+        return self._models[loaded, thread]
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
         mechanism, several = self.mechanism, np.ndim(x) > 1
-        packed, filled = self._filled(x, command, force, base, len(self._models[0].model.work.rows))
+        packed, filled = self._filled(x, command, force, base)
         rates, rows, torques, externals, booked = filled
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         acceleration, rate = rates[:, width : 2 * width], rates
@@ -83,14 +88,14 @@ class CompiledMechanism:
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
-        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, 0)
+        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, booked_only=True)
         return booked[:, len(self.mechanism.books.stored) :], externals
 
     def _filled(
-        self, x: Array, command: Array, force: Array | None, base: Array | None, columns: int
+        self, x: Array, command: Array, force: Array | None, base: Array | None, *, booked_only: bool = False
     ) -> tuple[Array, tuple[Array, ...]]:
-        """Return packed states, and what `evaluate_many` fills for them, with so many columns of the rows."""
-        mechanism, tables = self.mechanism, self._models[0].model.tables
+        """Return packed states, and what `evaluate_many` fills for them: all, or energies, powers and J^T F only."""
+        mechanism, tables = self.mechanism, self._tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
         packed = _rows(x, np.atleast_2d(x).shape)
@@ -101,10 +106,11 @@ class CompiledMechanism:
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
-        bases = _bases(base, count, len(self._models[0].model.work.guide))
+        bases = _bases(base, count, int(tables.guided.max(initial=-1)) + 1)
         states, attitudes = self._charts.to_core(packed)
         books = len(mechanism.books.stored) + len(mechanism.books.powers)
-        rates, rows = np.zeros_like(states), np.zeros((count, columns, len(tables.state)))
+        kept = 0 if booked_only else count
+        rates, rows = np.zeros((kept, states.shape[1])), np.zeros((kept, *self._model().model.work.rows.shape))
         torques, externals, booked = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, books))
 
         def fill(model: BoundModel, part: slice) -> None:
@@ -123,10 +129,10 @@ class CompiledMechanism:
             )
 
         if count < _FEW:
-            fill(self._models[loaded], slice(None))
+            fill(self._model(loaded), slice(None))
         else:
             half = count // 2
-            models = (self._models[loaded], self._bound(loaded))
+            models = (self._model(loaded), self._model(loaded, 1))
             in_threads(lambda each: fill(*each), list(zip(models, (slice(half), slice(half, None)), strict=True)))
         return packed, (rates, np.moveaxis(rows, 1, 0), torques, externals, booked)
 
@@ -135,11 +141,11 @@ class CompiledMechanism:
 
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
-        tables = self._models[0].model.tables
+        tables = self._tables
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
         given = _rows(position, shape), _rows(velocity, shape)
-        motion_many(self._models[0].address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
+        motion_many(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
 

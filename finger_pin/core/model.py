@@ -7,14 +7,14 @@ optimised again there.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
 from finger_pin.core import condensation, contacts, dynamics, linearisation, paths
-from finger_pin.core.binding import Vector, block_for, bound_at, kind_of, put
-from finger_pin.core.compilation import address_of, entry
+from finger_pin.core.binding import Vector, bound, bound_at, kind_of
+from finger_pin.core.compilation import address_of
 from finger_pin.core.inputs import Control, move_base
 from finger_pin.core.linearisation import Linear, build_linear
 from finger_pin.core.rigid_body import base_power, bias_rate
@@ -32,9 +32,10 @@ class Model(NamedTuple):
         state: Where it is evaluated, shape (size,).
         rate: What comes out, shape (size,).
         evaluate: Address of the function that fills ``rate``, at a time.
+        exert: Address of what it calls for the rows.
         linearise: Address of the function that fills all partial derivatives after it, at a time.
         condense: Address of the function that fills the solution of (g - J) u = r for a g; 0 where it is singular.
-        measure: Address of what `evaluate` calls for paths through space; 0 without any, as for the next three.
+        measure: Address of what `exert` calls for paths through space and contacts; 0 without, as for the next three.
         turn: Address of what `linearise` calls for them.
         touch: Address of what `condense` calls for contacts.
         press: Address of what it calls for the pin of a row that their forces may pass.
@@ -50,6 +51,7 @@ class Model(NamedTuple):
     state: Vector
     rate: Vector
     evaluate: int
+    exert: int
     linearise: int
     condense: int
     measure: int
@@ -82,22 +84,17 @@ class BoundModel:
             *(_units_for_base() if moved else (0, 0, 0)),
         )
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
-        self._block = block_for(MODEL)
-        bind(self.model, self._block)
+        self._block = bound(self.model, MODEL)
         self.address = int(self._block.ctypes.data)
 
 
-@entry
-def bind(model: Any, block: Any) -> None:
-    """Write into a block, made by `block_for(MODEL)`, where all of a model lies."""
-    put(block, model, MODEL)
-
-
 @cache
-def _units() -> tuple[int, int, int]:
+def _units() -> tuple[int, int, int, int]:
     kind = types.int64(types.int64, types.float64)
-    evaluate, linearise, condense = (address_of(kind, each, kept=True) for each in (_evaluate, _linearise, _condense))
-    return evaluate, linearise, condense
+    evaluate, exert, linearise, condense = (
+        address_of(kind, each, kept=True) for each in (_evaluate, _exert, _linearise, _condense)
+    )
+    return evaluate, exert, linearise, condense
 
 
 @cache
@@ -122,6 +119,12 @@ def _evaluate(address: int, time: float) -> int:
     return 1
 
 
+def _exert(address: int, time: float) -> int:
+    model = bound_at(address, MODEL)
+    dynamics.exert(model, address, time)
+    return 1
+
+
 def _linearise(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
     linearisation.linearise(model, address, time)
@@ -135,7 +138,10 @@ def _condense(address: int, g: float) -> int:
 
 def _measure(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
-    paths.measure_paths(model.tables, model.work)
+    tables, work, width = model.tables, model.work, model.work.torque.size
+    paths.measure_paths(tables, work)
+    if tables.touching:
+        contacts.exert_contacts(tables, model.state[width : 2 * width], model.state[2 * width :], work)
     return 1
 
 

@@ -28,64 +28,49 @@ MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
 @compiled
 def _place(tables: Any, i: int, angle: float, work: Any) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
-    body, parent, rotation = tables.bodies[i], tables.parents[i], work.rotation[i]
-    frame = work.frame
-    if parent < 0:
-        for r in range(3):
-            for c in range(3):
-                frame[r, c] = body[ROTATION + 3 * r + c]
-            work.origin[i, r] = body[TRANSLATION + r]
-    else:
-        above = work.rotation[parent]
-        for r in range(3):
-            for c in range(3):
-                frame[r, c] = (
-                    above[r, 0] * body[ROTATION + c]
-                    + above[r, 1] * body[ROTATION + 3 + c]
-                    + above[r, 2] * body[ROTATION + 6 + c]
-                )
-            work.origin[i, r] = (
-                work.origin[parent, r]
-                + above[r, 0] * body[TRANSLATION]
-                + above[r, 1] * body[TRANSLATION + 1]
-                + above[r, 2] * body[TRANSLATION + 2]
-            )
+    body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
+    ax, ay, az = body[ROTATION], body[ROTATION + 1], body[ROTATION + 2]
+    bx, by, bz = body[ROTATION + 3], body[ROTATION + 4], body[ROTATION + 5]
+    cx, cy, cz = body[ROTATION + 6], body[ROTATION + 7], body[ROTATION + 8]
+    x, y, z = body[TRANSLATION], body[TRANSLATION + 1], body[TRANSLATION + 2]
     prismatic = tables.kinds[i] == PRISMATIC
     sine, cosine = (0.0, 1.0) if prismatic else sine_cosine(angle)
+    slid = angle if prismatic else 0.0
     for r in range(3):
-        rotation[r, 0] = cosine * frame[r, 0] + sine * frame[r, 1]
-        rotation[r, 1] = cosine * frame[r, 1] - sine * frame[r, 0]
-        rotation[r, 2] = frame[r, 2]
-        if prismatic:
-            work.origin[i, r] += angle * frame[r, 2]
+        a, b, c, start = 1.0 * (r == 0), 1.0 * (r == 1), 1.0 * (r == 2), 0.0
+        if parent >= 0:
+            above = work.rotation[parent, r]
+            a, b, c, start = above[0], above[1], above[2], work.origin[parent, r]
+        # A row of the frame before the joint moves.
+        u, v, w = a * ax + b * bx + c * cx, a * ay + b * by + c * cy, a * az + b * bz + c * cz
+        rotation[r, 0], rotation[r, 1], rotation[r, 2] = cosine * u + sine * v, cosine * v - sine * u, w
+        origin[r] = start + a * x + b * y + c * z + slid * w
 
 
 @compiled
 def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
     """Express the inertia of body i about O in base axes."""
-    body, rotation, out = tables.bodies[i], work.rotation[i], work.inertia[i]
-    mass = body[MASS]
+    body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
+    mass, x, y, z = body[MASS], body[CENTRE], body[CENTRE + 1], body[CENTRE + 2]
     ixx, ixy, ixz = body[INERTIA], body[INERTIA + 1], body[INERTIA + 2]
     iyy, iyz, izz = body[INERTIA + 3], body[INERTIA + 4], body[INERTIA + 5]
-    centre = work.centre
-    for r in range(3):
-        centre[r] = (
-            work.origin[i, r]
-            + rotation[r, 0] * body[CENTRE]
-            + rotation[r, 1] * body[CENTRE + 1]
-            + rotation[r, 2] * body[CENTRE + 2]
-        )
-    squared = centre[0] * centre[0] + centre[1] * centre[1] + centre[2] * centre[2]
-    out[0] = mass
-    position = 4
-    for r in range(3):
-        out[1 + r] = mass * centre[r]
-        a, b, c = rotation[r, 0], rotation[r, 1], rotation[r, 2]
-        x, y, z = a * ixx + b * ixy + c * ixz, a * ixy + b * iyy + c * iyz, a * ixz + b * iyz + c * izz
-        for s in range(r, 3):
-            value = x * rotation[s, 0] + y * rotation[s, 1] + z * rotation[s, 2] - mass * centre[r] * centre[s]
-            out[position] = value + mass * squared if r == s else value
-            position += 1
+    ax, ay, az = rotation[0, 0], rotation[0, 1], rotation[0, 2]
+    bx, by, bz = rotation[1, 0], rotation[1, 1], rotation[1, 2]
+    cx, cy, cz = rotation[2, 0], rotation[2, 1], rotation[2, 2]
+    # The centre of mass, and rows of R I.
+    px = origin[0] + ax * x + ay * y + az * z
+    py = origin[1] + bx * x + by * y + bz * z
+    pz = origin[2] + cx * x + cy * y + cz * z
+    ux, uy, uz = ax * ixx + ay * ixy + az * ixz, ax * ixy + ay * iyy + az * iyz, ax * ixz + ay * iyz + az * izz
+    vx, vy, vz = bx * ixx + by * ixy + bz * ixz, bx * ixy + by * iyy + bz * iyz, bx * ixz + by * iyz + bz * izz
+    wx, wy, wz = cx * ixx + cy * ixy + cz * ixz, cx * ixy + cy * iyy + cz * iyz, cx * ixz + cy * iyz + cz * izz
+    out[0], out[1], out[2], out[3] = mass, mass * px, mass * py, mass * pz
+    out[4] = ux * ax + uy * ay + uz * az + mass * (py * py + pz * pz)
+    out[5] = ux * bx + uy * by + uz * bz - mass * px * py
+    out[6] = ux * cx + uy * cy + uz * cz - mass * px * pz
+    out[7] = vx * bx + vy * by + vz * bz + mass * (px * px + pz * pz)
+    out[8] = vx * cx + vy * cy + vz * cz - mass * py * pz
+    out[9] = wx * cx + wy * cy + wz * cz + mass * (px * px + py * py)
 
 
 @compiled

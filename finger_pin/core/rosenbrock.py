@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of, put
+from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of
 from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
+from finger_pin.core.drift import carry
 from finger_pin.core.inputs import HELD
 from finger_pin.core.kinks import hold, release, strayed, turn
 from finger_pin.core.model import MODEL
@@ -18,7 +19,7 @@ from finger_pin.core.tableaus import Tableau
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
-HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, MEMORY_SIZE = range(10, 16)
+HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, BEHIND, MEMORY_SIZE = range(10, 17)
 DONE, FULL, UNDERFLOW, NOT_FINITE, CREEPING, RUNAWAY = range(6)
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
@@ -91,7 +92,8 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
             release(tables, rows)
         elif tables.touching and i == tableau.nodes.size - 1:
             wake(tables, model.work.paths, x, state)
-        if i > 0 or fresh:
+        # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
+        if i > 0 or fresh or tables.loaded or tables.touching > 0:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
@@ -143,53 +145,12 @@ def _worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
     return index
 
 
-@compiled
-def _carry(linear: Any, g: float, gamma: float, joints: int, drift: Any, difference: Any, r: Any, u: Any) -> Any:
-    """Carry the estimated error over a step: that so far along the linearised flow, plus that of the step.
-
-    The flow exp(h J) is the rational function of second order in (1 - h gamma J)^-1 that vanishes for fast decay.
-
-    Returns:
-        Mean square of the joints' part.
-    """
-    size = drift.size
-    first, second = 1.0 / gamma - 1.0, 0.5 / gamma**2 - 1.0
-    cubic = second - 2.0 * first
-    square = first - 2.0 * cubic
-    weights = (1.0 - square - cubic, square, cubic)
-    for c in range(size):
-        u[c] = drift[c]
-        drift[c] = difference[c]
-    r[size] = 0.0
-    for weight in weights:
-        for c in range(size):
-            r[c] = g * u[c]
-        solve(linear, r, u)
-        for c in range(size):
-            drift[c] += weight * u[c]
-    total = 0.0
-    for c in range(joints):
-        total += drift[c] * drift[c]
-    if not total <= joints:
-        # Beyond a radian the linearised flow says nothing more.
-        for c in range(size):
-            drift[c] = drift[c] / np.sqrt(total / joints) if total < np.inf else 0.0
-        return 1.0
-    return total / joints
-
-
-@entry
-def bind(integration: Any, block: Any) -> None:
-    """Write into a block, made by `block_for(INTEGRATION)`, where all that an integration works on lies."""
-    put(block, integration, INTEGRATION)
-
-
 @entry
 def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, dense: Any) -> Any:
     """Take steps until the end, or until the record is full; return a status and the number of steps recorded.
 
     Args:
-        block: Filled by `bind`.
+        block: An `Integration`, bound.
         end: Time to reach, s.
         times: Record of the times at which steps end, shape (m,); of length zero to record nothing.
         states: Record of the states there, with the angles of free bodies since the step's start, shape (m, size).
@@ -246,7 +207,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
         if fresh:
             memory[JACOBIANS] += 1
         memory[FACTORISATIONS] += 1
-        memory[EVALUATIONS] += count if fresh else count - 1
+        memory[EVALUATIONS] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
         if outcome == 0:
             error = _error(x, reached, k[count - 1], rtol, atol)
         fresh = False
@@ -293,15 +254,8 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
             if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False
-            mean = _carry(
-                model.linear,
-                1.0 / (h * tableau.gamma),
-                tableau.gamma,
-                joints,
-                integration.drift,
-                k[count - 1],
-                r,
-                model.rate,
+            mean, memory[BEHIND] = carry(
+                model.linear, h, tableau.gamma, joints, integration.drift, k[count - 1], memory[BEHIND], r, model.rate
             )
             memory[DRIFT] += h * mean
             if tables.touching:

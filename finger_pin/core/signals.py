@@ -48,8 +48,8 @@ def evaluate_many(
         states: Shape (m, size).
         commands: Shape (m, u).
         forces: At the tips, shape (m, t, 3).
-        rates: Filled with the rates, shape (m, size).
-        rows: Filled with the table of rows, shape (m, columns, K), or of no columns.
+        rates: Filled with the rates, shape (m, size), or (0, size) if only J^T F, energies and powers are wanted.
+        rows: Filled with the table of rows, shape (m, columns, K), or (0, columns, K).
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
         booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
@@ -69,12 +69,22 @@ def evaluate_many(
             model.state[c] = states[m, c]
         _set_base(bases, m, tables, work)
         place_bodies(tables, attitudes[m])
-        call_at(model.evaluate, address, 0.0)
-        for c in range(states.shape[1]):
-            rates[m, c] = model.rate[c]
-        for c in range(rows.shape[1]):
-            for k in range(rows.shape[2]):
-                rows[m, c, k] = work.rows[c, k]
+        if rates.shape[0] > 0 or bases.shape[0] > 0:
+            call_at(model.evaluate, address, 0.0)
+        else:
+            # Powers do not need the acceleration, and only some rows need to know where bodies are.
+            for i in range(commands.shape[1]):
+                work.command[i] = commands[m, i]
+            if tables.loaded or tables.paths.columns.size > 0:
+                width = work.torque.size
+                move(tables, model.state[:width], model.state[width : 2 * width], work)
+            call_at(model.exert, address, 0.0)
+        if rates.shape[0] > 0:
+            for c in range(states.shape[1]):
+                rates[m, c] = model.rate[c]
+            for c in range(rows.shape[1]):
+                for k in range(rows.shape[2]):
+                    rows[m, c, k] = work.rows[c, k]
         for j in range(torques.shape[1]):
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]

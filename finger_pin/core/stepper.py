@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
-from finger_pin.core.binding import block_for
+from finger_pin.core.binding import bound
 from finger_pin.core.charts import Charts, place_all
 from finger_pin.core.drives import Drives, advance_driven
 from finger_pin.core.inputs import Control
@@ -107,8 +107,7 @@ class Part:
             drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
         )
-        self._block = block_for(core.INTEGRATION)
-        core.bind(self._bound, self._block)
+        self._block = bound(self._bound, core.INTEGRATION)
         place_all(tables, attitude)
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
@@ -192,8 +191,9 @@ class Stepper:
         rtol: float,
         atol: Array,
         force: Array | None = None,
+        time: float = 0.0,
     ) -> None:
-        """Start at time zero.
+        """Start from a state.
 
         Args:
             mechanism: The mechanism.
@@ -203,6 +203,7 @@ class Stepper:
             rtol: Relative tolerance.
             atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
+            time: When, s.
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
         tables = build_tables(mechanism)
@@ -220,7 +221,7 @@ class Stepper:
             # An island that nothing pushes computes as it does alone.
             own = own._replace(loaded=bool(len(inputs.force.harmonics) or np.any(own.tip_force)))
             memory = np.zeros(core.MEMORY_SIZE)
-            memory[core.STEP] = _FIRST_STEP
+            memory[[core.TIME, core.STEP]] = time, _FIRST_STEP
             at = self._places(island)
             free = np.isin(tables.charts, island.coordinates)
             self.parts.append(
@@ -256,8 +257,8 @@ class Stepper:
     def estimated_error(self) -> float:
         """Estimate of the error of the joints' angles so far, root mean square over joints and time, rad.
 
-        The local errors are carried along the linearised flow. A motion that is sensitive makes it grow, mostly by
-        more than the error itself.
+        The local errors are carried along the linearised flow. It is seldom below a third of the error, and
+        often far above it.
         """
         sizes = [len(part.tables.parents) for part in self.parts]
         total = sum(size * part.memory[core.DRIFT] for size, part in zip(sizes, self.parts, strict=True))

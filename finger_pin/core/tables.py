@@ -155,7 +155,6 @@ class Work(NamedTuple):
 
     rotation: Layers
     origin: Matrix
-    frame: Matrix
     centre: Vector
     base_velocity: Vector
     base_acceleration: Vector
@@ -361,7 +360,6 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
     return Work(
         rotation=np.zeros((size, 3, 3)),
         origin=np.zeros((size, 3)),
-        frame=np.zeros((3, 3)),
         centre=np.zeros(3),
         base_velocity=np.zeros(6),
         base_power=np.zeros(1),

@@ -12,13 +12,8 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.parameters import (
-    FingerDescription,
-    JointFriction,
-    PassiveTendon,
-    StrokeLimiter,
-    TendonFriction,
-)
+from finger_pin.description.friction import JointFriction, TendonFriction
+from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiter
 from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.validation import (

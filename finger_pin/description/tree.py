@@ -13,6 +13,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.description.meshes import Mesh
 from finger_pin.description.validation import (
     MOST_ANGLE,
     Description,
@@ -34,11 +35,12 @@ Pair = tuple[float, float]
 class Solid(Description):
     """What is seen of a body."""
 
-    kind: Annotated[Literal["sphere", "capsule", "cylinder", "box"], choice("sphere", "capsule", "cylinder", "box")] = (
-        quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder or box.")
-    )
+    kind: Annotated[
+        Literal["sphere", "capsule", "cylinder", "box", "mesh"], choice("sphere", "capsule", "cylinder", "box", "mesh")
+    ] = quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder, box or mesh.")
+    mesh: Name | None = Field(None, description="Of a mesh, which one of the tree's.")
     radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
-        0.0, unit="m", source="design", doc="Of all but a box."
+        0.0, unit="m", source="design", doc="Of all but a box and a mesh."
     )
     length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
         0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
@@ -47,11 +49,17 @@ class Solid(Description):
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
     )
     position: Annotated[Triple, PLACE] = quantity(
-        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
     )
+
+    @model_validator(mode="after")
+    def _which(self) -> Self:
+        if self.kind == "mesh" and self.mesh is None:
+            raise problem("mesh", 'is missing: kind = "mesh" needs the name of one')
+        return self
 
 
 class Body(Description):
@@ -200,6 +208,7 @@ class Tree(Description):
     couplings: dict[Name, Coupling] = Field({}, description="By name.")
     actuators: dict[Name, Actuator] = Field({}, description="By name.")
     tip: Tip = Tip()
+    meshes: dict[Name, Mesh] = Field({}, description="What solids are made of, by name.")
     left_out: tuple[str, ...] = Field((), description="What the model had that is not here.")
 
     @model_validator(mode="after")
@@ -208,6 +217,8 @@ class Tree(Description):
         for name, body in self.bodies.items():
             _check(f"bodies.{name}.parent", body.parent, known, "body before it")
             known.append(name)
+            for key, solid in body.solids.items():
+                _check(f"bodies.{name}.solids.{key}.mesh", solid.mesh, self.meshes, "mesh")
         for name, joint in self.joints.items():
             _check(f"joints.{name}.body", joint.body, self.bodies, "body")
         order = [known.index(joint.body) for joint in self.joints.values()]

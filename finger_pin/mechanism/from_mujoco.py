@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.description.meshes import Mesh
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import MOST_ANGLE, validate
@@ -24,6 +25,8 @@ _STOP_SLIDING = 1e4
 _LEAST_FRICTION = 1e-7
 # Time constant with which a coupled joint follows, critically damped, s.
 _COUPLED = 0.005
+# Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
+_HIDDEN = 3
 
 
 def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
@@ -103,6 +106,7 @@ class _Reader:
                 "couplings": self._couplings(),
                 "actuators": self._actuators(),
                 "tip": self._tip(),
+                "meshes": self._meshes(bodies),
                 "left_out": self.rest.listed(),
             },
         }
@@ -140,26 +144,38 @@ class _Reader:
         }
 
     def _solids(self, body: int) -> Table:
-        """Return what is seen of a body: its primitives, or boxes around its meshes if it moves and has none."""
-        model, kinds = self.model, self.mujoco.mjtGeom
-        primitives, boxes = {}, {}
-        for i in np.flatnonzero(model.geom_bodyid == body):
+        """Return what MuJoCo's viewer shows of a body, where it hides all, all; meshes only of what moves."""
+        model, kinds, found = self.model, self.mujoco.mjtGeom, {}
+        own = np.flatnonzero(model.geom_bodyid == body)
+        shown = own[model.geom_group[own] < _HIDDEN]
+        for i in shown if len(shown) else own:
             kind, size = model.geom_type[i], model.geom_size[i]
             place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
             radius, length = float(size[0]), 2.0 * float(size[1])
             if kind == kinds.mjGEOM_SPHERE:
-                primitives[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+                found[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
             elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
                 name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
-                primitives[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+                found[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
             elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
-                primitives[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
-            elif kind == kinds.mjGEOM_MESH:
-                middle, half = np.split(model.geom_aabb[i], 2)
-                place["position"] = (model.geom_pos[i] + rotation(place["orientation"]) @ middle).tolist()
-                boxes[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * half).tolist(), **place}
-        # What stands still is only in the way.
-        return primitives or (boxes if model.body_weldid[body] else {})
+                found[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+            elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
+                # A forearm that stands still would be in the way.
+                name = self.names.meshes[model.geom_dataid[i]]
+                found[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **place}
+        return found
+
+    def _meshes(self, bodies: list[int]) -> Table:
+        """Return the meshes that the solids of bodies are made of."""
+        model, names = self.model, self.names.meshes
+        used = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
+        found = {}
+        for i in range(model.nmesh):
+            points = slice(model.mesh_vertadr[i], model.mesh_vertadr[i] + model.mesh_vertnum[i])
+            faces = slice(model.mesh_faceadr[i], model.mesh_faceadr[i] + model.mesh_facenum[i])
+            if names[i] in used:
+                found[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
+        return found
 
     def _joint(self, i: int) -> Table:
         model, dof = self.model, int(self.model.jnt_dofadr[i])

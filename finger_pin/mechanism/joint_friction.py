@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.description.friction import JointFriction as Friction
+from finger_pin.description.friction import TendonFriction
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
@@ -47,12 +49,7 @@ class JointFriction:
             loads=loads,
             kinetic=expand(law.coulomb, size),
             static=expand(law.stiction, size),
-            stiffness=expand(law.stiffness, size),
-            viscous=expand(law.viscous, size),
-            stribeck_velocity=expand(law.stribeck_velocity, size),
-            floor=expand(law.floor, size),
-            stribeck_exponent=expand(law.stribeck_exponent, size),
-            lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
+            **bristles(law, size),
         )
 
     def rows(self, names: tuple[str, ...], pulled: Array, width: int) -> Rows:
@@ -72,21 +69,17 @@ class JointFriction:
             group="joint_friction",
             law=PIN_FRICTION,
             names=names,
-            parameters=np.array(
-                [
-                    self.kinetic,
-                    self.static,
-                    self.stiffness,
-                    self.viscous,
-                    self.stribeck_velocity,
-                    self.floor,
-                    self.stribeck_exponent,
-                    self.lag,
-                ]
-            ),
+            parameters=np.array([getattr(self, name) for name in PIN_FRICTION.parameters]),
             arm=np.eye(size, width),
             loads=loads,
             pins=np.arange(size),
             stored="joint_bristles",
             powers=("joint_coulomb", "joint_viscous", "joint_micro_damping"),
         )
+
+
+def bristles(law: Friction | TendonFriction, size: int) -> dict[str, Array]:
+    """Return what friction of tendons and of joints has alike, by the laws' names, a number for each of ``size``."""
+    names = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
+    found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
+    return found | {"lag": expand(law.micro_damping, size) / found["stiffness"]}

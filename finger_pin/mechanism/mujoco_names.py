@@ -20,6 +20,7 @@ class Names:
     tendons: list[str]
     sites: list[str]
     geoms: list[str]
+    meshes: list[str]
 
     @classmethod
     def of(cls, model: Any) -> Names:
@@ -30,6 +31,7 @@ class Names:
             tendons=distinct("tendon", [model.tendon(i).name for i in range(model.ntendon)]),
             sites=distinct("site", [model.site(i).name for i in range(model.nsite)]),
             geoms=distinct("geom", [model.geom(i).name for i in range(model.ngeom)]),
+            meshes=distinct("mesh", [model.mesh(i).name for i in range(model.nmesh)]),
         )
 
     def carrier(self, body: int, entry: str) -> Table:

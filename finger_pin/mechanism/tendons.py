@@ -12,6 +12,7 @@ from finger_pin.description.validation import expand
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.joint_friction import bristles
 from finger_pin.mechanism.rows import Rows
 
 
@@ -55,12 +56,7 @@ class Tendons:
             routing=routing,
             surface=expand(law.coulomb, size),
             stiction_ratio=expand(law.stiction_ratio, size),
-            stiffness=expand(law.stiffness, size),
-            viscous=expand(law.viscous, size),
-            stribeck_velocity=expand(law.stribeck_velocity, size),
-            floor=expand(law.floor, size),
-            stribeck_exponent=expand(law.stribeck_exponent, size),
-            lag=expand(law.micro_damping, size) / expand(law.stiffness, size),
+            **bristles(law, size),
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
             mass=expand(passive.mass, routing.passive),
         )
@@ -94,18 +90,8 @@ class Tendons:
         driven[:, :joints] = routing.coupling
         driven[actuated:] = np.eye(passive, width, joints)
         bends[:, :joints] = routing.curvature_matrix
-        friction = np.array(
-            [
-                self.surface,
-                self.stiction_ratio,
-                self.stiffness,
-                self.viscous,
-                self.stribeck_velocity,
-                self.floor,
-                self.stribeck_exponent,
-                self.lag,
-            ]
-        )
+        shared = (getattr(self, name) for name in PASSIVE_FRICTION.parameters[2:])
+        friction = np.array([self.surface, self.stiction_ratio, *shared])
         losses = ("tendon_coulomb", "tendon_viscous", "tendon_micro_damping")
         names = routing.passive_names
         pulled = np.zeros((actuated, 0)) if actuators is None else actuators.pulled

@@ -9,8 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.control.sampling import SampledController
-from finger_pin.core.textbook import Stop, Trajectory, integrate
+from finger_pin.control.compiled import compiled_control
+from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.inputs import Control
+from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.textbook import Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
@@ -24,9 +28,12 @@ _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]])
 _CHUNK = 4096
 # What may stay open, of all energy exchanged and in J, before the stretches of the motion where most of it stands open
-# are integrated again, and how finely; at most so many stretches, in so many steps altogether.
-_CLOSED, _NOTHING, _FINE = 1e-5, 1e-8, 1e-9
-_MOST_REFINED, _MOST_STEPS = 20, 5_000
+# are integrated again, and how finely; at most so many stretches, in about so many steps altogether.
+_CLOSED, _NOTHING, _FINE = 1e-5, 1e-9, 1e-10
+_MOST_REFINED, _MOST_STEPS = 500, 50_000
+# A power may bend inside a step where no force does, as that which a limiter loses where it would have to pull: how
+# often steps are halved there.
+_HALVINGS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +73,13 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     gained = total - total[0]
-    steps = itertools.count()
-    # A controller that acts in between is not asked again: there the account stays as it is.
-    sampled = loop.drives is not None or isinstance(loop.controller, SampledController)
-    for begin, end in [] if sampled else _open(gained - works.net, works.values, times, trajectory.breakpoints):
-        _refine(loop, trajectory, begin, end, times, works.values, lambda: next(steps) > _MOST_STEPS)
+    # A controller that acts in between is not asked again, and without the compiled core a method of scipy is as fine
+    # as its tolerance: there the account stays as it is.
+    compiled = loop.drives is None and isinstance(loop.dynamics, CompiledFinger)
+    control, taken = compiled_control(loop) if compiled else None, 0
+    for stretch in _open(gained - works.net, works.values, times, trajectory.breakpoints):
+        if control is not None and taken < _MOST_STEPS:
+            taken += _refine(loop, control, trajectory, stretch, times, works.values)
     return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
 
 
@@ -86,39 +95,63 @@ def _open(residual: Array, works: Array, times: Array, breakpoints: Array) -> li
     last = np.searchsorted(breakpoints, times[worst + 1], side="left")
     found: list[tuple[float, float]] = []
     for begin, end in sorted(zip(breakpoints[first], breakpoints[np.minimum(last, len(breakpoints) - 1)], strict=True)):
-        if found and begin < found[-1][1]:
-            begin, end = found[-1][0], max(end, found.pop()[1])
-        found.append((float(begin), float(end)))
+        # Every stretch begins anew on the motion that was simulated: they share no step.
+        begin = max(begin, found[-1][1]) if found else begin
+        if begin < end:
+            found.append((float(begin), float(end)))
     return found
 
 
 def _refine(
-    loop: ClosedLoop, trajectory: Trajectory, begin: float, end: float, times: Array, works: Array, stop: Stop
-) -> None:
+    loop: ClosedLoop, control: Control, trajectory: Trajectory, stretch: tuple[float, float], times: Array, works: Array
+) -> int:
     """Integrate a stretch again, finely, and put its works in place of those of the steps that passed it.
 
     A step may end well and yet pass in between too far from the motion for its powers, as where a joint that starts
     deep in a stiff limiter is thrown back.
+
+    Returns:
+        Steps that it took.
     """
-    start = trajectory.interpolate(np.array([begin]))[0]
-    fine = integrate(
-        lambda instant, x: loop.rhs(begin + instant, x),
-        start,
-        end - begin,
-        method="Radau",
-        rtol=_FINE,
-        atol=_FINE * loop.finger.layout.scales(),
-        stop=stop,
+    begin, end = stretch
+    start, tolerances = trajectory.interpolate(np.array([begin]))[0], _FINE * loop.finger.layout.scales()
+    tableau = TABLEAUS["Rodas5P"]()
+    stepper = Stepper(loop.finger.mechanism, control, start, tableau, _FINE, tolerances, loop.fingertip_force, begin)
+    looks = itertools.count()
+    fine = integrate_compiled(
+        stepper,
+        end,
+        loop.finger.layout.names,
+        knots=loop.knots(),
+        chunk=_CHUNK,
+        stop=lambda: next(looks) > _MOST_STEPS // _CHUNK,
     )
     if fine.failure or fine.interrupted:
-        return
+        return fine.statistics.steps
     inside = (times > begin) & (times < end)
     at, count = np.append(times[inside], end), works.shape[1]
     steps = trajectory.breakpoints[(trajectory.breakpoints >= begin) & (trajectory.breakpoints <= end)]
-    more = _works(loop, np.unique(begin + fine.breakpoints), lambda nodes: fine.interpolate(nodes - begin), at, count)
+    allowed = 1e-3 * _CLOSED * float(np.sum(np.max(np.abs(works), axis=0)))
+    more = _works(loop, _halved(loop, fine, count, allowed), fine.interpolate, at, count)
     more -= _works(loop, steps, trajectory.interpolate, at, count)
     works[inside] += more[:-1]
     works[times >= end] += more[-1]
+    return fine.statistics.steps
+
+
+def _halved(loop: ClosedLoop, trajectory: Trajectory, count: int, allowed: float) -> Array:
+    """Return ends of steps, some of them halved until no work, J, changes by more than is allowed for one."""
+    ends = trajectory.breakpoints
+    for _ in range(_HALVINGS):
+        middles = 0.5 * (ends[:-1] + ends[1:])
+        both = [
+            _works(loop, panels, trajectory.interpolate, ends, count) for panels in (ends, np.union1d(ends, middles))
+        ]
+        bent = np.max(np.abs(np.diff(both[1] - both[0], axis=0)), axis=1) > allowed
+        if not bent.any():
+            break
+        ends = np.union1d(ends, middles[bent])
+    return ends
 
 
 def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[tuple[ClosedLoop, Array, Callable[[Array], Array]]]:

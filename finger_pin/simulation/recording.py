@@ -92,25 +92,20 @@ def record(
     further = loop.finger.further
     variables = _signals(loop, times, signals, motion) | contact_variables(loop.finger, signals.finger)
     variables |= _further(further, signals.finger.mechanism) | _energies(kept)
-    dataset = xr.Dataset(
-        {name: (dims, values, attributes) for name, (dims, values, attributes) in variables.items()},
-        coords={
-            "time": ("time", times, {"units": "s", "long_name": "time"}),
-            "joint": ("joint", list(routing.joints), {"long_name": "joint"}),
-            "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
-            "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
-        },
-        attrs=_attributes(scenario, trajectory, method),
-    )
-    dataset = dataset.assign_coords({table.group: list(table.names) for table in further})
-    dataset = dataset.assign_coords(contact_coordinates(loop.finger))
+    coordinates: dict[str, Any] = {
+        "time": ("time", times, {"units": "s", "long_name": "time"}),
+        "joint": ("joint", list(routing.joints), {"long_name": "joint"}),
+        "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
+        "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
+    }
+    coordinates |= {table.group: list(table.names) for table in further} | contact_coordinates(loop.finger)
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
-        dataset = dataset.assign_coords(finger=list(scenario.hand.fingers))
+        coordinates["finger"] = list(scenario.hand.fingers)
     if routing.passive > 1:
-        dataset = dataset.assign_coords(passive_tendon=list(routing.passive_names))
+        coordinates["passive_tendon"] = list(routing.passive_names)
     if loop.finger.actuators.names:
-        dataset = dataset.assign_coords(motor=("motor", list(loop.finger.actuators.names), {"long_name": "motor"}))
-    return dataset
+        coordinates["motor"] = ("motor", list(loop.finger.actuators.names), {"long_name": "motor"})
+    return xr.Dataset(variables, coords=coordinates, attrs=_attributes(scenario, trajectory, method))
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:

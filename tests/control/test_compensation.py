@@ -8,7 +8,6 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.direction import direction
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.exceptions import InputError
@@ -139,32 +138,32 @@ def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     finger = fp.Finger(scenario.finger)
     feedforward = fp.control.build_controller(scenario, finger).tendons
     planned = np.array([1.0, 2.5, 3.0, 4.0, 5.0])
-    for position, velocity in zip(*postures(4, 3), strict=True):
-        command = feedforward.command(planned, position, velocity)
-        x = finger.rest_state(position)
-        state = finger.layout.unpack(x)
-        state.velocity[:] = velocity
-        for _ in range(10000):
-            forces = finger.evaluate(x, command[:4]).tendons
-            state.tendon_stiction[:] += 1e-5 * forces.stiction_rate
-        np.testing.assert_allclose(forces.strands[:4], planned[:4], rtol=1e-7)
+    positions, velocities = postures(4, 3)
+    command = np.stack([feedforward.command(planned, *each) for each in zip(positions, velocities, strict=True)])
+    x = np.stack([finger.rest_state(position) for position in positions])
+    state = finger.layout.unpack(x)
+    state.velocity[:] = velocities
+    for _ in range(2000):
+        forces = finger.evaluate(x, command[:, :4]).tendons
+        state.tendon_stiction[:] += 5e-5 * forces.stiction_rate
+    np.testing.assert_allclose(forces.strands[:, :4], np.tile(planned[:4], (4, 1)), rtol=1e-7)
 
 
-def settled_state(finger, position, velocity, command, halves):
+def settled_states(finger, position, velocity, command, halves):
     """The finger in mid-motion with all friction settled, and its passive tendon with given tensions of its halves."""
-    state = finger.layout.unpack(finger.rest_state(position))
-    passive = 3.5e-3 * position[2] - halves[0] / 1e5
-    assert 1e5 * (passive - 5e-3 * position[3]) == pytest.approx(halves[1], rel=1e-9)
-    speed = 0.5 * (3.5e-3 * velocity[2] + 5e-3 * velocity[3])
-    state = replace(state, velocity=velocity, passive_position=np.array([passive]), passive_velocity=np.array([speed]))
-    for _ in range(10000):
+    state = finger.layout.unpack(np.stack([finger.rest_state(each) for each in position]))
+    passive = 3.5e-3 * position[:, 2] - halves[0] / 1e5
+    np.testing.assert_allclose(1e5 * (passive - 5e-3 * position[:, 3]), halves[1], rtol=1e-9)
+    speed = 0.5 * (3.5e-3 * velocity[:, 2] + 5e-3 * velocity[:, 3])
+    state = replace(state, velocity=velocity, passive_position=passive[:, None], passive_velocity=speed[:, None])
+    for _ in range(2000):
         rate = finger.layout.unpack(finger.evaluate(finger.layout.pack(state), command).rate)
         state = replace(
             state,
-            tendon_stiction=state.tendon_stiction + 1e-5 * rate.tendon_stiction,
-            joint_stiction=state.joint_stiction + 2e-5 * rate.joint_stiction,
+            tendon_stiction=state.tendon_stiction + 5e-5 * rate.tendon_stiction,
+            joint_stiction=state.joint_stiction + 1e-4 * rate.joint_stiction,
         )
-    return state
+    return finger.layout.pack(state)
 
 
 def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction():
@@ -172,20 +171,19 @@ def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction(
     scenario = fig6(CONSISTENT, FEEDFORWARD, JOINTS, SHARP)
     finger = fp.Finger(scenario.finger)
     controller = fp.control.build_controller(scenario, finger)
-    for position, velocity in zip(*postures(3, 4), strict=True):
-        command = controller.command(0.0, ReferenceSignals(position, velocity), position, velocity).tension
-        assert command[4] == pytest.approx(WISH, rel=1e-9)
-        speed = 0.5 * (3.5e-3 + 0.7 * 5e-3) * velocity[2]
-        level = math.tanh(0.5 * 0.11 * 0.58) * (1.0 + 0.5 * math.exp(-abs(speed) / 0.01)) * math.copysign(1.0, speed)
-        state = settled_state(finger, position, velocity, command[:4], (WISH * (1 + level), WISH * (1 - level)))
-        signals = finger.evaluate(finger.layout.pack(state), command[:4])
-        body = finger.rigid_body
-        drift = body.coriolis_matrix(position, velocity) @ velocity
-        np.testing.assert_allclose(
-            body.mass_matrix(position) @ signals.acceleration, -drift, atol=1e-7 * abs(signals.tendon_torque).max()
-        )
-        # The viscous part of T5's friction is no part of the capstan balance of its halves.
-        assert 8.8e-6 * signals.tendons.passive_acceleration[0] == pytest.approx(-1.0 * speed, abs=1e-6)
+    position, velocity = postures(3, 4)
+    command = controller.command(0.0, ReferenceSignals(position, velocity), position, velocity).tension
+    np.testing.assert_allclose(command[:, 4], WISH, rtol=1e-9)
+    speed = 0.5 * (3.5e-3 + 0.7 * 5e-3) * velocity[:, 2]
+    level = math.tanh(0.5 * 0.11 * 0.58) * (1.0 + 0.5 * np.exp(-abs(speed) / 0.01)) * np.sign(speed)
+    x = settled_states(finger, position, velocity, command[:, :4], (WISH * (1 + level), WISH * (1 - level)))
+    signals = finger.evaluate(x, command[:, :4])
+    for i, torque in enumerate(signals.tendon_torque):
+        drift = finger.rigid_body.coriolis_matrix(position[i], velocity[i]) @ velocity[i]
+        driven = finger.rigid_body.mass_matrix(position[i]) @ signals.acceleration[i]
+        np.testing.assert_allclose(driven, -drift, atol=1e-7 * abs(torque).max())
+    # The viscous part of T5's friction is no part of the capstan balance of its halves.
+    np.testing.assert_allclose(8.8e-6 * signals.tendons.passive_acceleration[:, 0], -1.0 * speed, atol=1e-6)
 
 
 def test_believed_coefficients_are_compensated_instead_of_the_finger_s():
@@ -235,42 +233,6 @@ def test_compensating_more_joint_friction_than_locks_the_finger_is_refused(entry
         )
     assert caught.value.entry == "controller.joint_friction_compensation"
     assert "\n" not in str(caught.value)
-
-
-def test_the_direction_is_smooth_and_odd_and_zero_where_nothing_is_meant_to_move():
-    speed = np.linspace(-5.0, 5.0, 2001)
-    values = direction(speed, 0.5)
-    assert direction(0.0, 0.5) == 0.0
-    np.testing.assert_allclose(values, -values[::-1], atol=1e-15)
-    assert np.all(np.diff(values) >= 0.0)
-    assert np.max(np.diff(values) / np.diff(speed)) <= 1.0 / 0.5 + 1e-12
-
-
-def test_commands_do_not_chatter_at_a_reversal_whatever_the_measured_velocity_says():
-    """The command passes from one side to the other once.
-
-    x = M(v) tanh(v / v_r) is odd, at most M^c, and has one maximum: over a sweep of v it varies by at most
-    2 (2 M^c - |x_end|). f^a = f (1 + x) / (1 - x) varies by at most 2 f / (1 - M^c)^2 times that, b v by its own sweep.
-    A law on the measured velocity would switch at every one of its 2000 changes of sign.
-    """
-    controller = fp.control.build_controller(
-        fig6(FEEDFORWARD, {"controller.minimum_tension": [0.0, 0.0, 0.0, 0.0, WISH]})
-    )
-    position = np.array([0.0, 0.5, 0.5, 0.3])
-    sweep = np.linspace(-0.5, 0.5, 2001)[:, None] * np.array([0.0, 1.0, 0.0, 0.0])
-    noise = np.random.default_rng(5).normal(0.0, 1.0, sweep.shape)
-    places = np.broadcast_to(position, sweep.shape)
-    commands = controller.command(0.0, ReferenceSignals(places, sweep), places, noise).tension
-    planned = controller.command(0.0, still(position), position, np.zeros(4)).tension
-    variation = np.abs(np.diff(commands, axis=0)).sum(axis=0)
-    for tendon, radius, curvature in ((0, 8e-3, 1.0), (1, 8e-3, 1.0), (3, 5.3e-3, 0.51 + 1.0)):
-        kinetic = math.tanh(0.5 * 0.11 * curvature)
-        static, speed = 1.5 * kinetic, 0.5 * radius
-        end = (kinetic + 0.5 * kinetic * math.exp(-speed / 0.01)) * math.tanh(speed / 1e-3)
-        friction = 2.0 * planned[tendon] / (1.0 - static) ** 2 * 2.0 * (2.0 * static - end)
-        assert 0.5 * abs(commands[-1, tendon] - commands[0, tendon]) < variation[tendon]
-        assert variation[tendon] < friction + 2.0 * speed / (1.0 - static)
-    assert variation[2] < 1e-9
 
 
 @pytest.mark.parametrize("finger", ["planar", "dexmart_index"])

@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import errors
 
-from finger_pin.core.binding import Indices, Layers, Matrix, Vector, block_for, get, kind_of, put
+from finger_pin.core.binding import Indices, Layers, Matrix, Vector, bound, get, kind_of
 from finger_pin.core.compilation import entry
 
 
@@ -25,11 +24,6 @@ class Outer(NamedTuple):
 
 
 KIND = kind_of(Outer)
-
-
-@entry
-def bind(value, block):
-    put(block, value, KIND)
 
 
 @entry
@@ -61,8 +55,7 @@ def outer():
 
 
 def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
-    block, out = block_for(KIND), np.zeros(1)
-    bind(outer, block)
+    block, out = bound(outer, KIND), np.zeros(1)
     weigh(block, out)
     table = sum((3 * i + 7 * j) * outer.inner.table[i, j] for i in range(2) for j in range(3))
     assert out[0] == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + (1 + 2) * 4
@@ -83,5 +76,5 @@ def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
     ids=["strided", "single precision", "fewer dimensions", "integer"],
 )
 def test_what_would_be_misread_is_not_bound(outer, change):
-    with pytest.raises(errors.TypingError, match="cannot be bound"):
-        bind(outer._replace(**change), block_for(KIND))
+    with pytest.raises(TypeError, match="cannot be bound"):
+        bound(outer._replace(**change), KIND)

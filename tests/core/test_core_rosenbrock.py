@@ -174,14 +174,22 @@ def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
     assert np.all(np.abs(orders - ORDER[method]) < 0.5), (errors, orders)
 
 
-def test_a_rejected_step_leaves_no_trace(cases, method):
-    """From a first step that is much too long, the one accepted is the same as if it had been the first tried."""
-    case = cases["stick_slip"]
-    tried = case.part(method, step=0.5)
+@pytest.mark.parametrize("touching", [False, True], ids=["free", "touching"])
+def test_a_rejected_step_leaves_no_trace(cases, method, touching):
+    """From a first step that is much too long, the one accepted is the same as if it had been the first tried.
+
+    The pins of a finger that touches are loaded by the contact, whose force turns with the posture.
+    """
+    case = Case.of(ClosedLoop.from_scenario(fp.load_scenario("press"))) if touching else cases["stick_slip"]
+    x = case.loop.initial_state()
+    if touching:
+        x[1] += 0.37
+        x += 1e-3 * np.random.default_rng(2).normal(size=x.shape)
+    tried = case.part(method, x=x, step=0.5)
     record = tried.room(1)
     assert tried.advance(1.0, record) == (rosenbrock.FULL, 1)
     assert tried.memory[rosenbrock.REJECTED] > 0
-    direct = case.part(method, step=tried.time)
+    direct = case.part(method, x=x, step=tried.time)
     again = direct.room(1)
     assert direct.advance(1.0, again) == (rosenbrock.FULL, 1)
     assert direct.memory[rosenbrock.REJECTED] == 0

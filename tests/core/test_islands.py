@@ -10,6 +10,7 @@ from test_any_mechanism import assert_same
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
+from finger_pin.core.binding import bound
 from finger_pin.core.evaluation import CompiledMechanism
 from finger_pin.core.inputs import Signal, held_control, planned_control
 from finger_pin.core.integrator import integrate_compiled
@@ -200,7 +201,7 @@ def test_a_failure_of_one_finger_names_its_own_state(fingers):
     part.atol[:] = 1.0
     part.atol[2] = 1e-60
     part._bound = part._bound._replace(rtol=0.0)
-    rosenbrock.bind(part._bound, part._block)
+    part._block[:] = bound(part._bound, rosenbrock.INTEGRATION)
     trajectory = integrate_compiled(stepper, TIMES[-1], names_of(fingers.mechanism))
     place = fingers.parts[0].body.model.nv + 2
     assert trajectory.failure.endswith(f"the error is largest in x{place}")

@@ -2,12 +2,16 @@
 
 import copy
 
+import numpy as np
 import pytest
 
 import finger_pin as fp
 from finger_pin.description.hand import HandDescription
+from finger_pin.description.meshes import Mesh
 from finger_pin.description.validation import validate
 
+FACES = np.array([[0, 1, 2]], dtype=np.int32)
+SHELL = Mesh.packed(np.eye(3), FACES)
 FINGER = {
     "name": "seesaw",
     "joints": {"hinge": {"range": [-0.3, 0.3]}},
@@ -54,6 +58,19 @@ def test_the_tree_itself_is_taken():
 @pytest.mark.parametrize(
     ("entry", "value", "says"),
     [
+        ("tree__bodies__tip__solids", {"shell": {"kind": "mesh"}}, "solids.shell.mesh: is missing"),
+        ("tree__bodies__tip__solids", {"shell": {"kind": "mesh", "mesh": "shell"}}, "no such mesh; there are none"),
+        ("tree__meshes", {"shell": {**SHELL, "points": "AAAA"}}, "shell.points: must be numbers in threes"),
+        (
+            "tree__meshes",
+            {"shell": {**SHELL, "faces": SHELL["points"]}},
+            "must be corners from 0 to 2",
+        ),
+        (
+            "tree__meshes",
+            {"shell": Mesh.packed(1e3 * np.eye(3), FACES)},
+            "must be finite and at most 10 m",
+        ),
         ("tree__bodies__link__parent", "tip", "finger.tree.bodies.link.parent"),
         ("tree__bodies__tip__parent", "lnk", "did you mean link"),
         ("tree__bodies__link__orientation", [1.0, 1.0, 0.0, 0.0], "quaternion x, y, z, w of length 1"),

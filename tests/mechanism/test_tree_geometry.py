@@ -7,6 +7,7 @@ from mujoco_models import ROUTED, asset, posture
 
 import finger_pin as fp
 from finger_pin.mechanism.geometry import TreeGeometry
+from finger_pin.views.viewer.scene import Scene
 
 MOTORS = "".join(f'<motor name="{name}_motor" tendon="{name}" gear="-1" ctrlrange="0 5"/>' for name in ("top", "below"))
 
@@ -39,20 +40,42 @@ def test_paths_are_as_long_as_their_tendons_and_end_at_their_sites(pulled):
     assert wrapped > 20
 
 
-def test_solids_stand_where_mujoco_has_them():
+def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
+    """Of the Shadow hand meshes, but of two links that have boxes; its capsules are hidden."""
     model = mujoco.MjModel.from_xml_path(str(asset("hand/reach.xml")))
     description, data = fp.from_mujoco(model), mujoco.MjData(model)
     geometry = TreeGeometry(description)
     data.qpos = posture(model, np.random.default_rng(1))
     mujoco.mj_kinematics(model, data)
     poses = geometry.poses(data.qpos)
-    capsules = 0
-    for i in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE):
-        name = f"{model.body(model.geom_bodyid[i]).name}_{model.geom(i).name}".replace(":", "_")
-        found = [each for each in geometry.visuals if each.name == name]
-        for visual in found:
-            rotation, place = poses.rotation[visual.link], poses.translation[visual.link]
-            np.testing.assert_allclose(rotation @ visual.placement.translation + place, data.geom_xpos[i], atol=1e-9)
-            assert visual.shape.radius == pytest.approx(model.geom_size[i, 0])
-            capsules += 1
-    assert capsules > 10
+    drawn = {visual.name: visual for visual in geometry.visuals}
+    meshes = boxes = 0
+    for i in np.flatnonzero((model.geom_group < 3) & (model.body_weldid[model.geom_bodyid] > 0)):
+        name = f"{model.body(model.geom_bodyid[i]).name}_{model.geom(i).name or f'geom_{i}'}".replace(":", "_")
+        visual = drawn.pop(name)
+        rotation, place = poses.rotation[visual.link], poses.translation[visual.link]
+        np.testing.assert_allclose(rotation @ visual.placement.translation + place, data.geom_xpos[i], atol=1e-9)
+        if model.geom_type[i] != mujoco.mjtGeom.mjGEOM_MESH:
+            boxes += 1
+            continue
+        mesh = model.mesh(model.geom_dataid[i])
+        points = slice(mesh.vertadr[0], mesh.vertadr[0] + mesh.vertnum[0])
+        expected = model.mesh_vert[points] @ data.geom_xmat[i].reshape(3, 3).T + data.geom_xpos[i]
+        found = np.asarray(visual.shape.vertices()) @ (rotation @ visual.placement.rotation).T
+        found += rotation @ visual.placement.translation + place
+        np.testing.assert_allclose(found, expected, atol=1e-7)
+        faces = slice(mesh.faceadr[0], mesh.faceadr[0] + mesh.facenum[0])
+        triangle = visual.shape.tri_indices(5)
+        assert [triangle[k] for k in range(3)] == model.mesh_face[faces][5].tolist()
+        meshes += 1
+    assert (meshes, boxes, drawn) == (22, 2, {})
+    assert len(description.tree.meshes) == 10
+
+
+def test_what_falls_out_of_a_hand_leaves_the_view():
+    description = fp.from_mujoco(str(asset("adroit_hand/adroit_pen.xml")))
+    scene, still = Scene(description), np.zeros((2, len(description.joints)))
+    falling = still.copy()
+    falling[1, list(description.joints).index("OBJTz")] = -20.0
+    seen = [np.array(scene.header("", each, 1.0, live=False)["inView"]) for each in (still, falling)]
+    assert np.ptp(seen[1], axis=0) == pytest.approx(np.ptp(seen[0], axis=0), abs=0.02)

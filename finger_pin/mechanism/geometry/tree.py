@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from finger_pin.description.meshes import Mesh
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.tree import Solid
@@ -52,11 +53,18 @@ class TreeGeometry:
         self.model = body.model
         frames = [self.model.frames[tip] for tip in body.tips]
         self.tips = tuple((int(tip.parentJoint), np.array(tip.placement.translation)) for tip in frames)
+        meshes = {name: _surface(each) for name, each in description.tree.meshes.items()}
         self.visuals = tuple(
             visual
             for name, each in description.tree.bodies.items()
             for key, solid in each.solids.items()
-            for visual in _visuals(f"{name}_{key}", routes.placed[name].joint, routes.placed[name].frame, solid)
+            for visual in _visuals(
+                f"{name}_{key}",
+                routes.placed[name].joint,
+                routes.placed[name].frame,
+                solid,
+                meshes.get(solid.mesh or ""),
+            )
         )
         self._legs = {
             name: routes.routes[tendon.along].legs
@@ -145,10 +153,22 @@ def _arc(piece: Piece, start: Array, end: Array, direction: Array, turn: float) 
     return np.asarray(turned + np.outer(share, (end - start) * (1.0 - flat)) + start * (1.0 - flat))
 
 
-def _visuals(name: str, joint: int, frame: pin.SE3, solid: Solid) -> list[Visual]:
-    """Return a solid as boxes, cylinders and spheres."""
+def _surface(mesh: Mesh) -> coal.BVHModelBase:
+    points, faces = mesh.unpacked()
+    found = coal.BVHModelOBBRSS()
+    found.beginModel(len(faces), len(points))
+    found.addVertices(points)
+    found.addTriangles(faces.astype(np.uint64))
+    found.endModel()
+    return found
+
+
+def _visuals(name: str, joint: int, frame: pin.SE3, solid: Solid, surface: coal.BVHModelBase | None) -> list[Visual]:
+    """Return a solid as boxes, cylinders, spheres and its surface, if it is a mesh."""
     place = frame * pin.SE3(rotation(solid.orientation), np.array(solid.position))
     colour = MATERIALS["shell"]
+    if surface is not None:
+        return [Visual(name, joint, surface, place, colour)]
     if solid.kind == "box":
         return [Visual(name, joint, coal.Box(*solid.sides), place, colour)]
     if solid.kind == "sphere":

@@ -82,7 +82,7 @@ def plot_energy(result: xr.Dataset) -> Figure:
     shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
     given = [result.get(f"energy_exchanged_{name}") for name in _SUPPLIED]
     supplied = np.asarray(sum(each.values for each in given if each is not None))
-    figure = new_figure(11.0, max(6.6, 1.15 * len(shown)))
+    figure = new_figure(11.0, max(6.6, 1.35 * len(shown)))
     strips = stack(figure, 0.0, 5.0, [labelled(_STORED[name], "mJ") for name in shown], bottom=0.5)
     title(strips[0], "(a) stored energy")
     for axes, values in zip(strips, shown.values(), strict=True):

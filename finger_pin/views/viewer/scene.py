@@ -28,6 +28,8 @@ SLACK_TENSION = 0.05
 _TUBE_IN_LANE, _TUBE_IN_LINK = 0.34, 0.032
 #: Points per span and per radian of the tendons drawn, so that sags and arcs look smooth.
 _RESOLUTION = 11
+# Beyond so many times the hand's own extent, the camera does not follow.
+_LOST = 3.0
 _LARGEST = 32767
 _GHOST, _GHOST_COLOUR = f"{ROOT}/ghost", (0.69, 0.50, 1.0)
 
@@ -149,6 +151,12 @@ class Scene:
         if ghost is not None:
             seen.append(ghost.seen())
         corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
+        if palm is None:
+            # What a hand has lost, such as a pen of a model's that falls, leaves the view.
+            first = seen[0].reshape(-1, *seen[0].shape[-2:])[0] @ turn.T
+            middle = first.mean(axis=0)
+            reach = max(np.linalg.norm(first - middle, axis=1).max(), *self._widths)
+            corners = corners[np.linalg.norm(corners - middle, axis=1) < _LOST * reach]
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
@@ -255,7 +263,8 @@ def _outermost(points: Array) -> Array:
     index = np.arange(200) + 0.5
     polar, azimuth = np.arccos(1.0 - index / 100.0), math.pi * (1.0 + math.sqrt(5.0)) * index
     fan = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)])
-    return np.asarray(points[np.unique(np.argmax(points @ fan, axis=0))])
+    # A row of distances for each direction: to look for the greatest along columns takes five times as long.
+    return np.asarray(points[np.unique(np.argmax(fan.T @ points.T, axis=1))])
 
 
 def scale_above(tension: float) -> float:

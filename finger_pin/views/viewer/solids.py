@@ -84,18 +84,14 @@ def is_mesh(shape: Any) -> bool:
 
 
 def _mesh_geometry(shape: Any) -> Command:
-    """Return a mesh with a normal for each face, so that its edges show."""
-    corners = np.asarray(shape.vertices())
-    faces = np.array([[triangle[i] for i in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))])
-    points = corners[faces]
-    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    buffers = {"position": np.round(points.reshape(-1, 3), 5), "normal": np.round(np.repeat(normals, 3, axis=0), 2)}
-    attributes = {
-        name: {"itemSize": 3, "type": "Float32Array", "array": values.ravel().tolist()}
-        for name, values in buffers.items()
+    """Return a mesh by its corners, which its faces share."""
+    faces = [triangle[i] for triangle in map(shape.tri_indices, range(shape.num_tris)) for i in range(3)]
+    corners = np.round(np.asarray(shape.vertices()), 5)
+    attributes = {"position": {"itemSize": 3, "type": "Float32Array", "array": corners.ravel().tolist()}}
+    return {
+        "type": "BufferGeometry",
+        "data": {"attributes": attributes, "index": {"type": "Uint32Array", "array": faces}},
     }
-    return {"type": "BufferGeometry", "data": {"attributes": attributes}}
 
 
 def cylinder(radius: float, height: float) -> Command:
@@ -122,6 +118,8 @@ def mesh(
         "transparent": True,
         "opacity": float(opacity),
         "depthWrite": False,
+        # A face is lit as a whole, so that edges show where corners have no normals.
+        "flatShading": shape["type"] == "BufferGeometry",
     }
     solid = {
         "uuid": path,

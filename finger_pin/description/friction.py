@@ -1,0 +1,81 @@
+"""The numbers of law (9) for tendons and for joints."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import model_validator
+
+from finger_pin.description.validation import Description, Numbers, problem, quantity, reals
+from finger_pin.exceptions import toml_like
+
+
+class TendonFriction(Description):
+    """Law (9) for tendons: one number for all, or one per tendon."""
+
+    coulomb: Annotated[Numbers, reals(0.0, 10.0)] = quantity(
+        0.11, unit="1", source="Sec. IV-B", doc="mu_e, Coulomb coefficient between tendon and canal."
+    )
+    stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] = quantity(
+        1.5, unit="1", source="estimate", doc="rho = mu^c / mu^d."
+    )
+    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
+        5e4, unit="N/m", source="estimate", doc="sigma_0, bristle stiffness."
+    )
+    viscous: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        1.0, unit="N s/m", source="estimate", doc="b, viscous coefficient."
+    )
+    stribeck_velocity: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
+        0.01, unit="m/s", source="estimate", doc="omega, Stribeck velocity."
+    )
+    floor: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
+        1e-4, unit="N", source="guards (9a) at F^n = 0", doc="g_min, least friction level F^n M."
+    )
+    stribeck_exponent: Annotated[Numbers, reals(1.0, 2.0, whole=True)] = quantity(
+        1.0, unit="1", source="(9b)", doc="Exponent of |v| / omega: 1 as in the paper, or 2 as in the LuGre model."
+    )
+    micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N s/m", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
+    )
+
+
+class JointFriction(Description):
+    """Law (9) for joints: one number for all, or one per joint."""
+
+    coulomb: Annotated[Numbers, reals(0.0, 0.1, hint=" m (is it in millimetres?)")] = quantity(
+        2.5e-4, unit="m", source="estimate", doc="M^d, Coulomb coefficient times pin radius."
+    )
+    stiction: Annotated[Numbers, reals(0.0, 0.1, hint=" m (is it in millimetres?)")] = quantity(
+        3.5e-4, unit="m", source="estimate", doc="M^c, stiction coefficient times pin radius."
+    )
+    stiffness: Annotated[Numbers, reals(0.0, 1e9, above=True)] = quantity(
+        5.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness."
+    )
+    viscous: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        1e-3, unit="N m s/rad", source="estimate", doc="b, viscous coefficient."
+    )
+    stribeck_velocity: Annotated[Numbers, reals(0.0, 1e4, above=True)] = quantity(
+        0.1, unit="rad/s", source="estimate", doc="omega, Stribeck velocity."
+    )
+    floor: Annotated[Numbers, reals(0.0, 1e3, above=True)] = quantity(
+        1e-7, unit="N m", source="guards (9a) at R = 0", doc="g_min, least friction level R M."
+    )
+    stribeck_exponent: Annotated[Numbers, reals(1.0, 2.0, whole=True)] = quantity(
+        1.0, unit="1", source="(9b)", doc="Exponent of |v| / omega: 1 as in the paper, or 2 as in the LuGre model."
+    )
+    micro_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
+        0.0, unit="N m s/rad", source="(9c)", doc="sigma_1, damping of the bristles: none in the paper."
+    )
+
+    @model_validator(mode="after")
+    def _stiction_above_coulomb(self) -> Self:
+        both = isinstance(self.coulomb, tuple) and isinstance(self.stiction, tuple)
+        if both and len(self.coulomb) != len(self.stiction):  # type: ignore[arg-type]
+            return self
+        size = max(len(value) if isinstance(value, tuple) else 1 for value in (self.coulomb, self.stiction))
+        low = self.coulomb if isinstance(self.coulomb, tuple) else (self.coulomb,) * size
+        high = self.stiction if isinstance(self.stiction, tuple) else (self.stiction,) * size
+        if any(kinetic > static for kinetic, static in zip(low, high, strict=True)):
+            allowed = f"must be at least the Coulomb coefficient {toml_like(self.coulomb)}"
+            raise problem("stiction", allowed, self.stiction)
+        return self

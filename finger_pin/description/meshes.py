@@ -1,0 +1,56 @@
+"""Meshes as data: numbers packed into text, so that a file keeps them and stays readable around them."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from finger_pin.description.validation import Description, problem
+
+Array = NDArray[np.float64]
+_POINTS, _FACES = "<f4", "<i4"
+
+
+class Mesh(Description):
+    """A surface of triangles. Its numbers are binary, compressed by zlib, and written in base64."""
+
+    points: str = Field(description="Corners x, y, z, m, as 32-bit floats.")
+    faces: str = Field(description="Three corners of every triangle, as 32-bit integers, counted from 0.")
+
+    @classmethod
+    def packed(cls, points: Array, faces: NDArray[np.int32]) -> dict[str, str]:
+        """Return the table of a mesh with corners, shape (m, 3), m, and triangles, shape (k, 3)."""
+        return {"points": _pack(points, _POINTS), "faces": _pack(faces, _FACES)}
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        points, faces = _unpack("points", self.points, _POINTS), _unpack("faces", self.faces, _FACES)
+        if not np.all(np.abs(points) <= 10.0):
+            raise problem("points", "must be finite and at most 10 m (is it in millimetres?)")
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise problem("faces", f"must be corners from 0 to {len(points) - 1}", int(faces.max()))
+        return self
+
+    def unpacked(self) -> tuple[Array, NDArray[np.int32]]:
+        """Return corners, shape (m, 3), m, and triangles, shape (k, 3)."""
+        return _unpack("points", self.points, _POINTS).astype(float), _unpack("faces", self.faces, _FACES)
+
+
+def _pack(values: Any, kind: str) -> str:
+    return base64.b64encode(zlib.compress(np.ascontiguousarray(values, dtype=kind).tobytes(), 9)).decode("ascii")
+
+
+def _unpack(entry: str, text: str, kind: str) -> NDArray[Any]:
+    try:
+        found = np.frombuffer(zlib.decompress(base64.b64decode(text, validate=True)), dtype=kind).reshape(-1, 3)
+    except (binascii.Error, zlib.error, ValueError) as error:
+        raise problem(entry, f"must be numbers in threes, compressed by zlib, in base64 ({error})") from None
+    if not len(found):
+        raise problem(entry, "must not be empty")
+    return found
