@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.guides import Guides
 from finger_pin.control.hand import HandController, joined_controller
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
@@ -80,6 +81,7 @@ class ClosedLoop:
         parts: Of a hand whose controller and reference are the scenario's, the loops of its fingers, each alone on the
             palm; otherwise none.
         palm: Along which path the palm of a hand moves; None at rest.
+        guides: Along which paths objects are moved; None without any.
     """
 
     finger: Finger
@@ -92,6 +94,7 @@ class ClosedLoop:
     drives: PositionDrives | None = None
     parts: tuple[ClosedLoop, ...] = ()
     palm: PalmPath | None = None
+    guides: Guides | None = None
 
     @classmethod
     def from_scenario(
@@ -140,6 +143,7 @@ class ClosedLoop:
             # Fingers that may touch something are not apart.
             parts=parts if finger.surroundings is None else (),
             palm=PalmPath.of(scenario.hand, start),
+            guides=Guides.of(finger, start),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
@@ -164,7 +168,8 @@ class ClosedLoop:
         if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
-        return self.finger.rest_state(position, velocity, tension)
+        x = self.finger.rest_state(position, velocity, tension)
+        return x if self.guides is None else self.guides.place(self.finger, x)
 
     def compiled(self) -> ClosedLoop:
         """Return the same loop, whose finger is evaluated by the compiled core."""
@@ -194,7 +199,8 @@ class ClosedLoop:
         signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
         if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
             signals.append(self.controller.fingertip.wanted)
-        signals += [each for each in (self.varying_force, self.palm and self.palm.signal) if each]
+        guided = [each and each.signal for each in (self.palm, self.guides)]
+        signals += [each for each in (self.varying_force, *guided) if each]
         found = [each.knots for each in signals if not each.is_harmonic]
         return np.unique(np.concatenate([np.zeros(0), *found]))
 
@@ -214,8 +220,9 @@ class ClosedLoop:
         return LoopSignals(reference, control, finger)
 
     def base(self, time: Array | float) -> Array | None:
-        """Return how the palm moves at one time, shape (27,), or at times of shape (m,), (m, 27); None at rest."""
-        return None if self.palm is None else self.palm.base(time)
+        """Return how palm and objects are moved at one time, shape (27 + g,), or at times (m,); None at rest."""
+        mover = self.palm or self.guides
+        return None if mover is None else mover.base(time)
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips and energies at times (m,) and states, in the world: the base frame of a palm at rest."""

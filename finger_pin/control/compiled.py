@@ -23,7 +23,7 @@ def compiled_control(loop: ClosedLoop) -> Control | None:
         # Nothing of what the controller plans goes to the finger at once.
         control = held_control(mechanism.channels, mechanism.coordinates)
     elif isinstance(controller, OpenLoopTensions):
-        schedule = _arrays(controller.signal)
+        schedule = core_signal(controller.signal)
         schedule.harmonics[loop.finger.actuators.positioned] = 0.0
         schedule.coefficients[..., loop.finger.actuators.positioned] = 0.0
         control = scheduled_control(schedule, mechanism.coordinates)
@@ -59,7 +59,7 @@ def paper_control(controller: ProportionalController, reference: SignalReference
         inverse=padded(controller.inverse),
         internal=controller.internal,
         channel=np.where((tendons < routing.actuated) & ~positioned, tendons, -1),
-        reference=_arrays(reference.signal),
+        reference=core_signal(reference.signal),
         coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
         offset=padded(reference.coupling.offset),
         damping=padded(controller.damping),
@@ -70,15 +70,17 @@ def paper_control(controller: ProportionalController, reference: SignalReference
 def with_force(control: Control, loop: ClosedLoop) -> Control:
     """Return inputs with the path of the palm and what varies of the force at the fingertip, with its constant part."""
     if loop.palm is not None:
-        control = control._replace(palm=_arrays(loop.palm.signal))
+        control = control._replace(palm=core_signal(loop.palm.signal))
+    if loop.guides is not None:
+        control = control._replace(guide=core_signal(loop.guides.signal))
     if loop.varying_force is None:
         return control
-    force = _arrays(loop.varying_force)
+    force = core_signal(loop.varying_force)
     force.harmonics[:, 0] += loop.fingertip_force.ravel()
     return control._replace(force=force)
 
 
-def _arrays(signal: Signal) -> inputs.Signal:
+def core_signal(signal: Signal) -> inputs.Signal:
     """Return a signal as arrays of the core's own; polynomials that are zero are left out."""
     harmonics = np.array(signal.harmonics, dtype=float)
     if signal.is_harmonic:

@@ -205,6 +205,14 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
             velocity[i, width + j] = of_mass[places[j]]
         for c in range(2 * width, wide):
             velocity[i, c] = force[i, c]
+        if model.tables.guided[at_row] >= 0:
+            # v' is given as a function of time.
+            for j in range(width):
+                reduced[i, j] = 0.0
+            for c in range(wide):
+                velocity[i, c] = 0.0
+            reduced[i, i], velocity[i, width + i] = g, 1.0
+            velocity[i, wide - 1] = model.work.guide_rate[model.tables.guided[at_row]]
     if not _factorise(reduced, width, linear.pivots):
         return False
     _substitute(reduced, width, linear.pivots, velocity, wide)

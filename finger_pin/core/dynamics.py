@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import inputs, tip_forces
+from finger_pin.core.inputs import guide, inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
@@ -164,6 +164,11 @@ def evaluate(model: Any, address: int, time: float) -> None:
     solve_mass(size, work, work.acceleration)
     for j in range(size, width):
         work.acceleration[j] = work.torque[j] / tables.lumps[j - size]
+    if work.guide.size > 0:
+        guide(control, time, 2, work.guide)
+        for j in range(width):
+            if tables.guided[j] >= 0:
+                work.acceleration[j] = work.guide[tables.guided[j]]
     for j in range(width):
         rate[j] = v[j]
         rate[width + j] = work.acceleration[j]

@@ -15,7 +15,7 @@ from finger_pin.core.tables import build_tables, build_work
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.mechanism import Evaluation, Mechanism
+from finger_pin.mechanism.mechanism import GUIDES, Evaluation, Mechanism
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
 
@@ -106,7 +106,7 @@ class CompiledMechanism:
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
-        bases = _bases(base, count)
+        bases = _bases(base, count, int(tables.guided.max(initial=-1)) + 1)
         states, attitudes = self._charts.to_core(packed)
         books = len(mechanism.books.stored) + len(mechanism.books.powers)
         kept = 0 if booked_only else count
@@ -145,7 +145,7 @@ class CompiledMechanism:
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
         given = _rows(position, shape), _rows(velocity, shape)
-        motion_many(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0]))
+        motion_many(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
 
@@ -184,9 +184,12 @@ class CompiledFinger:
         return self._alone.motion(position, velocity, base)
 
 
-def _bases(base: Array | None, count: int) -> Array:
-    """Return how the base moves, shape (count, 15), or of no rows where it rests."""
-    return np.zeros((0, 15)) if base is None else _rows(base[..., :15], (count, 15))
+def _bases(base: Array | None, count: int, guided: int) -> Array:
+    """Return how the base moves, and what is moved along paths, shape (count, 15 + g), or no rows at rest."""
+    if base is None:
+        return np.zeros((0, 15 + guided))
+    given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + guided]], axis=-1)
+    return _rows(given, (count, 15 + guided))
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -59,6 +59,7 @@ class Control(NamedTuple):
         force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
         damping: K_D, shape (N,).
         damped: Whether it is not zero.
+        guide: Paths along which coordinates are moved, or no functions.
         palm: Path of the base: x, y, z, roll, pitch, yaw, or no functions for a base at rest.
         desired, rate, acceleration: Memory, tau^d, then theta^d' and theta^d'', shape (N,).
         planned: Memory, f_hat, shape (T,).
@@ -84,6 +85,7 @@ class Control(NamedTuple):
     force: Signal
     damping: Vector
     damped: bool
+    guide: Signal
     palm: Signal
     desired: Vector
     rate: Vector
@@ -186,6 +188,7 @@ def _control(
         force=no_signal(),
         damping=np.zeros(coordinates),
         damped=False,
+        guide=no_signal(),
         palm=no_signal(),
         desired=np.zeros(coordinates),
         rate=np.zeros(coordinates),
@@ -376,6 +379,13 @@ def _derivative(signal: Any, j: int, time: float, order: int) -> Any:
             polynomial = polynomial * since + factor
         value += polynomial
     return value
+
+
+@compiled
+def guide(control: Any, time: float, order: int, out: Any) -> None:
+    """Fill a time derivative of the paths along which coordinates are moved; what is given without stays."""
+    for j in range(min(out.size, control.guide.harmonics.shape[0])):
+        out[j] = _derivative(control.guide, j, time, order)
 
 
 @compiled

@@ -110,6 +110,7 @@ def select(tables: Tables, island: Island) -> Tables:
         bodies=tables.bodies[bodies],
         charts=body[tables.charts[charts]],
         chart_frames=tables.chart_frames[charts],
+        guided=tables.guided[coordinates],
         lumps=tables.lumps[lumps - size],
         tip_body=_mapped(body, tables.tip_body[island.tips]),
         tip_offset=tables.tip_offset[island.tips],

@@ -9,7 +9,7 @@ import numpy as np
 from finger_pin.core.binding import Indices, Matrix, Vector, call_at
 from finger_pin.core.blocks import Blocks, build_blocks, partition
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import Control, input_slopes, tip_force_rates
+from finger_pin.core.inputs import Control, guide, input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
@@ -191,6 +191,7 @@ def linearise(model: Any, address: int, time: float) -> None:
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
+    guide(control, time, 3, work.guide_rate)
     if tables.loaded:
         tip_force_rates(control, time, work.force_rate)
     for g in range(tables.groups.shape[0]):

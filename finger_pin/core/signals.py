@@ -53,7 +53,8 @@ def evaluate_many(
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
         booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
-        bases: Velocity, acceleration and gravity of the base, shape (m, 15), or (0, 15) at rest.
+        bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
+            (m, 15 + g), or (0, 15 + g) at rest.
         attitudes: Quaternions of free bodies, shape (m, f, 4).
     """
     model = bound_at(address, MODEL)
@@ -88,9 +89,16 @@ def evaluate_many(
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]
         _book(tables, work, booked[m])
-        if bases.shape[0] > 0:
-            call_at(model.power, address, 0.0)
-            booked[m, booked.shape[1] - 1] = work.base_power[0]
+        last = booked.shape[1] - 1
+        if model.power != 0:
+            last -= 1
+            if bases.shape[0] > 0:
+                call_at(model.power, address, 0.0)
+                booked[m, last + 1] = work.base_power[0]
+        if work.guide.size > 0:
+            for j in range(torques.shape[1]):
+                if tables.guided[j] >= 0:
+                    booked[m, last] -= work.torque[j] * states[m, torques.shape[1] + j]
 
 
 @compiled
@@ -101,6 +109,8 @@ def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
         work.base_velocity[k] = bases[m, k] if moved else 0.0
         rest = -tables.gravity[k - 3] if k >= 3 else 0.0
         work.base_acceleration[k] = bases[m, 6 + k] if moved else rest
+    for i in range(work.guide.size):
+        work.guide[i] = bases[m, 15 + i] if bases.shape[0] > 0 else 0.0
 
 
 @entry

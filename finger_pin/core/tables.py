@@ -47,6 +47,7 @@ class Tables(NamedTuple):
         bodies: Placement and inertia, columns of `rigid_body`, shape (n, BODY_COLUMNS).
         charts: First of the three bodies that turn a free one, shape (f,).
         chart_frames: Rotation of each one's spherical joint in the body before it, shape (f, 3, 3).
+        guided: For coordinates that are moved along paths, the number of their acceleration; -1 else, shape (N,).
         gravity: Shape (3,), m/s2.
         lumps: Inertia of the other coordinates, shape (N - n,).
         tip_body: Shape (t,).
@@ -91,6 +92,7 @@ class Tables(NamedTuple):
     bodies: Matrix
     charts: Indices
     chart_frames: Layers
+    guided: Indices
     gravity: Vector
     lumps: Vector
     tip_body: Indices
@@ -148,6 +150,7 @@ class Work(NamedTuple):
         force_rate: Time derivatives of the forces at the tips, shape (t, 3), N/s.
         torque, external, bias, acceleration: Shape (N,).
         command: Inputs, shape (u,).
+        guide, guide_rate: Accelerations of what is moved along paths, and their rates, shape (g,).
     """
 
     rotation: Layers
@@ -178,6 +181,8 @@ class Work(NamedTuple):
     bias: Vector
     acceleration: Vector
     command: Vector
+    guide: Vector
+    guide_rate: Vector
     paths: PathWork
 
 
@@ -288,6 +293,7 @@ def _read(mechanism: Mechanism) -> Tables:
         bodies=bodies,
         charts=np.array(charts, dtype=np.int64),
         chart_frames=np.array(frames).reshape(-1, 3, 3),
+        guided=mechanism.guided,
         gravity=np.array(model.gravity.linear),
         lumps=mechanism.inertia,
         tip_body=np.array([last[joint] for joint in holders], dtype=np.int64),
@@ -380,6 +386,8 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         bias=np.zeros(width),
         acceleration=np.zeros(width),
         command=np.zeros(channels),
+        guide=np.zeros(int(tables.guided.max(initial=-1)) + 1),
+        guide_rate=np.zeros(int(tables.guided.max(initial=-1)) + 1),
         paths=build_path_work(tables.paths, count, width),
     )
 

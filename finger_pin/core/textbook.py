@@ -158,7 +158,11 @@ def integrate(
         else:
             reason = f"the state or its Jacobian is not finite ({error})"
         # Repeat up to the last good step, to keep what was computed.
-        solution = solve(monitor.reached, _Monitor(None, None, bounded=False)) if monitor.reached > 0.0 else None
+        try:
+            solution = solve(monitor.reached, _Monitor(None, None, bounded=False)) if monitor.reached > 0.0 else None
+        except (ValueError, scipy.linalg.LinAlgError):
+            # The Jacobian at that step's end, by differences.
+            solution = None
     if solution is None:
         nothing = Statistics(0, system.evaluations, 0, 0, time.perf_counter() - began)
         return Trajectory(np.zeros(1), lambda at: np.tile(start, (len(at), 1)), nothing, failure=reason)

@@ -1,4 +1,4 @@
-"""Objects that a finger may touch, fixed or free, and the surfaces with which they touch."""
+"""Objects that a finger may touch, fixed, free or moved, and the surfaces with which they touch."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.description.hand import PathSignal
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import Description, choice, problem, quantity, real, vector
+from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+
+#: The coordinates of an object's path.
+PATH = ("x", "y", "z")
 
 #: The sizes of each shape. Solids are about their origin, cylinder and capsule along z; a half-space is z < 0.
 SIZES: dict[str, tuple[str, ...]] = {
@@ -58,7 +62,7 @@ class Surface(Description):
 
 
 class Object(Description):
-    """A rigid body of the environment: fixed, or free if it has a mass."""
+    """A rigid body of the environment: fixed, free if it has a mass, or moved along a path."""
 
     shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
         ..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule."
@@ -87,6 +91,9 @@ class Object(Description):
     angular_velocity: Annotated[tuple[float, float, float], vector(3, -1e4, 1e4)] = quantity(
         (0.0, 0.0, 0.0), unit="rad/s", source="chosen", doc="Of a free object at t = 0, its own frame."
     )
+    path: dict[Name, PathSignal] | None = Field(
+        None, description="Moves it, whatever pushes it: what x, y and z of its position grow by over time, base frame."
+    )
     surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
 
     @field_validator("shape", mode="before")
@@ -94,6 +101,14 @@ class Object(Description):
     def _no_mesh(cls, value: object) -> object:
         if value == "mesh":
             raise problem("", f"meshes are not supported; put together what is needed of {', '.join(SIZES)}", value)
+        return value
+
+    @field_validator("path")
+    @classmethod
+    def _along(cls, value: dict[str, PathSignal] | None) -> dict[str, PathSignal] | None:
+        for name in value or {}:
+            if name not in PATH:
+                raise problem(name, f"no such coordinate; there are {', '.join(PATH)}")
         return value
 
     @model_validator(mode="after")
@@ -109,10 +124,17 @@ class Object(Description):
             raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
         if self.shape == "half_space" and self.mass is not None:
             raise problem("mass", "a half-space is fixed; leave it out", self.mass)
+        if self.path is not None and self.mass is not None:
+            raise problem("path", "is for objects without a mass: what is free to move goes where it is pushed")
         if self.mass is None and (any(self.velocity) or any(self.angular_velocity)):
             entry = "velocity" if any(self.velocity) else "angular_velocity"
             raise problem(entry, "is for objects with a mass, which are free to move", getattr(self, entry))
         return self
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is free or moved."""
+        return self.mass is not None or bool(self.path)
 
     @property
     def sizes(self) -> tuple[float, ...]:

@@ -43,6 +43,7 @@ class Solid:
         rounding: Their radius, m.
         home: Centre of a ball, base frame, shape (3,), m, that it never leaves.
         range: Radius of that ball, m; infinite for what is free.
+        led: Whether nothing moves it but a path, if that: it is fixed, or moved.
         surface: Its surface; None for links and where it is left out, which touch with that of what they touch.
     """
 
@@ -59,13 +60,15 @@ class Solid:
     rounding: float
     home: Array
     range: float
+    led: bool = False
     surface: Surface | None = None
 
     def never_meets(self, other: Solid) -> bool:
         """Return whether it stays away from another solid, whatever both do."""
         for one, two in ((self, other), (other, self)):
             if np.isinf(two.reach):
-                return bool(two.rotation[:, 2] @ (one.home - two.position) > one.range)
+                # One that is moved may come from anywhere.
+                return two.joint == 0 and bool(two.rotation[:, 2] @ (one.home - two.position) > one.range)
         return float(np.linalg.norm(self.home - other.home)) > self.range + other.range
 
 
@@ -83,7 +86,7 @@ def contact_rows(solids: Sequence[Solid], width: int) -> Rows:
     numbers: list[tuple[float, ...]] = []
     paths: list[tuple[Leg, ...]] = []
     for one, other in itertools.combinations(solids, 2):
-        if one.group == other.group or one.joint == other.joint == 0 or one.never_meets(other):
+        if one.group == other.group or (one.led and other.led) or one.never_meets(other):
             continue
         found = list(_touching(one, other))
         for index, (a, w, ends, radius) in enumerate(found):
@@ -205,9 +208,9 @@ def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
 
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:
-    """Return objects; the free ones are carried by the joints that `add_free_objects` has made."""
+    """Return objects; those that move are carried by the joints that `add_free_objects` has made."""
     return [
-        object_solid(name, each, 0 if each.mass is None else int(body.model.getJointId(f"{name}_attitude")))
+        object_solid(name, each, int(body.model.getJointId(f"{name}_attitude")) if each.moves else 0)
         for name, each in objects.items()
     ]
 
@@ -255,23 +258,26 @@ def object_solid(name: str, described: Object, joint: int) -> Solid:
         rounding,
         np.array(place.translation),
         np.inf if joint else reach,
+        described.mass is None,
         described.surface,
     )
 
 
 def add_free_objects(body: RigidBody, objects: Mapping[str, Object]) -> RigidBody:
-    """Return a rigid body with the free objects of some as further bodies, in their order, after its joints.
+    """Return a rigid body with those of some objects that are free or moved as further bodies, after its joints.
 
     Each is a translation joint with the name of the object, at the origin of the base, and a spherical one, whose name
     ends in ``_attitude``, that carries it.
     """
     model = pin.Model(body.model)
     for name, each in objects.items():
-        if each.mass is not None:
+        if each.moves:
             place = pin.SE3.Identity()
             moved = model.addJoint(0, pin.JointModelTranslation(), place, name)
             turned = model.addJoint(moved, pin.JointModelSpherical(), place, f"{name}_attitude")
-            model.inertias[turned] = pin.Inertia(each.mass, np.zeros(3), np.diag(each.inertia))
+            # Of one that is moved any will do.
+            moments = np.ones(3) if each.mass is None else each.inertia
+            model.inertias[turned] = pin.Inertia(each.mass or 1.0, np.zeros(3), np.diag(moments))
     extended = RigidBody(model, [model.frames[tip].name for tip in body.tips])
     count = body.model.njoints
     extended.proximal_axes[:count], extended.carriers[:count] = body.proximal_axes, body.carriers

@@ -26,8 +26,10 @@ from finger_pin.mechanism.pieces import Paths, Reach, moved, reach
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 
-#: The power that a moving base supplies.
-BASE = "palm"
+#: The powers that a moving base supplies, and what moves objects along paths.
+BASE, GUIDED = "palm", "objects"
+#: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `laws.palm`.
+GUIDES = 27
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +47,9 @@ class Books:
     supplies: frozenset[str]
 
     @classmethod
-    def of(cls, rows: Sequence[Rows], moved: bool = False) -> Books:
-        """Collect the names of tables, and that of a base that moves."""
-        base = (BASE,) if moved else ()
+    def of(cls, rows: Sequence[Rows], moved: bool = False, guided: bool = False) -> Books:
+        """Collect the names of tables, and those of moved coordinates and of a base that moves."""
+        base = ((GUIDED,) if guided else ()) + ((BASE,) if moved else ())
         return cls(
             stored=tuple(dict.fromkeys(table.stored for table in rows)),
             powers=(*dict.fromkeys(name for table in rows for name in table.powers), *base),
@@ -67,6 +69,7 @@ class Evaluation:
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
         base_power: That of a base that moves, shape (..., 1), W.
+        guided_power: That of what moves coordinates along paths, shape (...,), W.
         booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
     """
 
@@ -77,6 +80,7 @@ class Evaluation:
     acceleration: Array
     rate: Array
     base_power: Array | None = None
+    guided_power: Array | None = None
     booked: Array | None = None
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -95,6 +99,8 @@ class Evaluation:
             energies[signals.rows.stored] = energies[signals.rows.stored] + stored
             for name, value in flows.items():
                 powers[name] = powers[name] + value
+        if self.guided_power is not None:
+            powers[GUIDED] = self.guided_power
         if self.base_power is not None:
             powers[BASE] = self.base_power[..., 0]
         return energies, powers
@@ -112,6 +118,7 @@ class Mechanism:
         books: Names under which energies and powers of the rows are booked.
         channels: Number of inputs from outside.
         moved: Whether the base moves along a path.
+        guided: For coordinates that are moved along paths, the number of their acceleration among all; else -1.
     """
 
     def __init__(
@@ -122,6 +129,7 @@ class Mechanism:
         inertia: Array | None = None,
         channels: int = 0,
         moved: bool = False,
+        guided: NDArray[np.int64] | None = None,
     ) -> None:
         """Join coordinates and rows; rows are as wide as there are coordinates, joints first, then lumps.
 
@@ -132,7 +140,8 @@ class Mechanism:
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         self.rows = tuple(rows)
         self.moved = moved
-        self.books = Books.of(self.rows, moved)
+        self.guided = np.full(self.coordinates, -1) if guided is None else guided
+        self.books = Books.of(self.rows, moved, bool(np.any(self.guided >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
@@ -220,8 +229,8 @@ class Mechanism:
             x: Shape (size,) or (m, size).
             command: Inputs u, shape (channels,) or (m, channels).
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
-            base: How the base moves, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more); at rest by
-                default.
+            base: How the base moves, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more), at rest by
+                default; after `GUIDES` of them the accelerations of what is moved along paths, zero by default.
         """
         q, v, z = self.split(x)
         joints, turning = int(self.body.model.nv), q[..., : self.body.model.nq]
@@ -262,7 +271,12 @@ class Mechanism:
             [self.body.forward_dynamics(turning, v[..., :joints], net[..., :joints]), net[..., joints:] / self.inertia],
             axis=-1,
         )
-        if base is not None:
+        led, guided_power = np.flatnonzero(self.guided >= 0), None
+        if len(led):
+            given = self.guided[led] + GUIDES
+            acceleration[..., led] = 0.0 if base is None else base[..., given]
+            guided_power = -np.sum(torque[..., led] * v[..., led], axis=-1)
+        if base is not None and self.moved:
             power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
         moving = self.body.position_rate(turning, v[..., :joints])
         rates = [found[t.group].rate for t in self.rows if t.states]
@@ -273,6 +287,7 @@ class Mechanism:
             external=external,
             acceleration=acceleration,
             base_power=np.zeros((*lead, 1)) if power is None and self.moved else power,
+            guided_power=guided_power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
 

@@ -43,7 +43,7 @@ class Surroundings:
     """Objects around a finger.
 
     Attributes:
-        free: The objects with a mass, by name.
+        free: The objects that move, free or along paths, by name.
         body: The finger's rigid body, and the free objects after its joints.
         contacts: Between links and objects, links of different fingers, and objects.
     """
@@ -74,7 +74,10 @@ class Surroundings:
                 raise InputError(f"environment.objects.{name}", "a joint has this name; choose another")
         extended = add_free_objects(mechanism.body, objects)
         solids = [*finger_solids(links, extended), *object_solids(objects, extended)]
-        free = {name: each for name, each in objects.items() if each.mass is not None}
+        free = {name: each for name, each in objects.items() if each.moves}
+        for name, each in free.items():
+            if each.path and mechanism.moved:
+                raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
         return cls(free, extended, contact_rows(solids, width))
 
@@ -87,7 +90,11 @@ class Surroundings:
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
         rows = [table.spread(places, bodies + lumps) for table in mechanism.rows]
         lumps_of = mechanism.lumps, mechanism.inertia
-        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved)
+        guided = np.full(bodies + lumps, -1)
+        led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.path]
+        for number, first in enumerate(led):
+            guided[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
+        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, guided)
 
     def start(self) -> tuple[Array, Array]:
         """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""

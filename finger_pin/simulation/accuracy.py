@@ -15,6 +15,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 
 #: Steps between two looks at a compiled simulation.
@@ -142,26 +143,25 @@ def floor_advice(signals: FingerSignals) -> str:
     return ""
 
 
-def stiff_advice(signals: FingerSignals, tolerance: float) -> str:
-    """Return what to try where a run ends at a contact too stiff for its tolerance; else empty.
+def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
+    """Return what to say if bodies have touched whose contact is too stiff for the tolerance; else empty.
 
     Args:
-        signals: Where it ended.
-        tolerance: Of the positions, rad; at the end of a finger about a tenth of that, m.
+        result: What happened.
+        finger: The finger.
+        tolerance: Of the joints' angles, rad: a tenth of that, m, at what they carry.
     """
-    for found in signals.mechanism.rows.values():
-        if found.rows.law is not CONTACT:
-            continue
-        stiffness, exponent = (
-            found.rows.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent")
+    if finger.surroundings is None:
+        return ""
+    contacts, known = finger.surroundings.contacts, 0.1 * tolerance
+    stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
+    depth = stiffness ** (-1.0 / exponent)
+    touched = np.any(result["contact_normal_force"].values > 0.0, axis=0)
+    for index in np.flatnonzero(touched & (depth < _SEEN * known)):
+        return (
+            f"{contacts.names[index]} is too stiff for the tolerances: 1 N presses it in by {depth[index]:.1g} m, and "
+            f"places are computed to about {known:.1g} m; softer surfaces or a smaller simulation.atol_scale help"
         )
-        near, depth = np.abs(found.row.gap) < 0.1 * tolerance, stiffness ** (-1.0 / exponent)
-        for index in np.flatnonzero(near & (depth < _SEEN * 0.1 * tolerance)):
-            pressed = f"{found.rows.names[index]} is pressed in by {depth[index]:.1g} m under 1 N"
-            return (
-                f"softer surfaces: with a stiffness of {stiffness[index]:g}, {pressed}, far less than positions are "
-                "computed to"
-            )
     return ""
 
 

@@ -55,6 +55,7 @@ _EXCHANGED = {
     "gearbox_viscous": "lost in the gears' viscous friction",
     "elastic_damping": "lost as tendons on spools stretch",
     "palm": "supplied by what moves the palm",
+    "objects": "supplied by what moves objects",
     "tendon_coulomb": "lost by tendons sliding",
     "tendon_viscous": "lost in the tendons' viscous friction",
     "tendon_micro_damping": "lost in the tendons' micro-damping",

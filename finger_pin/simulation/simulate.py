@@ -40,7 +40,7 @@ from finger_pin.simulation.accuracy import (
     floor_advice,
     open_account,
     ringing,
-    stiff_advice,
+    too_stiff,
 )
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
@@ -192,6 +192,7 @@ def simulate(
         result.attrs["own"] = own
     if np.isfinite(error):
         result.attrs["estimated_error"] = error
+    inaccurate = inaccurate or too_stiff(result, loop.finger, scenario.simulation.atol_scale)
     if inaccurate:
         result.attrs["accuracy"] = inaccurate
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=2)
@@ -211,8 +212,7 @@ def simulate(
         else:
             with np.errstate(all="ignore"):
                 last = loop.evaluate(reached, trajectory.interpolate(np.array([reached]))[0])
-                positions = scenario.simulation.atol_scale
-                advice = floor_advice(last.finger) or stiff_advice(last.finger, positions) or advice
+                advice = floor_advice(last.finger) or advice
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:

@@ -11,6 +11,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import Samples
+from finger_pin.control.compiled import core_signal
+from finger_pin.control.guides import Guides
 from finger_pin.control.reference import Reference
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.inputs import held_control
@@ -76,10 +78,14 @@ class Simulator:
         self._compiled = CompiledFinger(finger)
         self._tension = np.zeros(finger.mechanism.channels)
         mechanism = finger.mechanism
+        x = finger.rest_state(_numbers("position", start, (len(finger.routing.joints),)))
+        control, guides = held_control(mechanism.channels, mechanism.coordinates), Guides.of(finger, 0.0)
+        if guides is not None:
+            x, control = guides.place(finger, x), control._replace(guide=core_signal(guides.signal))
         self._stepper = Stepper(
             mechanism,
-            held_control(mechanism.channels, mechanism.coordinates),
-            finger.rest_state(_numbers("position", start, (len(finger.routing.joints),))),
+            control,
+            x,
             TABLEAUS[method](),
             rtol,
             atol_scale * finger.layout.scales(),

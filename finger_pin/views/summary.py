@@ -25,7 +25,7 @@ _SETTLING = 1.0
 _LONG = 2.0
 # What counts as sliding, m/s.
 _CREEP = 1e-6
-_SUPPLIES = ("actuators", "electrical", "fingertip", "palm")
+_SUPPLIES = ("actuators", "electrical", "fingertip", "palm", "objects")
 
 
 def summarize(result: xr.Dataset) -> str:

@@ -44,7 +44,7 @@ _STORED = {
     "elastic_tendons": "tendons on spools",
     "gearboxes": "gear bristles",
 }
-_SUPPLIED = ("actuators", "electrical", "fingertip", "palm")
+_SUPPLIED = ("actuators", "electrical", "fingertip", "palm", "objects")
 _LOST = {
     "tendon_coulomb": ("tendons sliding", VERMILLION),
     "tendon_viscous": ("tendons viscous", ORANGE),
