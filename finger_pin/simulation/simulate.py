@@ -33,7 +33,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import AccuracyWarning, InputError, IntegrationError, Interrupted, MicroDampingWarning
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, floor_advice, open_account, ringing
+from finger_pin.simulation.accuracy import CHUNK, check_memory, estimate_error, open_account, ringing
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -200,10 +200,6 @@ def simulate(
         advice = _ADVICE_TIGHT if tight else _ADVICE
         if "physical range" in trajectory.failure:
             advice = _ADVICE_RUNAWAY
-        else:
-            with np.errstate(all="ignore"):
-                last = loop.evaluate(reached, trajectory.interpolate(np.array([reached]))[0])
-                advice = floor_advice(last.finger) or advice
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:
