@@ -27,8 +27,9 @@ _TIGHTER = 10.0
 # Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
 # is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
-# The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
-_PATIENCE = 2
+# The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
+# far slower, and a motion that takes so many steps shows early how sensitive it is.
+_PATIENCE, _MOST_LOOKS = 2, 600
 # The share of the energy exchanged to which an account has to close, and what is too little to count, J.
 _OPEN, _NOTHING = 1e-4, 1e-12
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
@@ -64,7 +65,7 @@ def estimate_error(
     settings = scenario.simulation
     tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in ("rtol", "atol_scale")}
     looks = count()
-    most = _PATIENCE * (1 + trajectory.statistics.steps // CHUNK)
+    most = min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), _MOST_LOOKS)
     tightened = scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
     other = repeated(tightened, lambda: next(looks) >= most)
     times = scenario.sample_times()
