@@ -16,11 +16,12 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger_signals import FingerSignals, JointForces, MotorForces, TendonForces
 from finger_pin.mechanism.foreign_model import on_model
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
-from finger_pin.mechanism.mechanism import Evaluation, Mechanism
+from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
