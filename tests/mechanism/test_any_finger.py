@@ -220,8 +220,8 @@ def test_a_step_ends_finite_or_says_why_it_stopped(table, scale, pulls, steps, m
     assert np.isfinite(simulator.x).all()
 
 
-def test_steps_that_creep_end_with_time_state_and_advice():
-    """A passive tendon of a picogram at the largest stiffness: its waves would need 1e12 steps a second."""
+def test_a_run_that_cannot_go_on_ends_with_time_state_and_advice():
+    """A passive tendon of a millionth of a picogram at the largest stiffness: waves of 1e13 Hz."""
     frantic = {
         "finger.passive_tendon.mass": 1e-18,
         "finger.passive_tendon.stiffness": 1e10,
@@ -235,7 +235,6 @@ def test_steps_that_creep_end_with_time_state_and_advice():
     error = caught.value
     says_what_to_try(error)
     assert "T5" in error.reason
-    assert error.time < 0.1
     assert error.result.attrs["solver_steps"] < 1_000_000
     for name, values in error.result.data_vars.items():
         assert np.isfinite(values).all(), name
