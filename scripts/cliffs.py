@@ -21,7 +21,7 @@ SLOW, OPEN = 20.0, 1e-5
 
 @dataclass(frozen=True)
 class Run:
-    """How one finger went: wall time, s, steps, residual over the energy exchanged, and why it ended early."""
+    """How one finger went: processor time, s, steps, residual over the energy exchanged, and why it ended early."""
 
     seed: int
     seconds: float
@@ -40,19 +40,19 @@ def residual_share(result: xr.Dataset) -> float:
 
 
 def run_seed(seed: int, limit: float) -> Run:
-    """Run one finger for at most a time, s."""
-    scenario, began, reason = wild_scenario(seed), time.perf_counter(), ""
+    """Run one finger for at most a processor time, s."""
+    scenario, began, reason = wild_scenario(seed), time.process_time(), ""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            result = fp.simulate(scenario, stop=lambda: time.perf_counter() - began > limit)
+            result = fp.simulate(scenario, stop=lambda: time.process_time() - began > limit)
         except fp.IntegrationError as error:
             result, reason = error.result, str(error)
         except fp.Interrupted as error:
             result, reason = error.result, f"not done after {limit:g} s: {error}"
     assert result is not None
     steps, estimate = int(result.attrs["solver_steps"]), float(result.attrs.get("estimated_error", np.nan))
-    return Run(seed, time.perf_counter() - began, steps, residual_share(result), estimate, reason)
+    return Run(seed, time.process_time() - began, steps, residual_share(result), estimate, reason)
 
 
 def main(given: list[str] | None = None) -> int:
@@ -64,16 +64,18 @@ def main(given: list[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=2, help="side by side (default 2)")
     arguments = parser.parse_args(given)
     seeds = range(arguments.seed, arguments.seed + arguments.count)
-    with ProcessPoolExecutor(arguments.processes) as pool:
-        runs = list(pool.map(partial(run_seed, limit=arguments.limit), seeds))
     print(f"{'seed':>6}{'s':>8}{'steps':>9}{'residual':>11}{'estimate':>11}")
-    for run in runs:
-        if run.reason or run.residual > OPEN or run.seconds > SLOW / 4:
-            print(f"{run.seed:6}{run.seconds:8.2f}{run.steps:9}{run.residual:11.1e}{run.estimate:11.1e}  {run.reason}")
+    runs = []
+    with ProcessPoolExecutor(arguments.processes) as pool:
+        for run in pool.map(partial(run_seed, limit=arguments.limit), seeds):
+            runs.append(run)
+            if run.reason or run.residual > OPEN or run.seconds > SLOW / 4:
+                numbers = f"{run.seed:6}{run.seconds:8.2f}{run.steps:9}{run.residual:11.1e}{run.estimate:11.1e}"
+                print(f"{numbers}  {run.reason}", flush=True)
     failed = [run for run in runs if run.reason]
     steps = np.array([run.steps for run in runs])
     print(
-        f"{len(runs)} fingers: {len(failed)} not done, "
+        f"{len(runs)} fingers: {len(failed)} not done, {sum(run.seconds > SLOW for run in runs)} above {SLOW:g} s, "
         f"{sum(run.residual > OPEN for run in runs)} with a residual above {OPEN:g} of the energy exchanged; "
         f"steps: median {np.median(steps):.0f}, 99 % {np.quantile(steps, 0.99):.0f}, most {steps.max()}"
     )

@@ -9,7 +9,7 @@ from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.reference import SignalReference
 from finger_pin.control.signal import Signal
-from finger_pin.core import inputs
+from finger_pin.core import signal as signal_core
 from finger_pin.core.inputs import Control, held_control, planned_control, scheduled_control
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
@@ -80,9 +80,9 @@ def with_force(control: Control, loop: ClosedLoop) -> Control:
     return control._replace(force=force)
 
 
-def core_signal(signal: Signal) -> inputs.Signal:
+def core_signal(signal: Signal) -> signal_core.Signal:
     """Return a signal as arrays of the core's own; polynomials that are zero are left out."""
     harmonics = np.array(signal.harmonics, dtype=float)
     if signal.is_harmonic:
-        return inputs.Signal(harmonics, np.zeros(0), np.zeros((6, 0, len(harmonics))))
-    return inputs.Signal(harmonics, signal.knots.copy(), np.ascontiguousarray(signal.coefficients))
+        return signal_core.Signal(harmonics, np.zeros(0), np.zeros((6, 0, len(harmonics))))
+    return signal_core.Signal(harmonics, signal.knots.copy(), np.ascontiguousarray(signal.coefficients))

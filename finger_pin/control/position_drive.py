@@ -54,7 +54,8 @@ class PositionDrives:
         times: Array = period * np.arange(math.ceil(duration / period) + 1.0)
         wanted = reference.at(times)
         planned = controller.command(times, wanted, wanted.position, wanted.velocity).tension
-        goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated])[:, actuators.holds]
+        drawn = finger.excursion(wanted.position)
+        goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)[:, actuators.holds]
         encoders = [actuator.motor.encoder for _, actuator in chosen]
         for (name, _), encoder, goal in zip(chosen, encoders, goals.T, strict=True):
             least, most = float(goal.min()), float(goal.max())

@@ -13,9 +13,10 @@ from finger_pin.core.signals import evaluate_many, motion_many
 from finger_pin.core.stepper import in_threads
 from finger_pin.core.tables import build_tables, build_work
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.mechanism import GUIDES, Evaluation, Mechanism
+from finger_pin.mechanism.mechanism import GUIDES, Mechanism
 from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
 

@@ -7,37 +7,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.binding import Indices, Layers, Matrix, Vector
+from finger_pin.core.binding import Indices, Matrix, Vector
 from finger_pin.core.compilation import compiled
 from finger_pin.core.law_code import inlined
+from finger_pin.core.signal import Signal, no_signal, signal_curvatures, signal_derivative, signal_rates, signal_values
 from finger_pin.core.trigonometry import sine_cosine
 from finger_pin.description.routing import Array
 from finger_pin.laws import controller as controller_laws
 from finger_pin.laws import palm as palm_laws
-from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
 
 HELD, PLANNED, SCHEDULED = range(3)
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
 _base_motion = inlined(palm_laws.base_motion)
-_quintic = inlined(quintic)
-_quintic_rate = inlined(quintic_rate)
-_quintic_curvature = inlined(quintic_curvature)
-
-
-class Signal(NamedTuple):
-    """k functions of time: a sinusoid about an offset each, plus a piecewise polynomial on shared knots.
-
-    Attributes:
-        harmonics: Offset, amplitude, frequency, phase, shape (k, 4).
-        knots: Shape (m,); m = 0 without polynomials. Outside, these keep their value.
-        coefficients: Of (t - knot)^(5 - i), shape (6, m - 1, k).
-    """
-
-    harmonics: Matrix
-    knots: Vector
-    coefficients: Layers
 
 
 class Control(NamedTuple):
@@ -98,11 +81,6 @@ class Control(NamedTuple):
     by_position: Matrix
     by_velocity: Matrix
     by_time: Vector
-
-
-def no_signal() -> Signal:
-    """Return a signal of no functions."""
-    return Signal(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
 
 
 def planned_control(
@@ -205,68 +183,6 @@ def _control(
 
 
 @compiled
-def _piece(signal: Any, time: float) -> Any:
-    """Return the piece that a time is in, and the time since its knot, both clipped to the knots."""
-    knots = signal.knots
-    last = knots.size - 2
-    low, high = 0, last
-    while low < high:
-        middle = (low + high + 1) // 2
-        if knots[middle] <= time:
-            low = middle
-        else:
-            high = middle - 1
-    return low, min(max(time, knots[0]), knots[last + 1]) - knots[low]
-
-
-@compiled
-def signal_values(signal: Any, time: float, out: Any) -> None:
-    """Fill the values of the functions."""
-    table = signal.harmonics
-    for j in range(table.shape[0]):
-        out[j] = table[j, 0]
-        if table[j, 1] != 0.0:
-            out[j] += table[j, 1] * sine_cosine(2.0 * np.pi * table[j, 2] * time + table[j, 3])[0]
-    if signal.knots.size > 0:
-        piece, since = _piece(signal, time)
-        for j in range(table.shape[0]):
-            c = signal.coefficients[:, piece, j]
-            out[j] += _quintic(since, c[0], c[1], c[2], c[3], c[4], c[5])
-
-
-@compiled
-def signal_rates(signal: Any, time: float, out: Any) -> None:
-    """Fill the time derivatives of the functions."""
-    table, knots = signal.harmonics, signal.knots
-    for j in range(table.shape[0]):
-        out[j] = 0.0
-        if table[j, 1] != 0.0:
-            circular = 2.0 * np.pi * table[j, 2]
-            out[j] = table[j, 1] * circular * sine_cosine(circular * time + table[j, 3])[1]
-    if knots.size > 0 and knots[0] <= time < knots[knots.size - 1]:
-        piece, since = _piece(signal, time)
-        for j in range(table.shape[0]):
-            c = signal.coefficients[:, piece, j]
-            out[j] += _quintic_rate(since, c[0], c[1], c[2], c[3], c[4])
-
-
-@compiled
-def signal_curvatures(signal: Any, time: float, out: Any) -> None:
-    """Fill the second time derivatives of the functions."""
-    table, knots = signal.harmonics, signal.knots
-    for j in range(table.shape[0]):
-        out[j] = 0.0
-        if table[j, 1] != 0.0:
-            circular = 2.0 * np.pi * table[j, 2]
-            out[j] = -table[j, 1] * circular * circular * sine_cosine(circular * time + table[j, 3])[0]
-    if knots.size > 0 and knots[0] <= time < knots[knots.size - 1]:
-        piece, since = _piece(signal, time)
-        for j in range(table.shape[0]):
-            c = signal.coefficients[:, piece, j]
-            out[j] += _quintic_curvature(since, c[0], c[1], c[2], c[3])
-
-
-@compiled
 def _coupled(control: Any, values: Any, out: Any) -> None:
     """Fill what a derivative of the base signals makes of the desired positions, by the coupling (20)."""
     for j in range(out.size):
@@ -362,41 +278,21 @@ def tip_force_rates(control: Any, time: float, rates: Any) -> None:
 
 
 @compiled
-def _derivative(signal: Any, j: int, time: float, order: int) -> Any:
-    """Return a time derivative of function j, of order 0 to 3."""
-    table, knots = signal.harmonics, signal.knots
-    circular = 2.0 * np.pi * table[j, 2]
-    value = table[j, 1] * circular**order * np.sin(circular * time + table[j, 3] + 0.5 * np.pi * order)
-    if order == 0:
-        value += table[j, 0]
-    if knots.size > 0 and (order == 0 or knots[0] <= time < knots[knots.size - 1]):
-        piece, since = _piece(signal, time)
-        polynomial = 0.0
-        for power in range(5, order - 1, -1):
-            factor = signal.coefficients[5 - power, piece, j]
-            for n in range(order):
-                factor *= power - n
-            polynomial = polynomial * since + factor
-        value += polynomial
-    return value
-
-
-@compiled
 def guide(control: Any, time: float, order: int, out: Any) -> None:
     """Fill a time derivative of the paths along which coordinates are moved; what is given without stays."""
     for j in range(min(out.size, control.guide.harmonics.shape[0])):
-        out[j] = _derivative(control.guide, j, time, order)
+        out[j] = signal_derivative(control.guide, j, time, order)
 
 
 @compiled
 def _coordinates(signal: Any, time: float, order: int) -> Any:
     return (
-        _derivative(signal, 0, time, order),
-        _derivative(signal, 1, time, order),
-        _derivative(signal, 2, time, order),
-        _derivative(signal, 3, time, order),
-        _derivative(signal, 4, time, order),
-        _derivative(signal, 5, time, order),
+        signal_derivative(signal, 0, time, order),
+        signal_derivative(signal, 1, time, order),
+        signal_derivative(signal, 2, time, order),
+        signal_derivative(signal, 3, time, order),
+        signal_derivative(signal, 4, time, order),
+        signal_derivative(signal, 5, time, order),
     )
 
 

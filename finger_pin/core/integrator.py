@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.charts import angular_velocity
-from finger_pin.core.stepper import Part, Record, Stepper, failure, in_threads
+from finger_pin.core.part import Part, Record, failure
+from finger_pin.core.stepper import Stepper, in_threads
 from finger_pin.core.textbook import Statistics, Stop, Trajectory, Watch
 from finger_pin.description.routing import Array
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.inputs import PLANNED, Control, Signal
+from finger_pin.core.inputs import PLANNED, Control
 from finger_pin.core.path_tables import select_paths
+from finger_pin.core.signal import Signal
 from finger_pin.core.tables import Tables
 
 Indices = NDArray[np.int64]

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
+from finger_pin.core.chains import Chains
+from finger_pin.core.rigid_body import PRISMATIC, TRANSLATION
 from finger_pin.core.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.pieces import Leg, Piece
@@ -112,24 +114,9 @@ class PathWork(NamedTuple):
     wrench_slope: Layers
 
 
-def read_paths(
-    paths: Sequence[Sequence[Leg]],
-    parents: NDArray[np.int64],
-    last: Sequence[int],
-    turns: Sequence[Array],
-    slides: NDArray[np.bool_],
-    distances: Array,
-) -> Paths:
-    """Return the arrays of the paths of all rows.
-
-    Args:
-        paths: Of every row, empty for none.
-        parents: Of the core's bodies.
-        last: The core's body of every joint of the model, the base first.
-        turns: Rotation of that body's frame in the joint's.
-        slides: Whether each of the core's bodies slides.
-        distances: Of each from the one before it, m.
-    """
+def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
+    """Return the arrays of the paths of all rows, each empty for none, through the bodies of a model."""
+    parents, last, turns = chains.parents, chains.last, chains.turns
     pieces: list[Piece] = list(dict.fromkeys(leg.piece for legs in paths for leg in legs))
     number = {piece: e for e, piece in enumerate(pieces)}
     first_row = {leg.piece: k for k, each in reversed(list(enumerate(paths))) for leg in each}
@@ -141,10 +128,7 @@ def read_paths(
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
-    levers = [
-        _levers(p, row, at, parents, slides, distances)
-        for p, row, (at, _) in zip(pieces, carriers, entries, strict=True)
-    ]
+    levers = [_levers(p, row, at, chains) for p, row, (at, _) in zip(pieces, carriers, entries, strict=True)]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
     for body, parent in enumerate(parents):
@@ -200,12 +184,10 @@ def _levers(
     piece: Piece,
     carriers: NDArray[np.int64],
     coordinates: NDArray[np.int64],
-    parents: NDArray[np.int64],
-    slides: NDArray[np.bool_],
-    distances: Array,
+    chains: Chains,
 ) -> Array:
     """Return how far a unit of some coordinates moves points of a contact's first body, or of that of its frame."""
-    found = np.zeros(len(parents))
+    found = np.zeros(len(chains.parents))
     first = max(float(np.linalg.norm(end.point)) for end in piece.ends)
     for body, far in (
         (carriers[0], first),
@@ -213,10 +195,12 @@ def _levers(
     ):
         at, reach = int(body), far
         while at >= 0:
-            found[at] += 1.0 if slides[at] else reach
+            slides = chains.kinds[at] == PRISMATIC
+            found[at] += 1.0 if slides else reach
             # What slides may be anywhere.
-            reach += _ANYWHERE if slides[at] else distances[at]
-            at = int(parents[at])
+            distance = float(np.linalg.norm(chains.bodies[at, TRANSLATION : TRANSLATION + 3]))
+            reach += _ANYWHERE if slides else distance
+            at = int(chains.parents[at])
     return found[coordinates]
 
 

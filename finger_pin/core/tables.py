@@ -7,29 +7,19 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
+from finger_pin.core.chains import read_chains
 from finger_pin.core.law_code import SIGNALS, SLOPES, addresses, widest
 from finger_pin.core.path_tables import Paths, PathWork, build_path_work, reached, read_paths
 from finger_pin.core.rigid_body import (
-    ARMATURE,
-    BODY_COLUMNS,
-    CENTRE,
-    INERTIA,
-    MASS,
-    PRISMATIC,
-    ROTATION,
     SPATIAL_LAYERS,
     SQUARE_LAYERS,
-    TRANSLATION,
 )
 from finger_pin.description.routing import Array
-from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import FREE_JOINTS
 
 # Columns of the table of groups.
 FIRST, END, FED, PRESSED, KINK = range(5)
@@ -186,13 +176,6 @@ class Work(NamedTuple):
     paths: PathWork
 
 
-class _Body(NamedTuple):
-    """One coordinate of a joint: whether it slides, and its axis in the frame of the joint."""
-
-    kind: int
-    axis: Array
-
-
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
 
 
@@ -215,34 +198,8 @@ def _read(mechanism: Mechanism) -> Tables:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
-    model, size = body.model, int(body.model.nv)
-    parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
-    bodies, charts, frames = np.zeros((size, BODY_COLUMNS)), [], []
-    # Of every joint of the model, the base first: its last body, and how that one's frame is turned.
-    last, turns = [-1], [np.eye(3)]
-    for joint in range(1, model.njoints):
-        parent, placement = int(model.parents[joint]), model.jointPlacements[joint]
-        above, rotation, translation = last[parent], turns[parent].T @ placement.rotation, placement.translation
-        translation, turn = turns[parent].T @ translation, np.eye(3)
-        chain = _coordinates(model, joint)
-        first = int(model.joints[joint].idx_v)
-        if len(chain) == 3 and chain[0].kind != PRISMATIC:
-            charts.append(first)
-            frames.append(rotation)
-        for i, part in enumerate(chain, start=first):
-            turned = _frame_along(part.axis)
-            parents[i], kinds[i] = above, part.kind
-            bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
-            bodies[i, TRANSLATION : TRANSLATION + 3] = translation
-            bodies[i, ARMATURE] = model.armature[i]
-            above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
-        inertia = model.inertias[joint]
-        bodies[above, MASS] = inertia.mass
-        bodies[above, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
-        moments = turn.T @ inertia.inertia @ turn
-        bodies[above, INERTIA : INERTIA + 6] = moments[np.triu_indices(3)]
-        last.append(above)
-        turns.append(turn)
+    model, chains = body.model, read_chains(body.model)
+    parents, last, turns = chains.parents, chains.last, chains.turns
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
     first_body = [*(int(joint.idx_v) for joint in model.joints[1:]), -1]
     tips = [model.frames[tip] for tip in body.tips]
@@ -281,18 +238,16 @@ def _read(mechanism: Mechanism) -> Tables:
 
     arm, measure, bends = stacked("arm"), stacked("measure"), stacked("bends")
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
-    distances = np.linalg.norm(bodies[:, TRANSLATION : TRANSLATION + 3], axis=1)
-    legs = [path for table in rows for path in table.paths]
-    paths = read_paths(legs, parents, last, turns, kinds == PRISMATIC, distances)
+    paths = read_paths([path for table in rows for path in table.paths], chains)
     routed = reached(paths, count, mechanism.coordinates)
     arm_start, arm_row, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
     bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
     return Tables(
         parents=parents,
-        kinds=kinds,
-        bodies=bodies,
-        charts=np.array(charts, dtype=np.int64),
-        chart_frames=np.array(frames).reshape(-1, 3, 3),
+        kinds=chains.kinds,
+        bodies=chains.bodies,
+        charts=chains.charts,
+        chart_frames=chains.chart_frames,
         guided=mechanism.guided,
         gravity=np.array(model.gravity.linear),
         lumps=mechanism.inertia,
@@ -406,28 +361,3 @@ def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.in
     """Return where each row begins among the entries that are wanted, and the entries' rows and columns."""
     rows, columns = np.nonzero(wanted)
     return np.append(0, np.cumsum(wanted.sum(axis=1))), np.ascontiguousarray(rows), np.ascontiguousarray(columns)
-
-
-def _coordinates(model: pin.Model, index: int) -> list[_Body]:
-    """Return the coordinates of a joint, each about or along an axis of its frame."""
-    joint = model.joints[index]
-    if joint.shortname() in FREE_JOINTS:
-        kind = PRISMATIC if joint.nq == joint.nv else 0
-        return [_Body(kind, axis) for axis in np.eye(3)]
-    data = joint.createData()
-    joint.calc(data, np.zeros(1) if joint.nq == 1 else pin.neutral(model), np.zeros(1))
-    subspace = np.asarray(data.S)[:, 0] if np.ndim(data.S) == 2 else np.asarray(data.S)
-    linear, angular = subspace[:3], subspace[3:]
-    if np.allclose(angular, 0.0):
-        return [_Body(PRISMATIC, linear)]
-    if np.allclose(linear, 0.0):
-        return [_Body(0, angular)]
-    raise InputError(f"joint {model.names[index]}", "must turn about or slide along a fixed axis", joint.shortname())
-
-
-def _frame_along(axis: Array) -> Array:
-    """Return a rotation whose third column is a unit axis."""
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(axis, first), axis])

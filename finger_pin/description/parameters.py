@@ -234,9 +234,6 @@ class FingerDescription(Description):
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
-        for name, actuator in self.actuators.items():
-            if actuator.drive == "position" and any(self.tendons[each].along for each in actuator.tendons):
-                raise problem(f"actuators.{name}.drive", "must be tension for a tendon along a path", actuator.drive)
         for group, names, what in (
             ("tendon_friction", tendons, "tendon"),
             ("joint_friction", joints, "joint"),

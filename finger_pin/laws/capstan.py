@@ -25,6 +25,9 @@ from finger_pin.laws.bristle import (
 )
 from finger_pin.laws.law import Law, Row
 
+# What integrators take for an instant, s: about a hundred times the resolution of time.
+_INSTANT = 1e-12
+
 
 def capstan_coefficient(surface: Any, curvature: Any) -> Any:
     """Return mu^d = (1 - exp(-mu_e phi)) / (1 + exp(-mu_e phi)) = tanh(mu_e phi / 2), equation (16).
@@ -49,11 +52,30 @@ def delivered_tension(command: Any, loss: Any) -> Any:
     return np.maximum(0.0, command - loss)
 
 
+def _haste(p: Any) -> Any:
+    """Return what the level is at least, over the speed, N s/m: beyond the floor's reach, (9a) must not get faster.
+
+    As a driven tendon goes slack that slides against its stretched bristles, the tension in (14), y = |F^s| - b v,
+    makes (9a) y' = -sigma_0 b v^2 / (M y): a root of time that ends with an infinite rate, e / (2 M) before which
+    sqrt(e sigma_0 b) cuts it off. As a passive one goes slack, the time in which its bristles relax falls to the floor
+    within floor / (M K v), and no step may be longer than that; e sigma_0 leaves e sigma_0 / (M K).
+    """
+    return np.sqrt(_INSTANT * p[2] * p[3]) + _INSTANT * p[2]
+
+
+def _level(normal: Any, sliding: Any, speed: Any, p: Any) -> Any:
+    """Return F^n M, or what it is at least."""
+    return friction_level(normal, sliding, np.maximum(p[5], _haste(p) * np.abs(speed)))
+
+
 def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
     surface, ratio, stiffness, stribeck, floor, exponent = p[0], p[1], p[2], p[4], p[5], p[6]
-    own, by_speed, by_level = stiction_rate_slopes(stiction, speed, level, stiffness)
-    by_level = by_level * (level > floor)
+    own, by_speed, by_any = stiction_rate_slopes(stiction, speed, level, stiffness)
+    haste = _haste(p)
+    hasty = 1.0 * (level > floor) * (level <= haste * np.abs(speed))
+    by_speed = by_speed + hasty * by_any * haste * np.sign(speed)
+    by_level = by_any * (level > floor) * (1.0 - hasty)
     slope = friction_coefficient_slope(speed, coefficient, ratio * coefficient, stribeck, exponent)
     # M is proportional to mu^d, which depends on the posture through the curvature.
     share = sliding / np.maximum(coefficient, 1e-300)
@@ -62,12 +84,12 @@ def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, slidi
 
 
 def _driven(row: Row, p: Any) -> Any:
-    surface, ratio, stiffness, viscous, stribeck, floor, exponent, lag, acting = p
+    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, acting = p
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
     normal = np.abs(pressing) + np.abs(row.command)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
-    level = friction_level(normal, sliding, floor)
+    level = _level(normal, sliding, row.speed, p)
     rate = stiction_rate(row.state, row.speed, level, stiffness)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
     force = delivered_tension(row.command, loss) - acting * row.command
@@ -99,10 +121,10 @@ def _driven_account(
 
 
 def _passive(row: Row, p: Any) -> Any:
-    surface, ratio, stiffness, viscous, stribeck, floor, exponent, lag = p
+    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag = p
     coefficient = capstan_coefficient(surface, row.curvature)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
-    level = friction_level(row.load, sliding, floor)
+    level = _level(row.load, sliding, row.speed, p)
     rate = stiction_rate(row.state, row.speed, level, stiffness)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
     return -loss, rate, loss, row.load, coefficient, sliding, level

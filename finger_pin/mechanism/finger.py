@@ -16,11 +16,12 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger_signals import FingerSignals, JointForces, MotorForces, TendonForces
 from finger_pin.mechanism.foreign_model import on_model
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
-from finger_pin.mechanism.mechanism import Evaluation, Mechanism
+from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import Motion, RigidBody
 from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
@@ -207,7 +208,7 @@ class Finger:
         state.velocity[:] = 0.0 if velocity is None else velocity
         state.passive_position[:], state.passive_velocity[:] = middle(state.position), middle(state.velocity)
         if self.actuators.names:
-            angle, taken = self.actuators.angle, self._excursion(state.position)
+            angle, taken = self.actuators.angle, self.excursion(state.position)
             state.motor_position[:] = angle(state.position, tension, taken)
             moved = (state.velocity @ self.coupling_at(state.position).T)[: self.routing.actuated]
             state.motor_velocity[:] = angle(state.velocity, None, moved) - angle(state.velocity, None, 0.0 * moved)
@@ -289,16 +290,16 @@ class Finger:
             coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
         return coupling
 
-    def _excursion(self, position: Array) -> Array:
-        """Return l of the actuated tendons at theta, shape (n,), also of those along paths; shape (a,), m."""
+    def excursion(self, position: Array) -> Array:
+        """Return l of the actuated tendons at theta, shape (..., n), also of those along paths; shape (..., a), m."""
         drawn = position @ self.coupling.T
         if self.paths is not None and self.description.tree is not None:
             rest = np.array([joint.reference for joint in self.description.tree.joints.values()])
             lengths = self.paths.length(rest) - self.paths.length(position)
-            shorter = dict(zip(self.paths.routes, lengths, strict=True))
             for k, tendon in enumerate(self.description.tendons.values()):
-                drawn[k] = drawn[k] if tendon.along is None else shorter[tendon.along]
-        return np.asarray(drawn[: self.routing.actuated])
+                if tendon.along is not None:
+                    drawn[..., k] = lengths[..., list(self.paths.routes).index(tendon.along)]
+        return np.asarray(drawn[..., : self.routing.actuated])
 
     def _pulled_torque(self, x: Array, pulling: RowSignals) -> Array:
         """Return what driven or elastic tendons exert, shape (..., n), N m."""

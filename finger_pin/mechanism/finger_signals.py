@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.mechanism import Evaluation
+from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.state import State
 
 

@@ -29,7 +29,7 @@ _PARABOLAS = np.linalg.inv(np.vander(_NODES, 3)) / np.array([[3.0], [2.0], [1.0]
 _CHUNK = 4096
 # What may stay open, of all energy exchanged and in J, before the stretches of the motion where most of it stands open
 # are integrated again, and how finely; at most so many stretches, in about so many steps altogether.
-_CLOSED, _NOTHING, _FINE = 1e-5, 1e-9, 1e-10
+_CLOSED, _NOTHING, _FINE = 1e-5, 1e-12, 1e-10
 _MOST_REFINED, _MOST_STEPS = 500, 50_000
 # A power may bend inside a step where no force does, as that which a limiter loses where it would have to pull: how
 # often steps are halved there.

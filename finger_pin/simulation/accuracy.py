@@ -16,7 +16,6 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 256
@@ -30,8 +29,9 @@ _TIGHTER = 10.0
 # Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
 # is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
-# The repetition stops after so many times the run's looks at it: at a tighter tolerance it may be far slower.
-_PATIENCE = 3
+# The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
+# far slower, and a motion that takes so many steps shows early how sensitive it is.
+_PATIENCE, _MOST_LOOKS = 2, 600
 # The share of the energy exchanged to which an account has to close, and what is too little to count, J.
 _OPEN, _NOTHING = 1e-4, 1e-12
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
@@ -39,8 +39,6 @@ _OPEN, _NOTHING = 1e-4, 1e-12
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
 # A contact is too stiff where a newton presses it in by so small a part of what positions are computed to.
 _SEEN = 1e-4
-# Stiction so many times above the level that sliding settles at is being let go.
-_LETTING_GO = 30.0
 
 
 def expected_error(scenario: Scenario) -> float:
@@ -71,7 +69,7 @@ def estimate_error(
     settings = scenario.simulation
     tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in ("rtol", "atol_scale")}
     looks = count()
-    most = _PATIENCE * (1 + trajectory.statistics.steps // CHUNK)
+    most = min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), _MOST_LOOKS)
     tightened = scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
     other = repeated(tightened, lambda: next(looks) >= most)
     times = scenario.sample_times()
@@ -124,23 +122,6 @@ def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
         f"{name} rings almost undamped at {values[fastest].imag / (2.0 * np.pi):.3g} Hz, and steps of "
         f"{reached / steps:.1g} s on average follow it; more viscous friction, a softer spring or more mass there helps"
     )
-
-
-def floor_advice(signals: FingerSignals) -> str:
-    """Return what to try where a run ends because an unloaded contact lets its bristles go; else empty.
-
-    As a tendon goes slack with bristles stretched against its motion, they relax ever faster while the normal force
-    falls: a square root singularity of (9a) and (14), which the floor smooths over about g_min^2 / (sigma_0 F^s v) of
-    time.
-    """
-    kinds = {
-        "tendon": (signals.state.tendon_stiction, signals.tendons.level),
-        "joint": (signals.state.joint_stiction, signals.joints.level),
-    }
-    for kind, (stiction, level) in kinds.items():
-        if np.any(np.abs(stiction) > _LETTING_GO * level):
-            return f"a larger finger.{kind}_friction.floor: stretched bristles are let go without load"
-    return ""
 
 
 def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:

@@ -37,7 +37,6 @@ from finger_pin.simulation.accuracy import (
     CHUNK,
     check_memory,
     estimate_error,
-    floor_advice,
     open_account,
     ringing,
     too_stiff,
@@ -209,10 +208,6 @@ def simulate(
         advice = _ADVICE_TIGHT if tight else _ADVICE
         if "physical range" in trajectory.failure:
             advice = _ADVICE_RUNAWAY
-        else:
-            with np.errstate(all="ignore"):
-                last = loop.evaluate(reached, trajectory.interpolate(np.array([reached]))[0])
-                advice = floor_advice(last.finger) or advice
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:

@@ -23,7 +23,6 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
-from finger_pin.simulation.accuracy import floor_advice
 from finger_pin.simulation.told import Told
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
@@ -148,8 +147,7 @@ class Simulator:
         status = stepper.advance(stepper.time + dt)
         self._told.add(stepper.time, command, force)
         if status:
-            advice = floor_advice(self.signals()) or _ADVICE
-            raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), advice)
+            raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), _ADVICE)
         return self.state
 
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:

@@ -168,3 +168,18 @@ def test_the_controller_holds_tensions_at_the_minimum_and_follows_its_reference(
     result = fp.simulate(moving, control_period=0.002)
     assert np.abs(result.tracking_error).max() < 0.05
     assert np.abs(result.energy_residual).max() < 1e-6
+
+
+def test_servos_in_position_drive_turn_a_hinge_by_the_lengths_of_its_paths():
+    """L by the law of cosines; with the arms of the middle posture spools would stand 0.095 rad from where they do."""
+    driven = scenario({"offset": 0.25}, limit=0.5).model_dump(exclude_none=True)
+    motor = {"motor": "XL330-M288", "spool_radius": 0.005, "drive": "position"}
+    loop = {"position_loop": {"proportional": 9.2}, "tendon_rigidity": 5e3, "tendon_length": 0.2}
+    driven["finger"]["actuators"] = {name: {**motor, **loop, "tendons": [name]} for name in ("upper", "lower")}
+    driven["simulation"]["initial"] = {"position": {"hinge": 0.0}}
+    end = fp.simulate(read_scenario(driven)).isel(time=-1)
+    assert float(end.joint_position[0]) == pytest.approx(0.25, abs=2e-3)
+    opening = np.pi - 2.0 * np.arctan2(HEIGHT, REACH) + np.array([0.0, 0.25, -0.25])
+    length = np.hypot(REACH, HEIGHT) * np.sqrt(2.0 - 2.0 * np.cos(opening))
+    stretched = end.spool_tension.values * 0.2 / 5e3
+    np.testing.assert_allclose(end.motor_position, (length[0] - length[1:] + stretched) / 0.005, atol=2e-3)

@@ -14,7 +14,8 @@ from finger_pin.commands.validation.order import END, mean_order, smooth_motion,
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
 from finger_pin.core.integrator import _Recorder
-from finger_pin.core.stepper import TABLEAUS, failure
+from finger_pin.core.part import failure
+from finger_pin.core.stepper import TABLEAUS
 
 METHODS = tuple(TABLEAUS)
 ORDER = {"Rodas4": 4, "Rodas5P": 5}

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import finger_pin as fp
+from finger_pin.commands.validation.wild_fingers import wild_scenario
 
 
 def let_go(floor: float) -> tuple[fp.Scenario, np.ndarray]:
@@ -21,27 +21,20 @@ def let_go(floor: float) -> tuple[fp.Scenario, np.ndarray]:
     return scenario, x
 
 
-def test_a_floor_too_small_to_smooth_slack_is_named_and_a_larger_one_cures_it() -> None:
-    scenario, x = let_go(1e-9)
-    with pytest.raises(fp.IntegrationError, match=r"tendon_stiction.*finger\.tendon_friction\.floor"):
-        fp.simulate(scenario, initial=x)
-    simulator = fp.Simulator(fp.Finger(scenario.finger))
-    simulator.x = x
-    with pytest.raises(fp.IntegrationError, match=r"finger\.tendon_friction\.floor"):
-        simulator.step(np.zeros(4), 1e-3)
-    # As the advice says.
-    result = fp.simulate(let_go(1e-6)[0], initial=x)
-    assert result.time[-1] == 0.01
-    assert float(result.tendon_tension.sel(tendon=["T1", "T2", "T3", "T4"])[1:].min()) == 0.0
-    exchanged = float(sum(abs(result[f"energy_exchanged_{name}"]).max() for name in ("slack", "tendon_coulomb")))
-    assert float(abs(result.energy_residual).max()) < 1e-4 * exchanged
+def test_a_tendon_lets_its_bristles_go_in_the_same_way_however_small_the_floor() -> None:
+    positions = []
+    for floor in (1e-6, 1e-9, 1e-12):
+        scenario, x = let_go(floor)
+        result = fp.simulate(scenario, initial=x)
+        assert float(result.tendon_tension.sel(tendon=["T1", "T2", "T3", "T4"])[1:].min()) == 0.0
+        exchanged = float(sum(abs(result[f"energy_exchanged_{name}"]).max() for name in ("slack", "tendon_coulomb")))
+        assert float(abs(result.energy_residual).max()) < 1e-4 * exchanged
+        positions.append(result.joint_position)
+    assert max(float(abs(each - positions[0]).max()) for each in positions) < 1e-7
 
 
-def test_another_failure_is_not_blamed_on_the_floor() -> None:
-    simulator = fp.Simulator(fp.Finger("ub"))
-    broken = simulator.x
-    broken[5] = 1e200
-    simulator.x = broken
-    with pytest.raises(fp.IntegrationError) as caught:
-        simulator.step(np.ones(4), 1e-3)
-    assert "floor" not in str(caught.value)
+def test_a_passive_tendon_goes_slack_at_great_speed_with_a_small_floor() -> None:
+    # Its load falls to the floor of 15 nN within less than the resolution of time.
+    scenario = wild_scenario(274)
+    short = scenario.simulation.model_copy(update={"duration": 1e-3})
+    assert fp.simulate(scenario.model_copy(update={"simulation": short})).time[-1] == 1e-3

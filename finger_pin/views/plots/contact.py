@@ -90,5 +90,5 @@ def _moved(axes: Axes, result: xr.Dataset) -> None:
             label = f"{name} {axis}"
             trace(axes, time, _MILLI * (place - place[0]), label=label, linewidth=1.1, **series(index))
             index += 1
-    axes.legend(loc="upper left", ncols=3)
+    axes.legend(loc="best", ncols=3)
     title(axes, "(d) free objects")

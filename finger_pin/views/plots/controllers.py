@@ -46,11 +46,11 @@ def plot_controllers(results: dict[str, xr.Dataset], rows: Sequence[Comparison])
         height=0.66,
         label="of which passive stretch",
     )
-    left.legend(loc="lower right")
     _bars(right, rows, [row.peak_tension for row in rows], BLUE, "peak command (N)", ".2f")
     left.set_title("(b) after the first second")
     left.set_yticks(range(len(rows)), [row.name for row in rows])
     left.invert_yaxis()
+    legend(left, left.get_legend_handles_labels()[0], columns=2)
     return figure
 
 

@@ -144,19 +144,20 @@ class Scene:
         turn = self.view()
         shown = ForceSet.of(forces, self._size) if forces is not None else None
         seen = [poses.translation[..., geometry.first_seen :, :], self.tips(poses), *(path.points for path in paths)]
-        large = [each for each in geometry.visuals if is_mesh(each.shape) or each.name == "palm"]
+        tree = isinstance(geometry, TreeGeometry)
+        large = [each for each in geometry.visuals if tree or is_mesh(each.shape) or each.name == "palm"]
         seen += [_corners(visual, poses) for visual in large]
         if shown is not None:
             seen.append(shown.corners)
         if ghost is not None:
             seen.append(ghost.seen())
         corners = np.concatenate([points.reshape(-1, 3) for points in seen]) @ turn.T
-        if palm is None:
+        if tree:
             # What a hand has lost, such as a pen of a model's that falls, leaves the view.
-            first = seen[0].reshape(-1, *seen[0].shape[-2:])[0] @ turn.T
+            first = np.concatenate([points.reshape(-1, *points.shape[-2:])[0] for points in seen]) @ turn.T
             middle = first.mean(axis=0)
-            reach = max(np.linalg.norm(first - middle, axis=1).max(), *self._widths)
-            corners = corners[np.linalg.norm(corners - middle, axis=1) < _LOST * reach]
+            reach = np.linalg.norm(first - middle, axis=1).max()
+            corners = corners[np.linalg.norm(corners - middle, axis=1) <= _LOST * reach]
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
@@ -246,13 +247,9 @@ class Scene:
 
 
 def _corners(visual: Visual, poses: LinkPoses) -> Array:
-    """Return the corners of a box, or of that around a mesh, in all poses of its link."""
-    if is_mesh(visual.shape):
-        points = np.asarray(visual.shape.vertices())
-        low, high = points.min(axis=0), points.max(axis=0)
-    else:
-        high = np.asarray(visual.shape.halfSide)
-        low = -high
+    """Return the corners of the box around a solid, in all poses of its link."""
+    visual.shape.computeLocalAABB()
+    low, high = visual.shape.aabb_local.min_, visual.shape.aabb_local.max_
     box = np.array(list(product(*zip(low, high, strict=True)))) @ visual.placement.rotation.T
     rotation, translation = poses.rotation[..., visual.link, :, :], poses.translation[..., visual.link, None, :]
     return np.asarray((box + visual.placement.translation) @ np.swapaxes(rotation, -1, -2) + translation)

@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from motion import fingertip, joint_position
 from pages import opened, seek
 
+from finger_pin.description.exercise import exercise
+from finger_pin.description.loading import read_scenario, to_toml
+from finger_pin.mechanism.from_mujoco import from_mujoco
 from finger_pin.views.viewer import write_animation
 
 
@@ -63,3 +67,22 @@ def test_the_ghost_moves_as_the_other_result_does(both):
     return fingerPlayer.scene.ghostLinks.at(-1).localToWorld(new MeshCat.THREE.Vector3(0.0218, 0, 0)).toArray()""")
     assert tip == pytest.approx([x, z, -y], abs=1e-5)
     assert both.find_element("id", "ghost").text == "ghost: a <test> motion"
+
+
+JOINT_ALONE = """<mujoco><worldbody><body><joint name="knuckle" axis="0 1 0" range="-10 90"/>
+<geom type="capsule" size="0.01" fromto="0 0 0 0.1 0 0"/></body></worldbody>
+<tendon><fixed name="gear"><joint joint="knuckle" coef="1"/></fixed></tendon>
+<actuator><motor name="servo" joint="knuckle"/></actuator></mujoco>"""
+
+
+def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(browser, tmp_path):
+    (tmp_path / "alone.xml").write_text(JOINT_ALONE)
+    scenario = read_scenario(exercise(from_mujoco(tmp_path / "alone.xml", "alone")), {})
+    still = {
+        "joint_position": (("time", "joint"), np.zeros((2, 1))),
+        "tendon_tension": (("time", "tendon"), np.zeros((2, 0))),
+    }
+    result = xr.Dataset(still, {"time": [0.0, 1.0]}, {"scenario": to_toml(scenario)})
+    page = opened(browser, write_animation(result, tmp_path / "alone.html").as_uri())
+    assert page.find_element("id", "joints").text.startswith("knuckle")
+    assert [each.is_displayed() for each in page.find_elements("css selector", "#legend, #tensions")] == [False, False]

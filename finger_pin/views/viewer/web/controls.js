@@ -148,6 +148,8 @@ class Player {
     document.querySelector(".grid-note").textContent = ` · grid ${1000 * this.config.grid} mm`;
     this.hand = this.config.joints.some((name) => name.includes("."));
     document.getElementById("panel").classList.toggle("hand", this.hand);
+    const tendons = this.config.strands.length > 0;
+    for (const section of document.querySelectorAll(".tendons")) section.hidden = !tendons;
     const [tensions, joints] = ["tensions", "joints"].map((name) => document.getElementById(name));
     this.rows = this.hand ? byFinger(tensions, this.config.strands, 1) : this.config.strands.map((name) => {
       const row = tensions.insertRow();

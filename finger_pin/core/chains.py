@@ -1,0 +1,103 @@
+"""Joints of a model as chains of bodies with one coordinate each, which the core moves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from finger_pin.core.rigid_body import ARMATURE, BODY_COLUMNS, CENTRE, INERTIA, MASS, PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.rigid_body import FREE_JOINTS
+
+
+class Chains(NamedTuple):
+    """The bodies of `Tables`, and where the joints of the model are among them.
+
+    Attributes:
+        parents, kinds, bodies, charts, chart_frames: As in `Tables`.
+        last: Of every joint of the model, the base first, its last body; -1 for the base.
+        turns: Rotation of the joint's frame to that body's, shape (3, 3) each.
+    """
+
+    parents: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    bodies: Array
+    charts: NDArray[np.int64]
+    chart_frames: Array
+    last: list[int]
+    turns: list[Array]
+
+
+class _Body(NamedTuple):
+    """One coordinate of a joint: whether it slides, and its axis in the frame of the joint."""
+
+    kind: int
+    axis: Array
+
+
+def read_chains(model: pin.Model) -> Chains:
+    """Read the bodies of a model.
+
+    Raises:
+        InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
+    """
+    size = int(model.nv)
+    parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
+    bodies, charts, frames = np.zeros((size, BODY_COLUMNS)), [], []
+    # Of every joint of the model, the base first: its last body, and how that one's frame is turned.
+    last, turns = [-1], [np.eye(3)]
+    for joint in range(1, model.njoints):
+        parent, placement = int(model.parents[joint]), model.jointPlacements[joint]
+        above, rotation, translation = last[parent], turns[parent].T @ placement.rotation, placement.translation
+        translation, turn = turns[parent].T @ translation, np.eye(3)
+        chain = _coordinates(model, joint)
+        first = int(model.joints[joint].idx_v)
+        if len(chain) == 3 and chain[0].kind != PRISMATIC:
+            charts.append(first)
+            frames.append(rotation)
+        for i, part in enumerate(chain, start=first):
+            turned = _frame_along(part.axis)
+            parents[i], kinds[i] = above, part.kind
+            bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
+            bodies[i, TRANSLATION : TRANSLATION + 3] = translation
+            bodies[i, ARMATURE] = model.armature[i]
+            above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
+        inertia = model.inertias[joint]
+        bodies[above, MASS] = inertia.mass
+        bodies[above, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
+        moments = turn.T @ inertia.inertia @ turn
+        bodies[above, INERTIA : INERTIA + 6] = moments[np.triu_indices(3)]
+        last.append(above)
+        turns.append(turn)
+    return Chains(
+        parents, kinds, bodies, np.array(charts, dtype=np.int64), np.array(frames).reshape(-1, 3, 3), last, turns
+    )
+
+
+def _coordinates(model: pin.Model, index: int) -> list[_Body]:
+    """Return the coordinates of a joint, each about or along an axis of its frame."""
+    joint = model.joints[index]
+    if joint.shortname() in FREE_JOINTS:
+        kind = PRISMATIC if joint.nq == joint.nv else 0
+        return [_Body(kind, axis) for axis in np.eye(3)]
+    data = joint.createData()
+    joint.calc(data, np.zeros(1) if joint.nq == 1 else pin.neutral(model), np.zeros(1))
+    subspace = np.asarray(data.S)[:, 0] if np.ndim(data.S) == 2 else np.asarray(data.S)
+    linear, angular = subspace[:3], subspace[3:]
+    if np.allclose(angular, 0.0):
+        return [_Body(PRISMATIC, linear)]
+    if np.allclose(linear, 0.0):
+        return [_Body(0, angular)]
+    raise InputError(f"joint {model.names[index]}", "must turn about or slide along a fixed axis", joint.shortname())
+
+
+def _frame_along(axis: Array) -> Array:
+    """Return a rotation whose third column is a unit axis."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(axis, first), axis])
