@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from finger_pin.core.binding import bound_at, call_at
+from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import place_bodies
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.law_code import call_filling
@@ -20,11 +23,35 @@ def _book(tables: Any, work: Any, totals: Any) -> None:
         totals[c] = 0.0
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
+        if begin < tables.touching:
+            for k in range(begin, end, 3):
+                if work.paths.asleep[k] == 0:
+                    call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + 3)
+        else:
+            call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
         for i in range(tables.books.shape[1]):
             if tables.books[g, i] >= 0:
                 for k in range(begin, end):
                     totals[tables.books[g, i]] += work.powers[i, k]
+
+
+@compiled
+def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: Any) -> None:
+    """Wake the contacts that may have closed since the state before the m-th."""
+    for f in range(tables.charts.size):
+        # What a free body has turned by: its angles count from its attitude.
+        first, second, cosine = attitudes[m - 1, f], attitudes[m, f], 0.0
+        for r in range(4):
+            cosine += first[r] * second[r]
+        before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
+    wake(tables, work.paths, before, after)
+    width = work.torque.size
+    for k in range(tables.touching):
+        # Bent bristles tell of a contact that was closed meanwhile.
+        if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
+            first = k - k % 3
+            for each in range(first, first + 3):
+                work.paths.asleep[each] = 0
 
 
 @entry
@@ -59,6 +86,11 @@ def evaluate_many(
     """
     model = bound_at(address, MODEL)
     tables, control, work = model.tables, model.control, model.work
+    # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
+    sleepy = tables.touching > 0 and rates.shape[0] == 0 and bases.shape[0] == 0
+    before = model.rate
+    for k in range(tables.touching):
+        work.paths.asleep[k] = 0
     for m in range(states.shape[0]):
         for i in range(commands.shape[1]):
             control.tension[i] = commands[m, i]
@@ -67,6 +99,8 @@ def evaluate_many(
                 tables.tip_force[t, r] = forces[m, t, r]
         for c in range(states.shape[1]):
             model.state[c] = states[m, c]
+        if sleepy and m > 0:
+            _wake(tables, work, attitudes, m, before, model.state)
         _set_base(bases, m, tables, work)
         place_bodies(tables, attitudes[m])
         if rates.shape[0] > 0 or bases.shape[0] > 0:
@@ -89,6 +123,10 @@ def evaluate_many(
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]
         _book(tables, work, booked[m])
+        if sleepy:
+            settle(tables, work.rows, work.paths, before if m > 0 else model.state, model.state)
+            for c in range(states.shape[1]):
+                before[c] = model.state[c]
         last = booked.shape[1] - 1
         if model.power != 0:
             last -= 1

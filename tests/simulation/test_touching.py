@@ -7,6 +7,7 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.exceptions import AccuracyWarning
+from finger_pin.simulation.starting import packed_state
 from finger_pin.views.summary import summarize
 
 #: A ball that falls on the fingertip, off it, and on the floor.
@@ -182,3 +183,17 @@ def test_a_contact_too_stiff_for_its_tolerance_is_named():
     with pytest.warns(AccuracyWarning, match=r"^distal-plate is too stiff .* by 5e-12 m, .* to about 1e-07 m") as said:
         found = fp.simulate(fp.load_scenario("press", stiff))
     assert "\n" not in str(said[0].message) and found.attrs["accuracy"] == str(said[0].message)
+
+
+def test_powers_of_many_states_are_those_of_each_alone(scene, pushed):
+    loop = ClosedLoop.from_scenario(fp.load_scenario(scene)).compiled()
+    x = np.array([last_state(loop.finger, pushed, k) for k in range(0, 1200, 8)])
+    times = 8e-3 * np.arange(len(x))
+    alone = np.concatenate([loop.powers(times[k : k + 1], x[k : k + 1]) for k in range(len(x))])
+    assert loop.powers(times, x) == pytest.approx(alone, rel=1e-12, abs=1e-18)
+    # What slept meanwhile has met the ball.
+    assert alone[:, list(loop.finger.mechanism.books.powers).index("contacts_impact")].max() > 0.0
+
+
+def last_state(finger, result, k):
+    return packed_state(result.isel(time=slice(k, k + 1)), finger)
