@@ -104,7 +104,7 @@ def still(finger, samples=3):
     )
 
 
-@pytest.mark.parametrize("joints", [1, 2, 4])
+@pytest.mark.parametrize("joints", [1, 4])
 @settings(FEW, max_examples=1)
 @given(data=st.data())
 def test_every_figure_and_page_of_any_finger_can_be_drawn(joints, data):
