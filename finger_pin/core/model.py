@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from finger_pin.core import condensation, contacts, dynamics, linearisation, paths
+from finger_pin.core import condensation, contacts, dynamics, linearisation, path_derivatives, paths
 from finger_pin.core.binding import Vector, bound, bound_at, kind_of
 from finger_pin.core.compilation import address_of
 from finger_pin.core.inputs import Control, move_base
@@ -148,7 +148,7 @@ def _measure(address: int, _time: float) -> int:
 def _turn(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
     width = model.work.torque.size
-    paths.linearise_paths(model.tables, model.state[width : 2 * width], model.work, model.linear)
+    path_derivatives.linearise_paths(model.tables, model.state[width : 2 * width], model.work, model.linear)
     return 1
 
 

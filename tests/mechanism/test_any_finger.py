@@ -221,7 +221,7 @@ def test_a_step_ends_finite_or_says_why_it_stopped(table, scale, pulls, steps, m
 
 
 def test_a_run_that_cannot_go_on_ends_with_time_state_and_advice():
-    """A passive tendon of a millionth of a picogram at the largest stiffness: waves of 1e13 Hz."""
+    """A passive tendon of a femtogram at the largest stiffness, whose waves have 2e13 Hz."""
     frantic = {
         "finger.passive_tendon.mass": 1e-18,
         "finger.passive_tendon.stiffness": 1e10,
