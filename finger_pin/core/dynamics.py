@@ -121,7 +121,7 @@ def _exert(tables: Any, q: Any, v: Any, z: Any, work: Any, rate: Any) -> None:
             for k in range(begin, end):
                 if tables.state[k] >= 0:
                     rate[tables.state[k]] = rows[RATE, k]
-        if tables.touch[begin] > 0:
+        if end > begin and tables.touch[begin] > 0:
             push(tables, work)
 
 
