@@ -196,7 +196,7 @@ def linearise(model: Any, address: int, time: float) -> None:
         tip_force_rates(control, time, work.force_rate)
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        if tables.touch[begin] == 0:
+        if begin >= tables.touching:
             call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
             continue
         for k in range(begin, end, 3):
