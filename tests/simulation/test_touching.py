@@ -179,7 +179,7 @@ def test_two_fingers_hold_a_ball_until_friction_can_no_longer_carry_it():
 
 
 def test_a_contact_too_stiff_for_its_tolerance_is_named():
-    stiff = {"simulation.duration": 1.0, "environment.objects.plate.surface.stiffness": 2e11}
+    stiff = {"simulation.duration": 0.72, "environment.objects.plate.surface.stiffness": 2e11}
     with pytest.warns(AccuracyWarning, match=r"^distal-plate is too stiff .* by 5e-12 m, .* to about 1e-07 m") as said:
         found = fp.simulate(fp.load_scenario("press", stiff))
     assert "\n" not in str(said[0].message) and found.attrs["accuracy"] == str(said[0].message)
