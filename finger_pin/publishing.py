@@ -9,6 +9,7 @@ instant a process is killed, every name leads to a file of the same set; the nex
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import time
@@ -66,8 +67,9 @@ def _claim(stage: Path, hidden: Path) -> None:
         try:
             os.rename(stage, hidden)
             return
-        except OSError:
-            if not hidden.is_dir():
+        except OSError as error:
+            # Who was publishing may have finished meanwhile.
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) and not hidden.is_dir():
                 raise
         with contextlib.suppress(FileNotFoundError):
             if time.monotonic() > deadline or time.time() > hidden.stat().st_mtime + _PATIENCE:

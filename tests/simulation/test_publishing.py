@@ -1,5 +1,6 @@
 """One set of results takes the place of another at one instant, whatever fails and whoever is killed."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -147,6 +148,21 @@ def test_a_run_that_is_going_on_keeps_its_stage(tmp_path, result):
         living.write(result)
         living.publish()
     assert set(contents(tmp_path)) == {"scenario.toml", "trajectory.nc"}
+
+
+def test_who_finishes_publishing_just_then_is_not_in_the_way(tmp_path, result, monkeypatch):
+    folder, rename, tries = ResultFolder(tmp_path), os.rename, []
+    folder.write(result)
+
+    def once_too_early(source, target):
+        tries.append(target)
+        if len(tries) == 1:
+            raise OSError(errno.ENOTEMPTY, os.strerror(errno.ENOTEMPTY))
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", once_too_early)
+    folder.publish()
+    assert len(tries) == 2 and set(contents(tmp_path)) == {"scenario.toml", "trajectory.nc"}
 
 
 def test_runs_that_publish_at_the_same_time_do_not_mix(tmp_path, result):
