@@ -119,8 +119,8 @@ def _contact(study: Mapping[str, Any]) -> Iterator[str]:
     for name, each in study["scenarios"].items():
         yield from _work_precision(name, each)
         yield ""
-    if study["mujoco"]:
-        yield from _mujoco(study["mujoco"])
+    for each in study["mujoco"]:
+        yield from _mujoco(each)
 
 
 def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:
