@@ -26,6 +26,7 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
         ("step-interface", _stepping),
         ("joints", _joints),
         ("hand", _hand),
+        ("contact", _contact),
         ("mujoco", _mujoco),
         ("many-runs", _many),
         ("main-job", _main_job),
@@ -114,8 +115,17 @@ def _hand(study: Mapping[str, Any]) -> Iterator[str]:
     yield from table(("", "hand", "one finger", "hand / finger"), rows)
 
 
+def _contact(study: Mapping[str, Any]) -> Iterator[str]:
+    for name, each in study["scenarios"].items():
+        yield from _work_precision(name, each)
+        yield ""
+    for each in study["mujoco"]:
+        yield from _mujoco(each)
+
+
 def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:
-    yield f"MuJoCo {study['version']}, fig6 without friction other than viscous, {study['duration']:g} s"
+    what = f"{study['scenario']} without friction other than viscous"
+    yield f"MuJoCo {study['version']}, {what}, {study['duration']:g} s"
     for measure, best in study["ours"].items():
         yield f"{measure} error within {study['limit']:g} rad; ours: {best['method']} at rtol {best['rtol']:g}"
         rows = [

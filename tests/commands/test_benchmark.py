@@ -150,6 +150,8 @@ def stages():
     study = {"duration": 8.0, "target": 1e-5, "agreement": {"rms": 1e-10}, "points": points, "at_target": costs}
     row = {"measure": "worst", "integrator": "Euler", "massless": False, "step": 1e-5, "error": 1e-4}
     row |= {"rollout_error": 1e-4, "ours": 0.01, "loop": 0.5, "rollout": 0.1, "loop_over_ours": 50.0}
+    compared = {"version": "3", "scenario": "fig6", "duration": 8.0, "limit": 1e-3}
+    compared |= {"ours": {"worst": {"method": "Rodas4", "rtol": 0.1}}, "rows": [row | {"rollout_over_ours": 10.0}]}
     joint = {"states": 5, "wall_time": 0.1, "real_time_factor": 20.0, "steps": 9, "time_per_step": 1e-5}
     job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
     return {
@@ -164,8 +166,8 @@ def stages():
                 n: {kind: {"hand": 1.0 / int(n), "fingers": 0.9} for kind in ("integration", "whole")} for n in "12"
             }
         },
-        "mujoco": {"version": "3", "duration": 8.0, "limit": 1e-3, "ours": {"worst": {"method": "Rodas4", "rtol": 0.1}}}
-        | {"rows": [row | {"rollout_over_ours": 10.0}]},
+        "contact": {"scenarios": {"press": study}, "mujoco": [compared]},
+        "mujoco": compared,
         "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}
         | {"speed_up_without_start": None},
         "main-job": job | {"later": 3.0, "later_processor_time": 3.0, "later_memory": 2**21},
