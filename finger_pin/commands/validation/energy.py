@@ -14,10 +14,11 @@ from finger_pin.views.plots.style import new_figure, styled
 
 TITLE = "Energy account"
 TOLERANCES = (1e-4, 1e-6, 1e-8)
-#: The residual at the default tolerances over the work of actuators and electronics, and at a hundredth of them.
+#: The residual at the default tolerances over the work supplied, and at a hundredth of them.
 LIMIT, TIGHT_LIMIT = 2e-6, 2e-8
-#: The same where bodies hit each other: the account of a step in which a contact closes is less exact.
-IMPACT_LIMITS = {"pinch": (1e-5, 1e-6)}
+#: The same where bodies hit each other: the account of a step in which a contact closes is less exact, and looked at
+#: again only where it leaves 1e-5 of all that is exchanged open, which is two to three times what is supplied.
+IMPACT_LIMITS = {"pinch": (3e-5, 1e-6)}
 
 
 def run(name: str, tolerance: float) -> xr.Dataset:
@@ -26,8 +27,8 @@ def run(name: str, tolerance: float) -> xr.Dataset:
 
 
 def supplied(result: xr.Dataset) -> float:
-    """Return the greatest work of the actuators and of the motors' electronics, J."""
-    names = [f"energy_exchanged_{each}" for each in ("actuators", "electrical")]
+    """Return the greatest work of actuators and motors' electronics, and of what moves palm and objects, J."""
+    names = [f"energy_exchanged_{each}" for each in ("actuators", "electrical", "palm", "objects")]
     return sum(float(abs(result[name]).max()) for name in names if name in result)
 
 
