@@ -14,7 +14,7 @@ import numpy as np
 from finger_pin.core import law_code as at
 from finger_pin.core.binding import Indices, Vector
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import Control
+from finger_pin.core.control import Control
 from finger_pin.core.islands import find_islands
 from finger_pin.core.tables import Tables
 
@@ -72,7 +72,7 @@ def build_blocks(tables: Tables, control: Control) -> Blocks:
     def room(size: int) -> Any:
         return np.zeros(size, dtype=np.int64)
 
-    blocks = Blocks(
+    return Blocks(
         atom=atom,
         row_atom=row_atom,
         label=room(atoms),
@@ -90,7 +90,13 @@ def build_blocks(tables: Tables, control: Control) -> Blocks:
         loose=np.zeros(states),
         current=room(1),
     )
-    return blocks
+
+
+@compiled
+def extent(blocks: Any, b: int) -> Any:
+    """Return how many coordinates a block has, and columns: r of positions, velocities and states, and time."""
+    width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
+    return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
 
 
 @compiled

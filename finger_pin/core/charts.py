@@ -14,9 +14,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.compilation import compiled
+from finger_pin.core.law_code import inlined
 from finger_pin.core.rigid_body import ROTATION
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
+
+
+def place(frame: Any, q: Any, body: Any) -> None:
+    """Write the attitude of a quaternion into the placement of the first body that turns, whose z axis is its x axis.
+
+    Args:
+        frame: Rotation of the spherical joint in the body before it, shape (3, 3).
+        q: Quaternion, shape (4,).
+        body: Row of the table of bodies.
+    """
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    along_x = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w))
+    along_y = (2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w))
+    along_z = (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y))
+    for r in range(3):
+        # The frame along x has its axes along -z, y and x.
+        body[ROTATION + 3 * r] = -(frame[r, 0] * along_z[0] + frame[r, 1] * along_z[1] + frame[r, 2] * along_z[2])
+        body[ROTATION + 3 * r + 1] = frame[r, 0] * along_y[0] + frame[r, 1] * along_y[1] + frame[r, 2] * along_y[2]
+        body[ROTATION + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
+
+
+def place_all(tables: Any, attitude: Any) -> None:
+    """Place all free bodies by their quaternions, shape (f, 4)."""
+    for f in range(tables.charts.size):
+        place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
+
+
+_place = inlined(place)
+#: `place_all` in compiled code.
+place_bodies = inlined(place_all)
 
 
 @compiled
@@ -38,7 +69,7 @@ def rechart(tables: Any, x: Any, attitude: Any) -> None:
         size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
         for r in range(4):
             q[r] /= size
-        place(tables.chart_frames[f], q, tables.bodies[i])
+        _place(tables.chart_frames[f], q, tables.bodies[i])
 
 
 @compiled
@@ -51,39 +82,6 @@ def _turn(q: Any, axis: int, angle: float) -> None:
     q[3] = cosine * scalar - sine * own
     q[second] = cosine * along + sine * across
     q[third] = cosine * across - sine * along
-
-
-@compiled
-def place(frame: Any, q: Any, body: Any) -> None:
-    """Write the attitude of a quaternion into the placement of the first body that turns, whose z axis is its x axis.
-
-    Args:
-        frame: Rotation of the spherical joint in the body before it, shape (3, 3).
-        q: Quaternion, shape (4,).
-        body: Row of the table of bodies.
-    """
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    along_x = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w))
-    along_y = (2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w))
-    along_z = (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y))
-    for r in range(3):
-        # The frame along x has its axes along -z, y and x.
-        body[ROTATION + 3 * r] = -(frame[r, 0] * along_z[0] + frame[r, 1] * along_z[1] + frame[r, 2] * along_z[2])
-        body[ROTATION + 3 * r + 1] = frame[r, 0] * along_y[0] + frame[r, 1] * along_y[1] + frame[r, 2] * along_y[2]
-        body[ROTATION + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
-
-
-def place_all(tables: Any, attitude: Array) -> None:
-    """Place all free bodies by their quaternions, shape (f, 4)."""
-    for frame, quaternion, at in zip(tables.chart_frames, attitude, tables.charts, strict=True):
-        place.py_func(frame, quaternion, tables.bodies[at])  # type: ignore[attr-defined]
-
-
-@compiled
-def place_bodies(tables: Any, attitude: Any) -> None:
-    """Do the same from compiled code."""
-    for f in range(tables.charts.size):
-        place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
 
 
 def angular_velocity(angles: Array, rates: Array) -> Array:

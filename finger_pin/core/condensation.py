@@ -16,6 +16,7 @@ from typing import Any
 
 from finger_pin.core import law_code as at
 from finger_pin.core.binding import call_at
+from finger_pin.core.blocks import extent
 from finger_pin.core.compilation import compiled, compiled_loosely
 
 
@@ -190,8 +191,8 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
     linear, blocks = model.linear, model.linear.blocks
     places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
     states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
-    width, whole = places.size, linear.mass.shape[0]
-    wide = 2 * width + states.size + 1
+    whole = linear.mass.shape[0]
+    width, wide = extent(blocks, b)
     _gains(model, address, g, b, width, wide)
     force, velocity, reduced = linear.force, linear.velocity, linear.reduced
     inverse = 1.0 / g
@@ -257,8 +258,7 @@ def solve(linear: Any, r: Any, u: Any) -> None:
     for b in range(blocks.number[0]):
         places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
         states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
-        width = places.size
-        wide = 2 * width + states.size + 1
+        width, wide = extent(blocks, b)
         for c in range(width):
             right[c], right[width + c] = r[places[c]], r[whole + places[c]]
         for c in range(states.size):

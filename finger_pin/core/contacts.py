@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.core import law_code as at
+from finger_pin.core.blocks import extent
 from finger_pin.core.compilation import compiled
 from finger_pin.core.law_code import call_value
 from finger_pin.core.paths import passes, push
@@ -89,8 +90,7 @@ def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
     """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
     blocks = linear.blocks
     b = blocks.current[0]
-    width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
-    wide = 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
+    width, wide = extent(blocks, b)
     for index in range(blocks.touch_start[b], blocks.touch_start[b + 1]):
         _contact_gains(tables, g, blocks.touches[index], work, linear, width, wide)
 
@@ -99,9 +99,7 @@ def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
 def add_pushes(tables: Any, work: Any, k: int, linear: Any) -> None:
     """Add to the change of a pin's load that of the forces of the closed contacts of its block."""
     paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
-    b = blocks.current[0]
-    width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
-    wide = 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
+    _, wide = extent(blocks, blocks.current[0])
     for index in range(own.closed_count[0]):
         e = own.closed[index]
         passing = passes(paths, e, tables.pins[k])

@@ -8,10 +8,11 @@ import numpy as np
 
 from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import guide, inputs, tip_forces
+from finger_pin.core.inputs import inputs, tip_forces
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
+from finger_pin.core.signal import signal_derivatives
 from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
 
@@ -45,7 +46,7 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
     """Return |-e S + F| of (17) for row k, and keep the vector and e."""
     body = tables.pins[k]
     carrier = tables.carriers[body]
-    total = 0.0
+    pull = work.pull[k]
     for r in range(3):
         value = tables.directions[body, r]
         if carrier >= 0:
@@ -53,15 +54,15 @@ def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
             for c in range(3):
                 value += work.rotation[carrier, r, c] * tables.directions[body, c]
         work.lever[k, r] = value
-        pull = -load * value
+        pull[r] = -load * value
         for t in range(tables.tip_body.size):
-            pull += tables.carried[t, body] * tables.tip_force[t, r]
-        for index in range(work.paths.closed_count[0]):
-            e = work.paths.closed[index]
-            pull += passes(tables.paths, e, body) * work.paths.push[e, r]
-        work.pull[k, r] = pull
-        total += pull * pull
-    return np.sqrt(total)
+            pull[r] += tables.carried[t, body] * tables.tip_force[t, r]
+    for index in range(work.paths.closed_count[0]):
+        e = work.paths.closed[index]
+        passing = passes(tables.paths, e, body)
+        for r in range(3):
+            pull[r] += passing * work.paths.push[e, r]
+    return np.sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2])
 
 
 @compiled
@@ -165,7 +166,7 @@ def evaluate(model: Any, address: int, time: float) -> None:
     for j in range(size, width):
         work.acceleration[j] = work.torque[j] / tables.lumps[j - size]
     if work.guide.size > 0:
-        guide(control, time, 2, work.guide)
+        signal_derivatives(control.guide, time, 2, work.guide)
         for j in range(width):
             if tables.guided[j] >= 0:
                 work.acceleration[j] = work.guide[tables.guided[j]]

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.core.charts import Charts
-from finger_pin.core.inputs import held_control
+from finger_pin.core.control import held_control
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.model import BoundModel
 from finger_pin.core.signals import evaluate_many, motion_many
 from finger_pin.core.stepper import in_threads
-from finger_pin.core.tables import build_tables, build_work
+from finger_pin.core.tables import build_tables
+from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger

@@ -1,185 +1,22 @@
-"""What comes from outside, compiled: the paper's controller (19)-(22), inputs over time, or inputs that are held."""
+"""What comes from outside, compiled: values of a `Control`, and their slopes."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finger_pin.core.binding import Indices, Matrix, Vector
 from finger_pin.core.compilation import compiled
+from finger_pin.core.control import HELD, SCHEDULED
 from finger_pin.core.law_code import inlined
-from finger_pin.core.signal import Signal, no_signal, signal_curvatures, signal_derivative, signal_rates, signal_values
+from finger_pin.core.signal import signal_derivative, signal_derivatives, signal_values
 from finger_pin.core.trigonometry import sine_cosine
-from finger_pin.description.routing import Array
 from finger_pin.laws import controller as controller_laws
 from finger_pin.laws import palm as palm_laws
-
-HELD, PLANNED, SCHEDULED = range(3)
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
 _base_motion = inlined(palm_laws.base_motion)
-
-
-class Control(NamedTuple):
-    """Inputs of N coordinates and u channels; T planned tensions, those of passive tendons among them.
-
-    Attributes:
-        kind: HELD, PLANNED or SCHEDULED.
-        tension: What is held, shape (u,); zero for inputs that are planned or scheduled.
-        gain: K_P, shape (N,).
-        minimum: f0, shape (T,).
-        inverse: Pseudo-inverse of H_c^T, shape (T, N).
-        internal: f^k, shape (T,).
-        loop: The controller that a planned tension belongs to, each with a lambda of its own, shape (T,).
-        channel: The channel of a planned tension, -1 for a passive tendon, shape (T,).
-        reference: Desired positions before the coupling (20), r functions.
-        coupling: Shape (N, r).
-        offset: Shape (N,).
-        schedule: Inputs over time, u functions.
-        force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
-        damping: K_D, shape (N,).
-        damped: Whether it is not zero.
-        guide: Paths along which coordinates are moved, or no functions.
-        palm: Path of the base: x, y, z, roll, pitch, yaw, or no functions for a base at rest.
-        desired, rate, acceleration: Memory, tau^d, then theta^d' and theta^d'', shape (N,).
-        planned: Memory, f_hat, shape (T,).
-        active: Memory, the tension that sets lambda, by controller.
-        level: Memory, lambda, by controller.
-        base, slope: Memory, values of a signal.
-        by_position, by_velocity: Memory, du/dq and du/dv, shape (u, N).
-        by_time: Memory, du/dt, shape (u,).
-    """
-
-    kind: int
-    tension: Vector
-    gain: Vector
-    minimum: Vector
-    inverse: Matrix
-    internal: Vector
-    loop: Indices
-    channel: Indices
-    reference: Signal
-    coupling: Matrix
-    offset: Vector
-    schedule: Signal
-    force: Signal
-    damping: Vector
-    damped: bool
-    guide: Signal
-    palm: Signal
-    desired: Vector
-    rate: Vector
-    acceleration: Vector
-    planned: Vector
-    active: Indices
-    level: Vector
-    base: Vector
-    slope: Vector
-    by_position: Matrix
-    by_velocity: Matrix
-    by_time: Vector
-
-
-def planned_control(
-    channels: int,
-    gain: Array,
-    minimum: Array,
-    inverse: Array,
-    internal: Array,
-    channel: NDArray[np.int64],
-    reference: Signal,
-    coupling: Array,
-    offset: Array,
-    loop: NDArray[np.int64] | None = None,
-    damping: Array | None = None,
-) -> Control:
-    """Return the paper's controller, with damping K_D (theta^d' - theta') if given, or several of them side by side."""
-    loops = np.zeros(len(minimum), dtype=np.int64) if loop is None else np.asarray(loop, dtype=np.int64)
-    control = _control(
-        PLANNED, channels, gain, minimum, inverse, internal, loops, channel, reference, coupling, offset, no_signal()
-    )
-    if damping is None:
-        return control
-    return control._replace(damping=np.array(damping, dtype=float), damped=bool(np.any(damping)))
-
-
-def held_control(channels: int, coordinates: int) -> Control:
-    """Return the control that keeps given tensions."""
-    return _without_plan(HELD, channels, coordinates, no_signal())
-
-
-def scheduled_control(schedule: Signal, coordinates: int) -> Control:
-    """Return the control that gives inputs over time."""
-    return _without_plan(SCHEDULED, len(schedule.harmonics), coordinates, schedule)
-
-
-def _without_plan(kind: int, channels: int, coordinates: int, schedule: Signal) -> Control:
-    nothing, none = np.zeros(0), np.zeros(0, dtype=np.int64)
-    return _control(
-        kind,
-        channels,
-        np.zeros(coordinates),
-        nothing,
-        np.zeros((0, coordinates)),
-        nothing,
-        none,
-        none,
-        no_signal(),
-        np.zeros((coordinates, 0)),
-        np.zeros(coordinates),
-        schedule,
-    )
-
-
-def _control(
-    kind: int,
-    channels: int,
-    gain: Array,
-    minimum: Array,
-    inverse: Array,
-    internal: Array,
-    loop: NDArray[np.int64],
-    channel: NDArray[np.int64],
-    reference: Signal,
-    coupling: Array,
-    offset: Array,
-    schedule: Signal,
-) -> Control:
-    coordinates, loops = len(gain), int(loop.max(initial=-1)) + 1
-    functions = max(len(reference.harmonics), len(schedule.harmonics))
-    return Control(
-        kind=kind,
-        tension=np.zeros(channels),
-        gain=np.array(gain, dtype=float),
-        minimum=np.array(minimum, dtype=float),
-        inverse=np.ascontiguousarray(inverse, dtype=float),
-        internal=np.array(internal, dtype=float),
-        loop=np.array(loop, dtype=np.int64),
-        channel=np.array(channel, dtype=np.int64),
-        reference=reference,
-        coupling=np.ascontiguousarray(coupling, dtype=float),
-        offset=np.array(offset, dtype=float),
-        schedule=schedule,
-        force=no_signal(),
-        damping=np.zeros(coordinates),
-        damped=False,
-        guide=no_signal(),
-        palm=no_signal(),
-        desired=np.zeros(coordinates),
-        rate=np.zeros(coordinates),
-        acceleration=np.zeros(coordinates),
-        planned=np.zeros(len(minimum)),
-        active=np.zeros(loops, dtype=np.int64),
-        level=np.zeros(loops),
-        base=np.zeros(functions),
-        slope=np.zeros(functions),
-        by_position=np.zeros((channels, coordinates)),
-        by_velocity=np.zeros((channels, coordinates)),
-        by_time=np.zeros(channels),
-    )
 
 
 @compiled
@@ -212,7 +49,7 @@ def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) ->
             wanted += control.coupling[j, k] * base[k]
         desired[j] = _proportional_torque(control.gain[j], wanted, position[j])
     if control.damped:
-        signal_rates(control.reference, time, control.slope)
+        signal_derivatives(control.reference, time, 1, control.slope)
         _coupled(control, control.slope, control.rate)
         for j in range(count):
             desired[j] += control.damping[j] * (control.rate[j] - velocity[j])
@@ -241,13 +78,13 @@ def input_slopes(control: Any, time: float) -> None:
     if control.kind == HELD:
         return
     if control.kind == SCHEDULED:
-        signal_rates(control.schedule, time, by_time)
+        signal_derivatives(control.schedule, time, 1, by_time)
         return
     count = control.gain.size
-    signal_rates(control.reference, time, control.base)
+    signal_derivatives(control.reference, time, 1, control.base)
     _coupled(control, control.base, control.rate)
     if control.damped:
-        signal_curvatures(control.reference, time, control.base)
+        signal_derivatives(control.reference, time, 2, control.base)
         _coupled(control, control.base, control.acceleration)
     for i in range(control.planned.size):
         row = control.channel[i]
@@ -273,15 +110,7 @@ def tip_forces(control: Any, time: float, tables: Any) -> None:
 @compiled
 def tip_force_rates(control: Any, time: float, rates: Any) -> None:
     """Fill their time derivatives, shape (t, 3)."""
-    if control.force.harmonics.shape[0] > 0:
-        signal_rates(control.force, time, rates.reshape(-1))
-
-
-@compiled
-def guide(control: Any, time: float, order: int, out: Any) -> None:
-    """Fill a time derivative of the paths along which coordinates are moved; what is given without stays."""
-    for j in range(min(out.size, control.guide.harmonics.shape[0])):
-        out[j] = signal_derivative(control.guide, j, time, order)
+    signal_derivatives(control.force, time, 1, rates.reshape(-1))
 
 
 @compiled

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.inputs import PLANNED, Control
+from finger_pin.core.control import PLANNED, Control
 from finger_pin.core.path_tables import select_paths
 from finger_pin.core.signal import Signal
 from finger_pin.core.tables import Tables

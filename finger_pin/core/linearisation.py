@@ -7,13 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.binding import Indices, Matrix, Vector, call_at
-from finger_pin.core.blocks import Blocks, build_blocks, partition
+from finger_pin.core.blocks import Blocks, build_blocks
 from finger_pin.core.compilation import compiled
-from finger_pin.core.inputs import Control, guide, input_slopes, tip_force_rates
+from finger_pin.core.control import Control
+from finger_pin.core.inputs import input_slopes, tip_force_rates
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
+from finger_pin.core.signal import signal_derivatives
 from finger_pin.core.tables import END, FIRST, Tables
 
 
@@ -191,7 +193,7 @@ def linearise(model: Any, address: int, time: float) -> None:
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
-    guide(control, time, 3, work.guide_rate)
+    signal_derivatives(control.guide, time, 3, work.guide_rate)
     if tables.loaded:
         tip_force_rates(control, time, work.force_rate)
     for g in range(tables.groups.shape[0]):
@@ -207,5 +209,3 @@ def linearise(model: Any, address: int, time: float) -> None:
     _load_slopes(tables, work, linear)
     if model.turn != 0:
         call_at(model.turn, address, time)
-    if tables.touching:
-        partition(tables, work, linear.blocks)

@@ -12,13 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from finger_pin.core import condensation, contacts, dynamics, linearisation, path_derivatives, paths
+from finger_pin.core import blocks, condensation, contacts, dynamics, linearisation, path_derivatives, paths
 from finger_pin.core.binding import Vector, bound, bound_at, kind_of
 from finger_pin.core.compilation import address_of
-from finger_pin.core.inputs import Control, move_base
+from finger_pin.core.control import Control
+from finger_pin.core.inputs import move_base
 from finger_pin.core.linearisation import Linear, build_linear
 from finger_pin.core.rigid_body import base_power, bias_rate
-from finger_pin.core.tables import Tables, Work
+from finger_pin.core.tables import Tables
+from finger_pin.core.work import Work
 
 
 class Model(NamedTuple):
@@ -147,8 +149,10 @@ def _measure(address: int, _time: float) -> int:
 
 def _turn(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
-    width = model.work.torque.size
-    path_derivatives.linearise_paths(model.tables, model.state[width : 2 * width], model.work, model.linear)
+    tables, work, width = model.tables, model.work, model.work.torque.size
+    path_derivatives.linearise_paths(tables, model.state[width : 2 * width], work, model.linear)
+    if tables.touching:
+        blocks.partition(tables, work, model.linear.blocks)
     return 1
 
 

@@ -10,12 +10,13 @@ import numpy as np
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.binding import bound
 from finger_pin.core.charts import place_all
+from finger_pin.core.control import Control
 from finger_pin.core.drives import Drives, advance_driven
-from finger_pin.core.inputs import Control
 from finger_pin.core.islands import Island
 from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau
-from finger_pin.core.tables import Tables, build_work
+from finger_pin.core.tables import Tables
+from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
 

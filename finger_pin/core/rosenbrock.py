@@ -11,8 +11,8 @@ from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import compiled, entry
 from finger_pin.core.condensation import solve
+from finger_pin.core.control import HELD
 from finger_pin.core.drift import carry
-from finger_pin.core.inputs import HELD
 from finger_pin.core.kinks import hold, release, strayed, turn
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau

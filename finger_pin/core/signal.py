@@ -10,11 +10,9 @@ from finger_pin.core.binding import Layers, Matrix, Vector
 from finger_pin.core.compilation import compiled
 from finger_pin.core.law_code import inlined
 from finger_pin.core.trigonometry import sine_cosine
-from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
+from finger_pin.laws.quintic import quintic
 
 _quintic = inlined(quintic)
-_quintic_rate = inlined(quintic_rate)
-_quintic_curvature = inlined(quintic_curvature)
 
 
 class Signal(NamedTuple):
@@ -67,38 +65,6 @@ def signal_values(signal: Any, time: float, out: Any) -> None:
 
 
 @compiled
-def signal_rates(signal: Any, time: float, out: Any) -> None:
-    """Fill the time derivatives of the functions."""
-    table, knots = signal.harmonics, signal.knots
-    for j in range(table.shape[0]):
-        out[j] = 0.0
-        if table[j, 1] != 0.0:
-            circular = 2.0 * np.pi * table[j, 2]
-            out[j] = table[j, 1] * circular * sine_cosine(circular * time + table[j, 3])[1]
-    if knots.size > 0 and knots[0] <= time < knots[knots.size - 1]:
-        piece, since = _piece(signal, time)
-        for j in range(table.shape[0]):
-            c = signal.coefficients[:, piece, j]
-            out[j] += _quintic_rate(since, c[0], c[1], c[2], c[3], c[4])
-
-
-@compiled
-def signal_curvatures(signal: Any, time: float, out: Any) -> None:
-    """Fill the second time derivatives of the functions."""
-    table, knots = signal.harmonics, signal.knots
-    for j in range(table.shape[0]):
-        out[j] = 0.0
-        if table[j, 1] != 0.0:
-            circular = 2.0 * np.pi * table[j, 2]
-            out[j] = -table[j, 1] * circular * circular * sine_cosine(circular * time + table[j, 3])[0]
-    if knots.size > 0 and knots[0] <= time < knots[knots.size - 1]:
-        piece, since = _piece(signal, time)
-        for j in range(table.shape[0]):
-            c = signal.coefficients[:, piece, j]
-            out[j] += _quintic_curvature(since, c[0], c[1], c[2], c[3])
-
-
-@compiled
 def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
     """Return a time derivative of function j, of order 0 to 3."""
     table, knots = signal.harmonics, signal.knots
@@ -116,3 +82,10 @@ def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
             polynomial = polynomial * since + factor
         value += polynomial
     return value
+
+
+@compiled
+def signal_derivatives(signal: Any, time: float, order: int, out: Any) -> None:
+    """Fill a time derivative of the functions, as many as there is room for; without functions what is there stays."""
+    for j in range(min(out.size, signal.harmonics.shape[0])):
+        out[j] = signal_derivative(signal, j, time, order)

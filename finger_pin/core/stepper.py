@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.charts import Charts
+from finger_pin.core.control import Control
 from finger_pin.core.drives import Drives
-from finger_pin.core.inputs import Control
 from finger_pin.core.islands import Island, find_islands, select, select_control
 from finger_pin.core.part import FIRST_STEP, Part, failure
 from finger_pin.core.tableaus import Tableau, rodas4, rodas5p

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -11,14 +10,9 @@ from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.chains import read_chains
-from finger_pin.core.law_code import SIGNALS, SLOPES, addresses, widest
-from finger_pin.core.path_tables import Paths, PathWork, build_path_work, reached, read_paths
-from finger_pin.core.rigid_body import (
-    SPATIAL_LAYERS,
-    SQUARE_LAYERS,
-)
+from finger_pin.core.law_code import SIGNALS, addresses
+from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.routing import Array
-from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import Mechanism
 
 # Columns of the table of groups.
@@ -119,61 +113,6 @@ class Tables(NamedTuple):
     bend: Vector
     curvature_offset: Vector
     paths: Paths
-
-
-class Work(NamedTuple):
-    """Memory of one evaluation and its linearisation; never holds anything between calls.
-
-    Attributes:
-        base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
-        base_rate: Their rates, shape (2, 6).
-        base_power: What the base supplies, shape (1,), W.
-        rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
-        slopes: Derivatives of the laws, shape (SLOPES, K).
-        powers: Stored energy and powers of the rows, shape (1 + powers, K).
-        arm: As in the tables, shape (arms,), with what paths through space add.
-        gradient: dl/dq there, with what they add, shape (arms,).
-        pull: Total force on the pin of each row, shape (K, 3), N.
-        lever: The pin's link direction, shape (K, 3).
-        tip: Positions of the tips, shape (t, 3), m.
-        jacobian: Of the tips, shape (t, 3, N).
-        force_rate: Time derivatives of the forces at the tips, shape (t, 3), N/s.
-        torque, external, bias, acceleration: Shape (N,).
-        command: Inputs, shape (u,).
-        guide, guide_rate: Accelerations of what is moved along paths, and their rates, shape (g,).
-    """
-
-    rotation: Layers
-    origin: Matrix
-    centre: Vector
-    base_velocity: Vector
-    base_acceleration: Vector
-    base_rate: Matrix
-    base_power: Vector
-    spatial: Layers
-    inertia: Matrix
-    composite: Matrix
-    coriolis: Matrix
-    vectors: Matrix
-    square: Layers
-    rows: Matrix
-    slopes: Matrix
-    powers: Matrix
-    arm: Vector
-    gradient: Vector
-    pull: Matrix
-    lever: Matrix
-    tip: Matrix
-    jacobian: Layers
-    force_rate: Matrix
-    torque: Vector
-    external: Vector
-    bias: Vector
-    acceleration: Vector
-    command: Vector
-    guide: Vector
-    guide_rate: Vector
-    paths: PathWork
 
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
@@ -301,49 +240,6 @@ def _read(mechanism: Mechanism) -> Tables:
         bend=bends[bend_row, bend_at],
         curvature_offset=np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
         paths=paths,
-    )
-
-
-def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
-    """Allocate the memory for tables whose rows follow some laws."""
-    size, count = len(tables.parents), len(tables.state)
-    width = size + len(tables.lumps)
-    tips = len(tables.tip_body)
-    columns, powers = widest(laws)
-    base = np.zeros(6)
-    base[3:] = -tables.gravity
-    return Work(
-        rotation=np.zeros((size, 3, 3)),
-        origin=np.zeros((size, 3)),
-        centre=np.zeros(3),
-        base_velocity=np.zeros(6),
-        base_power=np.zeros(1),
-        base_acceleration=base,
-        base_rate=np.zeros((2, 6)),
-        spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
-        inertia=np.zeros((size, 10)),
-        composite=np.zeros((size, 10)),
-        coriolis=np.zeros((size, 12)),
-        vectors=np.zeros((2, 6)),
-        square=np.zeros((SQUARE_LAYERS, size, size)),
-        rows=np.zeros((columns, count)),
-        slopes=np.zeros((SLOPES, count)),
-        powers=np.zeros((powers, count)),
-        arm=tables.arm.copy(),
-        gradient=tables.measure.copy(),
-        pull=np.zeros((count, 3)),
-        lever=np.zeros((count, 3)),
-        tip=np.zeros((tips, 3)),
-        jacobian=np.zeros((tips, 3, width)),
-        force_rate=np.zeros((tips, 3)),
-        torque=np.zeros(width),
-        external=np.zeros(width),
-        bias=np.zeros(width),
-        acceleration=np.zeros(width),
-        command=np.zeros(channels),
-        guide=np.zeros(int(tables.guided.max(initial=-1)) + 1),
-        guide_rate=np.zeros(int(tables.guided.max(initial=-1)) + 1),
-        paths=build_path_work(tables.paths, count, width),
     )
 
 

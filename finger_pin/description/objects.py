@@ -150,6 +150,11 @@ class Object(Description):
         return np.asarray(found / np.linalg.norm(found))
 
     @property
+    def pose(self) -> Array:
+        """Where it starts: x, y, z, m, and its quaternion, shape (7,)."""
+        return np.append(self.position, self.quaternion)
+
+    @property
     def inertia(self) -> tuple[float, float, float]:
         """Moments of inertia of a free object about x, y and z of its frame, kg m2; zero for a fixed one."""
         mass = self.mass

@@ -98,7 +98,7 @@ class Surroundings:
 
     def start(self) -> tuple[Array, Array]:
         """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""
-        poses = [np.append(each.position, each.quaternion) for each in self.free.values()]
+        poses = [each.pose for each in self.free.values()]
         rates = [np.append(each.velocity, each.angular_velocity) for each in self.free.values()]
         return np.array(poses).reshape(-1), np.array(rates).reshape(-1)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control
+from finger_pin.core.control import Control
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.inputs import Control
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Trajectory

@@ -14,8 +14,8 @@ from finger_pin.control.closed_loop import Samples
 from finger_pin.control.compiled import core_signal
 from finger_pin.control.guides import Guides
 from finger_pin.control.reference import Reference
+from finger_pin.core.control import held_control
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.inputs import held_control
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import nearest

@@ -7,8 +7,8 @@ import pytest
 from core_cases import Bound, relative
 from random_mechanisms import kinds_of, random_mechanism, random_states
 
+from finger_pin.core.control import held_control
 from finger_pin.core.evaluation import CompiledMechanism
-from finger_pin.core.inputs import held_control
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import integrate
 from finger_pin.mechanism.mechanism import Mechanism

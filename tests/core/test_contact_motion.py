@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 
 from finger_pin.core import rosenbrock
-from finger_pin.core.inputs import held_control
+from finger_pin.core.control import held_control
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from test_contact_motion import G, plane, scene
 
-from finger_pin.core.inputs import held_control
+from finger_pin.core.control import held_control
 from finger_pin.core.law_code import FORCE
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object

@@ -69,11 +69,7 @@ class Things:
         at = result.isel(time=np.searchsorted(result["time"].values, time))
         closed = at.isel(contact=np.flatnonzero(steepness > 0.0))
         parts = [closed[f"contact_{name}"].values for name in ("point", "force", "normal")]
-        found = {
-            name: np.broadcast_to(np.append(each.position, each.quaternion), (len(time), 7))
-            for name, each in objects.items()
-            if palm is not None
-        }
+        found = {name: np.broadcast_to(each.pose, (len(time), 7)) for name, each in objects.items() if palm is not None}
         for name in result["object"].values if "object_position" in result else ():
             own = at.sel(object=name)
             found[str(name)] = np.concatenate([own["object_position"], own["object_orientation"]], axis=-1)
@@ -125,7 +121,7 @@ class Things:
             path = f"{ROOT}/object_{name}"
             for index, (shape, turned, offset, colour) in enumerate(self.parts(name)):
                 yield mesh(f"{path}/part{index}", shape, turned, offset, colour, 1.6 * SOLID_OPACITY)
-            yield self._placement(name, np.append(each.position, each.quaternion))
+            yield self._placement(name, each.pose)
 
     def frame(self, index: int) -> Iterator[Command]:
         """Yield meshcat's commands that move objects to where they are in a frame."""
@@ -137,7 +133,7 @@ class Things:
         if name in self.moving:
             return np.asarray(self.poses[:, self.moving.index(name)])
         each = self.objects[name]
-        return np.tile(np.append(each.position, each.quaternion), (len(self.poses), 1))
+        return np.tile(each.pose, (len(self.poses), 1))
 
     def arrows(self) -> Array:
         """Return where the arrow of every contact's force begins and ends in all frames, shape (m, c, 2, 3), m."""

@@ -1,0 +1,113 @@
+"""The memory that the compiled core works in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from finger_pin.core.binding import Layers, Matrix, Vector
+from finger_pin.core.law_code import SLOPES, widest
+from finger_pin.core.path_tables import PathWork, build_path_work
+from finger_pin.core.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS
+from finger_pin.core.tables import Tables
+from finger_pin.laws.law import ContactLaw, Law
+
+
+class Work(NamedTuple):
+    """Memory of one evaluation and its linearisation; never holds anything between calls.
+
+    Attributes:
+        base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
+        base_rate: Their rates, shape (2, 6).
+        base_power: What the base supplies, shape (1,), W.
+        rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
+        slopes: Derivatives of the laws, shape (SLOPES, K).
+        powers: Stored energy and powers of the rows, shape (1 + powers, K).
+        arm: As in the tables, shape (arms,), with what paths through space add.
+        gradient: dl/dq there, with what they add, shape (arms,).
+        pull: Total force on the pin of each row, shape (K, 3), N.
+        lever: The pin's link direction, shape (K, 3).
+        tip: Positions of the tips, shape (t, 3), m.
+        jacobian: Of the tips, shape (t, 3, N).
+        force_rate: Time derivatives of the forces at the tips, shape (t, 3), N/s.
+        torque, external, bias, acceleration: Shape (N,).
+        command: Inputs, shape (u,).
+        guide, guide_rate: Accelerations of what is moved along paths, and their rates, shape (g,).
+    """
+
+    rotation: Layers
+    origin: Matrix
+    centre: Vector
+    base_velocity: Vector
+    base_acceleration: Vector
+    base_rate: Matrix
+    base_power: Vector
+    spatial: Layers
+    inertia: Matrix
+    composite: Matrix
+    coriolis: Matrix
+    vectors: Matrix
+    square: Layers
+    rows: Matrix
+    slopes: Matrix
+    powers: Matrix
+    arm: Vector
+    gradient: Vector
+    pull: Matrix
+    lever: Matrix
+    tip: Matrix
+    jacobian: Layers
+    force_rate: Matrix
+    torque: Vector
+    external: Vector
+    bias: Vector
+    acceleration: Vector
+    command: Vector
+    guide: Vector
+    guide_rate: Vector
+    paths: PathWork
+
+
+def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
+    """Allocate the memory for tables whose rows follow some laws."""
+    size, count = len(tables.parents), len(tables.state)
+    width = size + len(tables.lumps)
+    tips = len(tables.tip_body)
+    columns, powers = widest(laws)
+    base = np.zeros(6)
+    base[3:] = -tables.gravity
+    return Work(
+        rotation=np.zeros((size, 3, 3)),
+        origin=np.zeros((size, 3)),
+        centre=np.zeros(3),
+        base_velocity=np.zeros(6),
+        base_power=np.zeros(1),
+        base_acceleration=base,
+        base_rate=np.zeros((2, 6)),
+        spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
+        inertia=np.zeros((size, 10)),
+        composite=np.zeros((size, 10)),
+        coriolis=np.zeros((size, 12)),
+        vectors=np.zeros((2, 6)),
+        square=np.zeros((SQUARE_LAYERS, size, size)),
+        rows=np.zeros((columns, count)),
+        slopes=np.zeros((SLOPES, count)),
+        powers=np.zeros((powers, count)),
+        arm=tables.arm.copy(),
+        gradient=tables.measure.copy(),
+        pull=np.zeros((count, 3)),
+        lever=np.zeros((count, 3)),
+        tip=np.zeros((tips, 3)),
+        jacobian=np.zeros((tips, 3, width)),
+        force_rate=np.zeros((tips, 3)),
+        torque=np.zeros(width),
+        external=np.zeros(width),
+        bias=np.zeros(width),
+        acceleration=np.zeros(width),
+        command=np.zeros(channels),
+        guide=np.zeros(int(tables.guided.max(initial=-1)) + 1),
+        guide_rate=np.zeros(int(tables.guided.max(initial=-1)) + 1),
+        paths=build_path_work(tables.paths, count, width),
+    )
