@@ -22,11 +22,12 @@ from finger_pin.control.proportional import Controller, ControlSignals, Proporti
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
-from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.evaluation import CompiledFinger, Room
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rigid_body import Motion
@@ -37,6 +38,7 @@ _SHORTEST = 1e-4
 
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]
+_Acting = tuple[Array, Array, Array | None]
 
 
 class Dynamics(Protocol):
@@ -208,16 +210,42 @@ class ClosedLoop:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots()).min(initial=np.inf)), _SHORTEST)
 
-    def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
-        """Return all signals at one time and state, or at times (m,) and states (m, size)."""
-        state = self.finger.layout.unpack(x)
-        reference = self.reference.at(time)
-        control = self.controller.command(time, reference, state.position, state.velocity)
-        command = self._command(time, control)
+    def evaluate(self, time: Array | float, x: Array, found: Evaluation | None = None) -> LoopSignals:
+        """Return all signals at one time and state, or at times (m,) and states (m, size).
+
+        Args:
+            time: s.
+            x: Packed states.
+            found: What the mechanism does there, where it is known already.
+        """
+        reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        finger = self.dynamics.evaluate(x, command, self.force(time), self.base(time))
+        if found is not None:
+            finger = self.finger.signals(x, acting[0], acting[1], found)
+        else:
+            finger = self.dynamics.evaluate(x, *acting)
         return LoopSignals(reference, control, finger)
+
+    def fill(self, room: Room, time: Array, x: Array) -> None:
+        """Fill a room, one of the compiled core's, with what the mechanism does at times (m,) and states (m, size)."""
+        assert isinstance(self.dynamics, CompiledFinger)
+        self.dynamics.mechanism.fill(room, x, *self._acting(time, x)[2])
+
+    def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
+        """Return what is desired and planned, and what acts: inputs of the mechanism, F, and how palm or objects move.
+
+        Inputs are tensions, voltages of motors in position drive, inputs of a tree.
+        """
+        state, reference = self.finger.layout.unpack(x), self.reference.at(time)
+        control = self.controller.command(time, reference, state.position, state.velocity)
+        command = control.tension[..., : self.finger.routing.actuated]
+        if self.drives is not None:
+            command = command.copy()
+            command[..., self.drives.channels] = self.drives.voltages(time)
+        if control.inputs is not None:
+            command = np.concatenate([command, control.inputs], axis=-1)
+        return reference, control, (command, self.force(time), self.base(time))
 
     def base(self, time: Array | float) -> Array | None:
         """Return how palm and objects are moved at one time, shape (27 + g,), or at times (m,); None at rest."""
@@ -237,21 +265,11 @@ class ClosedLoop:
                 objects = objects[0], lifted
         return replace(found, objects=objects)
 
-    def _command(self, time: Array | float, control: ControlSignals) -> Array:
-        """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
-        command = control.tension[..., : self.finger.routing.actuated]
-        if self.drives is not None:
-            command = command.copy()
-            command[..., self.drives.channels] = self.drives.voltages(time)
-        return command if control.inputs is None else np.concatenate([command, control.inputs], axis=-1)
-
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
-        state, reference = self.finger.layout.unpack(x), self.reference.at(time)
-        control = self.controller.command(time, reference, state.position, state.velocity)
-        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time), self.base(time))
-        joints = state.velocity.shape[-1]
-        fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
+        rows, external = self.dynamics.powers(x, *self._acting(time, x)[2])
+        velocity = self.finger.layout.unpack(x).velocity
+        fingertip = np.sum(external[:, : velocity.shape[-1]] * velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)
 
     def rhs(self, time: float, x: Array) -> Array:

@@ -53,7 +53,14 @@ class Account:
     residual: Array
 
 
-def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: LoopSignals, motion: Motion) -> Account:
+def account(
+    loop: ClosedLoop,
+    trajectory: Trajectory,
+    times: Array,
+    signals: LoopSignals,
+    motion: Motion,
+    done: Array | None = None,
+) -> Account:
     """Keep the energy account of a trajectory.
 
     Args:
@@ -62,13 +69,15 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         times: Saved times, shape (m,), beginning at the trajectory's start.
         signals: The signals at those times.
         motion: Fingertip and energies of the rigid body at those times.
+        done: The integrals of all powers up to those times, `Works.values`, where they are known already.
     """
     booked = powers(signals.finger)
-    done = np.zeros((len(times), len(booked.names)))
-    for part, ends, states in _apart(loop, trajectory):
-        # A finger without motors, say, has fewer powers than the hand.
-        columns = [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)]
-        done[:, columns] += _works(part, ends, states, times, len(columns))
+    if done is None:
+        done = np.zeros((len(times), len(booked.names)))
+        for part, ends, states in _apart(loop, trajectory):
+            # A finger without motors, say, has fewer powers than the hand.
+            columns = [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)]
+            done[:, columns] += Works(part, times).add(ends, states).values
     works = Flows(done, booked.names, booked.supplies)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
@@ -129,23 +138,23 @@ def _refine(
     if fine.failure or fine.interrupted:
         return fine.statistics.steps
     inside = (times > begin) & (times < end)
-    at, count = np.append(times[inside], end), works.shape[1]
+    at = np.append(times[inside], end)
     steps = trajectory.breakpoints[(trajectory.breakpoints >= begin) & (trajectory.breakpoints <= end)]
     allowed = 1e-3 * _CLOSED * float(np.sum(np.max(np.abs(works), axis=0)))
-    more = _works(loop, _halved(loop, fine, count, allowed), fine.interpolate, at, count)
-    more -= _works(loop, steps, trajectory.interpolate, at, count)
+    more = Works(loop, at).add(_halved(loop, fine, allowed), fine.interpolate).values
+    more -= Works(loop, at).add(steps, trajectory.interpolate).values
     works[inside] += more[:-1]
     works[times >= end] += more[-1]
     return fine.statistics.steps
 
 
-def _halved(loop: ClosedLoop, trajectory: Trajectory, count: int, allowed: float) -> Array:
+def _halved(loop: ClosedLoop, trajectory: Trajectory, allowed: float) -> Array:
     """Return ends of steps, some of them halved until no work, J, changes by more than is allowed for one."""
     ends = trajectory.breakpoints
     for _ in range(_HALVINGS):
         middles = 0.5 * (ends[:-1] + ends[1:])
         both = [
-            _works(loop, panels, trajectory.interpolate, ends, count) for panels in (ends, np.union1d(ends, middles))
+            Works(loop, ends).add(panels, trajectory.interpolate).values for panels in (ends, np.union1d(ends, middles))
         ]
         bent = np.max(np.abs(np.diff(both[1] - both[0], axis=0)), axis=1) > allowed
         if not bent.any():
@@ -163,27 +172,44 @@ def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[tuple[ClosedLoop, A
     return [(loop, trajectory.breakpoints, trajectory.interpolate)]
 
 
-def _works(loop: ClosedLoop, breakpoints: Array, states: Callable[[Array], Array], times: Array, count: int) -> Array:
-    """Return the integrals of all powers from the start to the saved times, shape (m, count).
+class Works:
+    """Integrals of all powers up to the saved times, taken over steps as they come.
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
+
+    Attributes:
+        values: Shape (m, powers + 1), J.
     """
-    begin, length = breakpoints[:-1], np.diff(breakpoints)
-    works, reached = np.zeros((len(times), count)), np.zeros(count)
-    if len(length) == 0:
-        return works
-    inside = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, len(begin) - 1)
-    for first in range(0, len(begin), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        nodes = (begin[part, None] + length[part, None] * _NODES).ravel()
-        values = loop.powers(nodes, states(nodes))
-        values = values.reshape(-1, len(_NODES), count) * length[part, None, None]
+
+    def __init__(self, loop: ClosedLoop, times: Array) -> None:
+        """Begin at nothing; times have shape (m,), in order."""
+        self._loop, self._times = loop, times
+        count = len(loop.finger.mechanism.books.powers) + 1
+        self.values, self._reached = np.zeros((len(times), count)), np.zeros(count)
+
+    def add(self, ends: Array, states: Callable[[Array], Array]) -> Works:
+        """Go on over steps, given by their ends with the start first, and what maps times to packed states."""
+        for first in range(0, len(ends) - 1, _CHUNK):
+            self._add(ends[first : first + _CHUNK + 1], states)
+        return self
+
+    def _add(self, ends: Array, states: Callable[[Array], Array]) -> None:
+        begin, length = ends[:-1], np.diff(ends)
+        nodes = (begin[:, None] + length[:, None] * _NODES).ravel()
+        powers = self._loop.powers(nodes, states(nodes)).reshape(len(begin), len(_NODES), -1)
+        values = powers * length[:, None, None]
         steps = sum(weight * values[:, node] for node, weight in enumerate(_WEIGHTS))
-        before = reached + np.cumsum(steps, axis=0) - steps
-        rows = slice(*np.searchsorted(inside, (first, first + _CHUNK)))
-        step = inside[rows] - first
-        share = np.vander((times[rows] - begin[inside[rows]]) / length[inside[rows]], 4)[:, :3] @ _PARABOLAS
-        works[rows] = before[step] + sum(share[:, node, None] * values[step, node] for node in range(len(_NODES)))
-        reached = before[-1] + steps[-1]
-    return works
+        before = self._reached + np.cumsum(steps, axis=0) - steps
+        rows = saved(self._times, ends)
+        times = self._times[rows]
+        step = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, None)
+        share = np.vander((times - begin[step]) / length[step], 4)[:, :3] @ _PARABOLAS
+        self.values[rows] = before[step] + sum(share[:, node, None] * values[step, node] for node in range(len(_NODES)))
+        self._reached = before[-1] + steps[-1]
+
+
+def saved(times: Array, ends: Array) -> slice:
+    """Return which of the saved times lie in steps, those at their ends among them."""
+    first, last = np.searchsorted(times, ends[0]), np.searchsorted(times, ends[-1] * (1.0 + 1e-12), side="right")
+    return slice(int(first), int(last))

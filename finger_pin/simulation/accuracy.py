@@ -18,7 +18,7 @@ from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
 
 #: Steps between two looks at a compiled simulation.
-CHUNK = 256
+CHUNK = 128
 
 # A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
 _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
@@ -31,7 +31,7 @@ _TIGHTER = 10.0
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
 # far slower, and a motion that takes so many steps shows early how sensitive it is.
-_PATIENCE, _MOST_LOOKS = 2, 600
+_PATIENCE, _MOST_LOOKS = 2, 1200
 # The share of the energy exchanged to which an account has to close, and what is too little to count, J.
 _OPEN, _NOTHING = 1e-4, 1e-12
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a

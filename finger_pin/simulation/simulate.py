@@ -24,7 +24,7 @@ from finger_pin.control.reference import Reference
 from finger_pin.control.sampling import SampledController
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.integrator import Follow, integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
@@ -41,6 +41,7 @@ from finger_pin.simulation.accuracy import (
     ringing,
     too_stiff,
 )
+from finger_pin.simulation.following import Following
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -169,7 +170,12 @@ def simulate(
             observe(time, loop.evaluate(time, x))
 
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
-    trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
+    # Only what is a function of time and state can be evaluated beside the integration.
+    compiled = isinstance(loop.dynamics, CompiledFinger) and compiled_control(loop) is not None
+    following = None
+    if compiled and method in TABLEAUS and loop.drives is None and observe is None and not own:
+        following = Following(loop, scenario.sample_times())
+    trajectory = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(
         scenario,
@@ -182,7 +188,7 @@ def simulate(
     slow = ringing(loop, trajectory)
     # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        result = record(scenario, loop, trajectory, method)
+        result = record(scenario, loop, trajectory, method, following=following)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
     if driving:
@@ -249,7 +255,13 @@ def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | No
 
 
 def _integrate(
-    scenario: Scenario, loop: ClosedLoop, method: str, watch: Watch, chunk: int, stop: Stop | None
+    scenario: Scenario,
+    loop: ClosedLoop,
+    method: str,
+    watch: Watch,
+    chunk: int,
+    stop: Stop | None,
+    follow: Follow | None = None,
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
@@ -268,6 +280,7 @@ def _integrate(
             chunk=chunk,
             together=chunk == _CHUNK_OBSERVED,
             stop=stop,
+            follow=follow,
         )
     if method == "CVODE":
         return integrate_cvode(
