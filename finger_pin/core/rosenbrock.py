@@ -246,11 +246,13 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 memory[CULPRIT] = 0.0
             if recorded < times.size:
                 for row in range(tableau.dense.shape[0]):
+                    bend = dense[recorded, row]
                     for c in range(size):
-                        value = 0.0
-                        for j in range(count):
-                            value += tableau.dense[row, j] * k[j, c]
-                        dense[recorded, row, c] = value
+                        bend[c] = 0.0
+                    for j in range(count):
+                        factor_of_stage = tableau.dense[row, j]
+                        for c in range(size):
+                            bend[c] += factor_of_stage * k[j, c]
             if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False
