@@ -6,21 +6,17 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.guides import Guides
 from finger_pin.control.hand import HandController, joined_controller
-from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
+from finger_pin.control.own import Samples, choose_controller, choose_reference
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
-from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger, Room
 from finger_pin.description.routing import Array, Routing
@@ -36,8 +32,6 @@ from finger_pin.mechanism.state import State
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
-#: Times, shape (m,), s, and values, one row for each.
-Samples = tuple[ArrayLike, ArrayLike]
 _Acting = tuple[Array, Array, Array | None]
 
 
@@ -138,8 +132,8 @@ class ClosedLoop:
         alone = len(acting) == 1
         loop = cls(
             finger=finger,
-            controller=_controller(controller, scenario, finger),
-            reference=_reference(reference, scenario, finger.routing),
+            controller=choose_controller(controller, scenario, finger),
+            reference=choose_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
             # Fingers that may touch something are not apart.
@@ -288,25 +282,3 @@ def _remembering_nothing(controller: Controller) -> Controller | None:
         known = [each for each in own if each is not None]
         return HandController(known, controller.routing) if len(known) == len(own) else None
     return None
-
-
-def _controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:
-    if given is None:
-        return build_controller(scenario, finger)
-    if isinstance(given, tuple | list):
-        return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
-    if isinstance(given, own | RoutedController):
-        return given
-    kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
-    return kind(given, finger.routing, scenario.simulation.start_time)
-
-
-def _reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> Reference:
-    if given is None:
-        return SignalReference.from_scenario(scenario, routing)
-    if isinstance(given, tuple | list):
-        return SignalReference.from_samples(given, scenario, routing)
-    if isinstance(given, SignalReference):
-        return given
-    return OwnReference(given, routing.joints, scenario.simulation.start_time)

@@ -102,6 +102,25 @@ def open_account(result: xr.Dataset) -> str:
     )
 
 
+def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
+    length, excess = result.sizes["time"], ""
+    for name in result.data_vars:
+        values = result.variables[name]
+        # The sum alone tells in most cases.
+        if np.isfinite(np.sum(values.values)):
+            continue
+        finite = np.isfinite(values.values)
+        if not finite.all():
+            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
+            if first < length:
+                length, excess = first, str(name)
+    if excess:
+        result = result.isel(time=slice(max(length, 1)))
+        result.attrs["end_time"] = float(result["time"][-1])
+    return result, excess
+
+
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
     """Return what rings undamped where a run took many short steps, and at which frequency; else empty.
 

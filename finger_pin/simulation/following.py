@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
+import numpy as np
+
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array
@@ -35,8 +37,10 @@ class Following:
     def _evaluate(self, ends: Array, states: Callable[[Array], Array]) -> None:
         part = saved(self._times, ends)
         times = self._times[part]
-        self._loop.fill(self._room.result().part(part), times, states(times))
-        self._works.add(ends, states)
+        # A motion at the edge of what numbers hold has energies beyond it.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            self._loop.fill(self._room.result().part(part), times, states(times))
+            self._works.add(ends, states)
 
     def finish(self, count: int) -> tuple[LoopSignals, Motion, Array] | None:
         """Wait until all steps that came are evaluated.

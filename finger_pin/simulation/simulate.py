@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
 from finger_pin.analysis.passivity import micro_damping_advice
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.own import OwnController
+from finger_pin.control.own import OwnController, Samples
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
@@ -37,6 +37,7 @@ from finger_pin.simulation.accuracy import (
     CHUNK,
     check_memory,
     estimate_error,
+    finite_part,
     open_account,
     ringing,
     too_stiff,
@@ -171,10 +172,8 @@ def simulate(
 
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
     # Only what is a function of time and state can be evaluated beside the integration.
-    compiled = isinstance(loop.dynamics, CompiledFinger) and compiled_control(loop) is not None
-    following = None
-    if compiled and method in TABLEAUS and loop.drives is None and observe is None and not own:
-        following = Following(loop, scenario.sample_times())
+    pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
+    following = Following(loop, scenario.sample_times()) if pure and observe is None else None
     trajectory = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(
@@ -185,10 +184,10 @@ def simulate(
         ),
         margin=math.inf if margin is None else margin,
     )
-    slow = ringing(loop, trajectory)
     # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         result = record(scenario, loop, trajectory, method, following=following)
+    slow = ringing(loop, trajectory)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
     if driving:
@@ -206,7 +205,7 @@ def simulate(
         result.attrs["account"] = gap
     if slow:
         result.attrs["ringing"] = slow
-    result, excess = _finite_part(result)
+    result, excess = finite_part(result)
     if trajectory.failure:
         if isinstance(answers, OwnController) and answers.problem_time >= reached:
             raise IntegrationError(reached, answers.problem, "another controller", result)
@@ -221,25 +220,6 @@ def simulate(
     if trajectory.interrupted:
         raise Interrupted(reached, result)
     return result
-
-
-def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
-    length, excess = result.sizes["time"], ""
-    for name in result.data_vars:
-        values = result.variables[name]
-        # The sum alone tells in most cases.
-        if np.isfinite(np.sum(values.values)):
-            continue
-        finite = np.isfinite(values.values)
-        if not finite.all():
-            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
-            if first < length:
-                length, excess = first, str(name)
-    if excess:
-        result = result.isel(time=slice(max(length, 1)))
-        result.attrs["end_time"] = float(result["time"][-1])
-    return result, excess
 
 
 def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:
