@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.core.binding import call
 from finger_pin.core.charts import Charts
 from finger_pin.core.control import held_control
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.model import BoundModel
-from finger_pin.core.signals import evaluate_many, motion_many
+from finger_pin.core.signals import MOTIONS, STATES, Motions, States, evaluate_many, motion_many
 from finger_pin.core.stepper import in_threads
 from finger_pin.core.tables import build_tables
 from finger_pin.core.work import build_work
@@ -153,20 +154,9 @@ class CompiledMechanism:
 
         def fill(model: BoundModel, part: slice) -> None:
             own = room.part(part)
-            evaluate_many(
-                model.address,
-                states[part],
-                commands[part],
-                forces[part],
-                own.rates,
-                own.rows,
-                own.first,
-                own.torques,
-                own.externals,
-                own.booked,
-                bases[part],
-                attitudes[part],
-            )
+            filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
+            given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part])
+            call(evaluate_many, States(model.address, *given), STATES)
 
         if count < _FEW:
             fill(self._model(loaded), slice(None))
@@ -184,7 +174,8 @@ class CompiledMechanism:
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
         given = _rows(position, shape), _rows(velocity, shape)
-        motion_many(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
+        motions = Motions(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
+        call(motion_many, motions, MOTIONS)
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
 
