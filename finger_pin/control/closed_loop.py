@@ -26,7 +26,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
 
 # However close points are, steps need not be shorter than this, s.

@@ -20,8 +20,8 @@ from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import GUIDES, Mechanism
-from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
 
 # Fewer states than this are not worth a second thread.

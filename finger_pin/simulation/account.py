@@ -16,7 +16,7 @@ from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its

@@ -20,7 +20,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.following import Following

@@ -209,15 +209,18 @@ def test_energy_shows_what_is_stored_supplied_and_lost(result):
         assert_shows(axes.get_lines()[0], time, 1e3 * result[f"energy_{name}"].values)
     supplied = result["energy_exchanged_actuators"].values
     assert_shows(lines(balance)["supplied"], time, 1e3 * supplied)
-    # Every loss lies on those before it. The made-up account closes, so the stored energy on top of them all ends where
-    # the supplied energy does.
+    # Every loss lies on those before it; what was put into store is on top, and ends where the supplied energy does.
     areas = {each.get_label(): each for each in balance.collections if isinstance(each, PolyCollection)}
     level = np.cumsum([result[f"energy_exchanged_{name}"].values[-1] for name in LOST if name != "slack"])
+    # Where less is supplied than lost, the rest comes from the store.
+    x, y = areas.pop("taken from store").get_paths()[0].vertices.T
+    least = np.argmin(result[[f"energy_{name}" for name in STORED]].to_array().sum("variable").values)
+    assert y[x == time[least]].min() == pytest.approx(1e3 * supplied[least])
     assert len(areas) == len(level) + 1
-    for area, height in zip(areas.values(), [*level, supplied[-1]], strict=True):
+    for area, height in zip(areas.values(), [*level, max(level[-1], supplied[-1])], strict=True):
         x, y = area.get_paths()[0].vertices.T
         assert np.isclose(y[x == time[-1]], 1e3 * height).any()
-    assert "tensions cut at zero" not in areas and list(areas)[-1] == "change of stored energy"
+    assert "tensions cut at zero" not in areas and list(areas)[-1] == "put into store"
     assert residual.get_yscale() == "log"
     worst = np.abs(result["energy_residual"].values).max() / np.abs(supplied).max()
     assert residual.get_lines()[0].get_ydata().max() == pytest.approx(worst)

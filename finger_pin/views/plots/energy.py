@@ -104,7 +104,10 @@ def _balance(axes: Axes, result: xr.Dataset, supplied: Array, stored: Array) -> 
             shade(axes, time, level, above, color=colour, alpha=0.8, label=label)
             level = above
     change = _MILLI * (stored - stored[0])
-    shade(axes, time, level, level + change, color=GREY, alpha=0.35, label="change of stored energy")
+    shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
+    if np.min(change) < 0.0:
+        taken = {"facecolor": "none", "edgecolor": BLACK, "hatch": "////", "alpha": 0.5}
+        shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **taken)
     trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=1.6)
     if axes.dataLim.y0 >= 0.0:
         axes.set_ylim(bottom=0.0)
