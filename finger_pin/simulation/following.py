@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.simulation.account import Works, saved
 
 
