@@ -36,6 +36,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import (
     CHUNK,
     check_memory,
+    close_account,
     estimate_error,
     open_account,
     ringing,
@@ -168,21 +169,21 @@ def simulate(
         if observe is not None:
             observe(time, loop.evaluate(time, x))
 
+    def repeated(other: Scenario, enough: Stop) -> Trajectory:
+        asked = stop or (lambda: False)
+        return _integrate(other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or asked())
+
+    def recorded(found: Trajectory) -> xr.Dataset:
+        # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return record(scenario, loop, found, method)
+
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
-    trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
+    run = close_account(scenario, _integrate(scenario, loop, method, watch, chunk, stop), repeated, recorded)
+    trajectory, result = run.trajectory, run.result
     reached = float(trajectory.breakpoints[-1])
-    error, inaccurate = estimate_error(
-        scenario,
-        trajectory,
-        lambda other, enough: _integrate(
-            other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or (stop is not None and stop())
-        ),
-        margin=math.inf if margin is None else margin,
-    )
+    error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
-    # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        result = record(scenario, loop, trajectory, method)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
     if driving:
