@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
@@ -32,8 +33,13 @@ _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
 # far slower, and a motion that takes so many steps shows early how sensitive it is.
 _PATIENCE, _MOST_LOOKS = 2, 1200
-# The share of the energy exchanged to which an account has to close, and what is too little to count, J.
-_OPEN, _NOTHING = 1e-4, 1e-12
+# The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
+_OPEN, _ROUNDING = 1e-4, 1e-13
+# A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
+# most, and not if it took more steps.
+_CLOSED, _WELL_CLOSED = 10.0, 1e-5
+_MOST_REPETITIONS, _MOST_STEPS = 3, 200_000
+_TOLERANCES = ("rtol", "atol_scale")
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
@@ -47,31 +53,84 @@ def expected_error(scenario: Scenario) -> float:
     return min(_EXPECTED * max(settings.rtol, settings.atol_scale), _MOST_EXPECTED)
 
 
-def estimate_error(
-    scenario: Scenario, trajectory: Trajectory, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
-) -> tuple[float, str]:
-    """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run whose energy account has been seen to.
 
-    Where the estimate that the integration carried along is large, or the finger is close to self-locking, where the
-    linearised flow does not show how far slips go, the run is repeated at a tighter tolerance, and the difference
-    counts.
+    Attributes:
+        scenario: With the tolerances that it took.
+        trajectory: Its solution.
+        result: What was recorded of it.
+        coarser: What it replaces, if it is a repetition.
+    """
+
+    scenario: Scenario
+    trajectory: Trajectory
+    result: xr.Dataset
+    coarser: Trajectory | None = None
+
+
+def close_account(
+    scenario: Scenario,
+    trajectory: Trajectory,
+    repeated: Callable[[Scenario, Stop], Trajectory],
+    recorded: Callable[[Trajectory], xr.Dataset],
+) -> Run:
+    """Record a run, and repeat it at tighter tolerances as long as its energy account does not close to ten times them.
+
+    Small forces and slow drifts are within the tolerances of the state and yet may be all that a run's energy is. The
+    result says at which tolerances it ran.
 
     Args:
         scenario: What was simulated.
         trajectory: Its solution.
         repeated: Integrates the scenario with other tolerances until it is asked to stop.
+        recorded: Makes the result of a trajectory.
+    """
+    run = Run(scenario, trajectory, recorded(trajectory))
+    settings, share = scenario.simulation, left_open(run.result)
+    limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
+    whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
+    for _ in range(_MOST_REPETITIONS):
+        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < left_open(run.result) < np.inf:
+            break
+        tighter = _tightened(run.scenario)
+        other = repeated(tighter, _patient(run.trajectory))
+        if other.failure or other.interrupted:
+            break
+        run = Run(tighter, other, recorded(other), run.trajectory)
+        run.result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
+        run.result.attrs["repeated"] = (
+            f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
+            f"{share:.1g} of the energy exchanged"
+        )
+    return run
+
+
+def estimate_error(
+    scenario: Scenario, run: Run, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
+) -> tuple[float, str]:
+    """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
+
+    Where the estimate that the integration carried along is large, or the finger is close to self-locking, where the
+    linearised flow does not show how far slips go, the run is repeated at a tighter tolerance, and the difference
+    counts; or the difference to the coarser one that it replaces.
+
+    Args:
+        scenario: What was asked for.
+        run: What was simulated.
+        repeated: Integrates the scenario with other tolerances until it is asked to stop.
         margin: Of the joints' friction to what locks the finger; infinite where not known.
     """
+    trajectory, other = run.trajectory, run.coarser
     expected, error = expected_error(scenario), trajectory.estimated_error
     doubted = error > _DOUBTED * expected or (margin < _CLOSE_TO_LOCKING and np.isfinite(error))
     if not doubted or trajectory.failure or trajectory.interrupted:
         return error, ""
-    settings = scenario.simulation
-    tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in ("rtol", "atol_scale")}
-    looks = count()
-    most = min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), _MOST_LOOKS)
-    tightened = scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
-    other = repeated(tightened, lambda: next(looks) >= most)
+    rtol = run.scenario.simulation.rtol
+    if other is None:
+        tighter = _tightened(run.scenario)
+        other, rtol = repeated(tighter, _patient(trajectory, _MOST_LOOKS)), tighter.simulation.rtol
     times = scenario.sample_times()
     times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
     difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]
@@ -79,23 +138,43 @@ def estimate_error(
     if error <= expected:
         return error, ""
     return error, (
-        f"the run errs by about {error:.1g} rad rms: repeated at rtol {tighter['rtol']:g} it differs by that. "
+        f"the run errs by about {error:.1g} rad rms: repeated at rtol {rtol:g} it differs by that. "
         "The motion is sensitive, as close to self-locking or in a loop that hunts; "
         "try a smaller simulation.rtol and atol_scale"
     )
 
 
+def _tightened(scenario: Scenario) -> Scenario:
+    settings = scenario.simulation
+    tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in _TOLERANCES}
+    return scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
+
+
+def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
+    """Return what asks to stop after more looks than a trajectory took, or so many at most."""
+    looks, most = count(), min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), most)
+    return lambda: next(looks) >= most
+
+
+def left_open(result: xr.Dataset) -> float:
+    """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding."""
+    most = {
+        str(name).removeprefix("energy_"): float(np.abs(values.values).max())
+        for name, values in result.variables.items()
+        if str(name).startswith("energy_")
+    }
+    residual = most.pop("residual")
+    exchanged = sum(value for name, value in most.items() if name.startswith("exchanged_"))
+    if not residual > _ROUNDING * max(most.values()):
+        return 0.0
+    return residual / exchanged if exchanged else np.inf
+
+
 def open_account(result: xr.Dataset) -> str:
     """Return what to say if a result's energy account does not close to a ten thousandth of all energy exchanged."""
-    exchanged = sum(
-        float(np.abs(values.values).max())
-        for name, values in result.variables.items()
-        if str(name).startswith("energy_exchanged_")
-    )
-    residual = float(np.abs(result.variables["energy_residual"].values).max())
-    if not residual > max(_OPEN * exchanged, _NOTHING):
+    share = left_open(result)
+    if not share > _OPEN:
         return ""
-    share = residual / exchanged if exchanged else np.inf
     return (
         f"the energy account closes only to {share:.1g} of the energy exchanged: an impact or a kink was passed too "
         "coarsely; try a smaller simulation.rtol and atol_scale"

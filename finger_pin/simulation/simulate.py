@@ -36,6 +36,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import (
     CHUNK,
     check_memory,
+    close_account,
     estimate_error,
     finite_part,
     open_account,
@@ -170,23 +171,24 @@ def simulate(
         if observe is not None:
             observe(time, loop.evaluate(time, x))
 
+    def repeated(other: Scenario, enough: Stop) -> Trajectory:
+        asked = stop or (lambda: False)
+        return _integrate(other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or asked())
+
+    def recorded(found: Trajectory) -> xr.Dataset:
+        # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return record(scenario, loop, found, method, following=following if found is first else None)
+
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
     # Only what is a function of time and state can be evaluated beside the integration.
     pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
     following = Following(loop, scenario.sample_times()) if pure and observe is None else None
-    trajectory = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
+    first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
+    run = close_account(scenario, first, repeated, recorded)
+    trajectory, result = run.trajectory, run.result
     reached = float(trajectory.breakpoints[-1])
-    error, inaccurate = estimate_error(
-        scenario,
-        trajectory,
-        lambda other, enough: _integrate(
-            other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or (stop is not None and stop())
-        ),
-        margin=math.inf if margin is None else margin,
-    )
-    # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        result = record(scenario, loop, trajectory, method, following=following)
+    error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
     if margin is not None:
         result.attrs["self_locking_margin"] = margin
