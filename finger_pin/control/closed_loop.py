@@ -23,7 +23,6 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
@@ -204,27 +203,23 @@ class ClosedLoop:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots()).min(initial=np.inf)), _SHORTEST)
 
-    def evaluate(self, time: Array | float, x: Array, found: Evaluation | None = None) -> LoopSignals:
-        """Return all signals at one time and state, or at times (m,) and states (m, size).
-
-        Args:
-            time: s.
-            x: Packed states.
-            found: What the mechanism does there, where it is known already.
-        """
+    def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
+        """Return all signals at one time and state, or at times (m,) and states (m, size)."""
         reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        if found is not None:
-            finger = self.finger.signals(x, acting[0], acting[1], found)
-        else:
-            finger = self.dynamics.evaluate(x, *acting)
-        return LoopSignals(reference, control, finger)
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, *acting))
 
-    def fill(self, room: Room, time: Array, x: Array) -> None:
-        """Fill a room, one of the compiled core's, with what the mechanism does at times (m,) and states (m, size)."""
+    def fill(self, room: Room, time: Array, x: Array) -> tuple[ReferenceSignals, ControlSignals, Array]:
+        """Fill a room of the compiled core with what the mechanism does at times (m,) and states (m, size).
+
+        Returns:
+            What is desired and planned, and the inputs of the mechanism.
+        """
         assert isinstance(self.dynamics, CompiledFinger)
-        self.dynamics.mechanism.fill(room, x, *self._acting(time, x)[2])
+        reference, control, acting = self._acting(time, x)
+        self.dynamics.mechanism.fill(room, x, *acting)
+        return reference, control, acting[0]
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
         """Return what is desired and planned, and what acts: inputs of the mechanism, F, and how palm or objects move.

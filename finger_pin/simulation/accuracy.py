@@ -61,12 +61,14 @@ class Run:
         scenario: With the tolerances that it took.
         trajectory: Its solution.
         result: What was recorded of it.
+        left: Which share of all energy exchanged its account leaves open.
         coarser: What it replaces, if it is a repetition.
     """
 
     scenario: Scenario
     trajectory: Trajectory
     result: xr.Dataset
+    left: float
     coarser: Trajectory | None = None
 
 
@@ -87,23 +89,24 @@ def close_account(
         repeated: Integrates the scenario with other tolerances until it is asked to stop.
         recorded: Makes the result of a trajectory.
     """
-    run = Run(scenario, trajectory, recorded(trajectory))
-    settings, share = scenario.simulation, left_open(run.result)
+    result, settings = recorded(trajectory), scenario.simulation
+    first = run = Run(scenario, trajectory, result, left_open(result))
     limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
     whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
     for _ in range(_MOST_REPETITIONS):
-        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < left_open(run.result) < np.inf:
+        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < run.left < np.inf:
             break
         tighter = _tightened(run.scenario)
         other = repeated(tighter, _patient(run.trajectory))
         if other.failure or other.interrupted:
             break
-        run = Run(tighter, other, recorded(other), run.trajectory)
-        run.result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
-        run.result.attrs["repeated"] = (
+        result = recorded(other)
+        result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
+        result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
-            f"{share:.1g} of the energy exchanged"
+            f"{first.left:.1g} of the energy exchanged"
         )
+        run = Run(tighter, other, result, left_open(result), run.trajectory)
     return run
 
 
