@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, trace
@@ -61,16 +62,19 @@ def plot_by_finger(result: xr.Dataset, columns: Sequence[Column]) -> Figure:
         labels = [labelled(name, unit) for name in parts]
         panels = stack(figure, left, left + _WIDTH - 0.15, labels, bottom=0.9)
         title(panels[0], f"({'abcdef'[index]}) {text}")
+        # Fingers may differ: the same name has the same look in all rows, and another name another one.
+        shown: dict[str, Line2D] = {}
         for axes, part in zip(panels, parts.values(), strict=True):
-            _lines(axes, part, variable, factor)
-        longest = max(panels, key=lambda axes: len(axes.get_lines()))
-        legend(panels[-1], longest.get_lines(), columns=5)
+            _lines(axes, part, variable, factor, shown)
+        legend(panels[-1], list(shown.values()), columns=5)
     return figure
 
 
-def _lines(axes: Axes, part: xr.Dataset, variable: str, factor: float) -> None:
+def _lines(axes: Axes, part: xr.Dataset, variable: str, factor: float, shown: dict[str, Line2D]) -> None:
     dimension = "joint" if "joint" in part[variable].dims else "tendon"
     time, values = part["time"].values, factor * part[variable].transpose("time", dimension).values
     for index, name in enumerate(names(part, dimension)):
         column: Array = np.asarray(values[:, index])
-        trace(axes, time, column, label=name, **series(index))
+        look = list(shown).index(name) if name in shown else len(shown)
+        line = trace(axes, time, column, label=name, **series(look))
+        shown.setdefault(name, line)
