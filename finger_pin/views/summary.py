@@ -13,13 +13,13 @@ from finger_pin.analysis import (
     locking_advice,
 )
 from finger_pin.description.routing import Array
+from finger_pin.views.account import account
 from finger_pin.views.trees import is_tree
 
 _SETTLING = 1.0
 _LONG = 2.0
 # What counts as sliding, m/s.
 _CREEP = 1e-6
-_SUPPLIES = ("actuators", "electrical", "fingertip", "palm", "objects")
 
 
 def summarize(result: xr.Dataset) -> str:
@@ -160,21 +160,11 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
 
 
 def _energy(result: xr.Dataset) -> list[str]:
-    exchanged = {
-        name.removeprefix("energy_exchanged_"): result[name]
-        for name in map(str, result)
-        if name.startswith("energy_exchanged_")
-    }
-    stored = sum(
-        _final(result[name]) - float(result[name][0])
-        for name in map(str, result)
-        if name.startswith("energy_") and name.removeprefix("energy_exchanged_") == name and name != "energy_residual"
-    )
-    supplied = [name for name in _SUPPLIES if name in exchanged]
-    supplies = [_final(exchanged[name]) for name in supplied]
-    came_in = sum(max(value, 0.0) for value in (*supplies, -stored))
-    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in supplied]
-    entries += [(_label(values), _final(values)) for name, values in exchanged.items() if name not in _SUPPLIES]
+    energies = account(result)
+    stored = sum(_final(values) - float(values[0]) for values in energies.stored.values())
+    came_in = sum(max(value, 0.0) for value in (*map(_final, energies.supplied.values()), -stored))
+    exchanged = (*energies.supplied.values(), *energies.lost.values())
+    entries = [(_label(values), _final(values)) for values in exchanged]
     entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
     rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]
     return ["Energy, and its share of what was supplied or drawn from store", *table(("", "mJ", "share"), rows)]

@@ -54,7 +54,7 @@ STYLE: Any = {
     "xtick.labelcolor": "black",
     "ytick.labelcolor": "black",
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.limits": (-4, 4),
     # Parsing mathematical text takes a third of the time of a drawing; plain text has superscripts too.
     "axes.formatter.use_mathtext": False,
     "mathtext.fontset": "dejavusans",
