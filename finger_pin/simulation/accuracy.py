@@ -36,8 +36,8 @@ _PATIENCE, _MOST_LOOKS = 2, 600
 # The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
 _OPEN, _ROUNDING = 1e-4, 1e-13
 # A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
-# most, and not if it took more steps.
-_CLOSED, _WELL_CLOSED = 10.0, 1e-5
+# most, not if it took more steps, and only as long as a repetition leaves less than a share of that open.
+_CLOSED, _WELL_CLOSED, _HELPS = 10.0, 1e-5, 0.5
 _MOST_REPETITIONS, _MOST_STEPS = 3, 200_000
 _TOLERANCES = ("rtol", "atol_scale")
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
@@ -89,18 +89,23 @@ def close_account(
     """
     run = Run(scenario, trajectory, recorded(trajectory))
     settings, share = scenario.simulation, left_open(run.result)
-    limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
+    limit, left = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED), share
     whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
     for _ in range(_MOST_REPETITIONS):
-        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < left_open(run.result) < np.inf:
+        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < left < np.inf:
             break
         tighter = _tightened(run.scenario)
         other = repeated(tighter, _patient(run.trajectory))
         if other.failure or other.interrupted:
             break
-        run = Run(tighter, other, recorded(other), run.trajectory)
-        run.result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
-        run.result.attrs["repeated"] = (
+        result, before = recorded(other), left
+        left = left_open(result)
+        if not left < max(limit, _HELPS * before):
+            # A power that is booked wrong, say.
+            break
+        run = Run(tighter, other, result, run.trajectory)
+        result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
+        result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
             f"{share:.1g} of the energy exchanged"
         )
