@@ -22,12 +22,3 @@ def without(name: str, seeker: str) -> Iterator[None]:
         yield
     finally:
         del sys.modules[name]
-
-
-def load_numba() -> None:
-    """Let numba load what it compiles with, but not scipy's BLAS, which the core does not call: a tenth of a run."""
-    with without("scipy.linalg", "numba.np.arraymath"):
-        from numba.core.registry import cpu_target
-
-        cpu_target.typing_context.refresh()
-        cpu_target.target_context.refresh()

@@ -11,7 +11,7 @@ import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
 from finger_pin.commands.drawing import Drawing, NotDrawn
-from finger_pin.commands.imports import load_numba, without
+from finger_pin.commands.imports import without
 from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
 from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
 
@@ -110,7 +110,6 @@ def compute(
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.simulate import simulate
 
-    load_numba()
     if live:
         from finger_pin.views.viewer import LiveView
 

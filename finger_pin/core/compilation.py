@@ -1,34 +1,40 @@
-"""The compiler: numba, with a cache that survives processes and never serves stale code.
+"""Compiled code: machine code that is loaded where an earlier process has kept it, and compiled where not.
 
-numba notices a change of a function's own file, not of the functions that it calls. The cache folder is therefore
-named after a digest of every source file that is compiled. Where no folder can be written, everything is compiled
-anew in each process. What takes its time is said once, as a warning of the logger ``finger_pin``, which Python prints
-on standard error unless logging is set up otherwise.
+Loading takes LLVM alone. The compiler, numba, is imported when something is to be compiled, which `compiler` does.
+
+The folder of what is kept is named after a digest of every source file that is compiled, of the processor and of the
+compiler's version, so that no stale code is served. Where no folder can be written, everything is compiled anew in each
+process. What takes its time is said once, as a warning of the logger ``finger_pin``, which Python prints on standard
+error unless logging is set up otherwise.
 """
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import logging
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache
+import threading
+from collections.abc import Callable
+from functools import cache, cached_property
+from importlib import import_module, metadata
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar
 
-import numba
 import platformdirs
-from numba.core import event
-from numba.core.caching import FunctionCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from llvmlite import binding as llvm
+
+from finger_pin.files import replacing
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 # Where compiled code stands.
 _COMPILED = ("core/*.py", "laws/*.py", "mechanism/pieces.py", "mechanism/spans/*.py", "mechanism/gaps/*.py")
 _LOGGER = logging.getLogger("finger_pin")
+
+#: The name of the one function that a piece of machine code is there for.
+SYMBOL = "unit"
 
 
 def _root() -> str:
@@ -37,7 +43,8 @@ def _root() -> str:
 
 def _digest() -> str:
     package = Path(__file__).parent.parent
-    digest = hashlib.sha256(numba.__version__.encode())
+    processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+    digest = hashlib.sha256(f"{metadata.version('numba')} {metadata.version('llvmlite')} {processor}".encode())
     for source in sorted([path for room in _COMPILED for path in package.glob(room)]):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
@@ -58,19 +65,9 @@ def _cache_folder() -> str | None:
 CACHE_FOLDER = _cache_folder()
 
 
-_OPTIONS: dict[str, Any] = {
-    "error_model": "numpy",
-    # IEEE arithmetic is kept, so that NaN stays NaN; only a product and a sum may be fused.
-    "fastmath": {"contract"},
-    # Nothing is allocated, so reference counting, which would cost half of the time, is left out; and the
-    # tables of arrays that every function takes are free to pass only when calls are inlined.
-    "_nrt": False,
-}
-
-
 def is_cached() -> bool:
     """Return whether compiled code is in the cache, so that the first simulation starts at once."""
-    return CACHE_FOLDER is not None and any(Path(CACHE_FOLDER).rglob("*.nbi"))
+    return CACHE_FOLDER is not None and any(Path(CACHE_FOLDER).glob("*.o"))
 
 
 @cache
@@ -80,119 +77,114 @@ def _say(text: str) -> None:
         _LOGGER.warning(text)
 
 
-class _Announcer(event.Listener):
-    """Says that the model is being compiled."""
+class Later:
+    """What compiled code uses, made when the first code that uses it is compiled."""
 
-    def on_start(self, event: Any) -> None:
-        if event.data["dispatcher"].py_func.__module__.startswith("finger_pin."):
-            often = "once for this version" if CACHE_FOLDER else f"in every run, as {_root()} cannot be written"
-            advice = "" if CACHE_FOLDER else "; FINGER_PIN_CACHE_DIR may name another folder"
-            _say(f"Compiling the model, {often}: about half a minute{advice} ...")
+    def __init__(self, make: Callable[[], Any]) -> None:
+        """Keep what makes it."""
+        self._make = make
 
-    def on_end(self, event: Any) -> None:
-        pass
-
-
-event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
+    @cached_property
+    def made(self) -> Any:
+        """What numba is to see in its place."""
+        return self._make()
 
 
-class _Cache(FunctionCache):
-    """numba's cache, where a full disk costs the next run half a minute and not this one its results."""
+class _Inlined(Later):
+    """A function that is called by compiled code only."""
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        try:
-            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
-        except OSError as error:
-            _say(f"the compile cache {CACHE_FOLDER} cannot be written: {error.strerror}; the next run compiles again")
-
-
-class _Text(JITCodeLibrary):
-    """Code that is only inlined: what calls it optimises it, and it becomes no machine code of its own.
-
-    That saves a fourth of all compiling. Numba asks a library's generator for one thing only here, to store an address.
-    """
-
-    @property
-    def codegen(self) -> _Text:
-        return self
-
-    def set_env(self, name: str, environment: Any) -> None:
-        """Store nothing: there is no machine code that would read it."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
-        self._finalized = True
-
-
-class _TextCompiler(Compiler):
-    """Compiles to `_Text`."""
-
-    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
-        own = library or _Text(target.codegen(), "inlined")  # type: ignore[no-untyped-call]
-        super().__init__(typing, target, own, *rest)  # type: ignore[no-untyped-call]
-
-
-_INLINED: dict[str, Any] = {
-    "cache": False,
-    "forceinline": True,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": _TextCompiler,
-}
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        super().__init__(lambda: import_module("finger_pin.core.compiler").inlined(function, **options))
+        self.function = function
 
 
 def compiled(function: _Function) -> _Function:
     """Return the function compiled, to be called by compiled code only, where it is inlined."""
-    return _compile(function, **_INLINED)
+    return _Inlined(function)  # type: ignore[return-value]
 
 
 def compiled_loosely(function: _Function) -> _Function:
     """Return the function compiled as `compiled` does, with sums in whatever order vector instructions like."""
-    return _compile(function, fastmath={"contract", "reassoc"}, **_INLINED)
+    return _Inlined(function, fastmath={"contract", "reassoc"})  # type: ignore[return-value]
 
 
-def entry(function: _Function) -> _Function:
-    """Return the function compiled on first use, to be called from Python."""
-    return _compile(function, cache=CACHE_FOLDER is not None, no_cfunc_wrapper=True)
+def intrinsic(name: str) -> Any:
+    """Return a function of `intrinsics`, to be called by compiled code only."""
+    return Later(lambda: getattr(import_module("finger_pin.core.intrinsics"), name))
 
 
-# Addresses that were handed out; the code behind them lives as long as these do.
-_alive: list[Any] = []
+class Unit:
+    """A function of an address and a number that returns an integer, compiled on first use, or found on disk."""
+
+    def __init__(self, function: Callable[[int, float], int]) -> None:
+        """Compile nothing yet."""
+        assert isinstance(function, FunctionType)
+        self._function = function
+
+    @cached_property
+    def address(self) -> int:
+        """Where compiled code finds it."""
+        return address_of("int64(int64, float64)", self._function, kept=True)
+
+    @cached_property
+    def _call(self) -> Callable[[int, float], int]:
+        return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double)(self.address)
+
+    def __call__(self, address: int, number: float = 0.0) -> int:
+        """Call it; other threads may run meanwhile."""
+        return self._call(address, number)
 
 
-def address_of(signature: Any, function: _Function, *, kept: bool) -> int:
-    """Return the address of the function compiled for C.
+# Machine code lives as long as the engine that holds it; two threads may ask for the same.
+_engines: list[Any] = []
+_lock = threading.RLock()
+
+
+def address_of(signature: str, function: FunctionType, *, kept: bool) -> int:
+    """Return the address of the function compiled for C; it lives as long as the process.
 
     Args:
-        signature: numba's, of pointers and numbers.
+        signature: As numba writes it, of pointers and numbers.
         function: The function.
         kept: Whether it is found on disk by later processes; for functions of this package only, whose digest names
-            the folder.
+            the folder, and of others that call nothing else.
     """
-    keep = kept and CACHE_FOLDER is not None
-    with _cache_directory():
-        code = numba.cfunc(signature, cache=keep, **_OPTIONS)(function)
-    _alive.append(code)
-    return int(code.address or 0)
+    path = None
+    if kept and CACHE_FOLDER is not None:
+        text = function.__code__
+        own = hashlib.sha256(text.co_code + repr((text.co_names, text.co_consts)).encode()).hexdigest()[:8]
+        path = Path(CACHE_FOLDER) / f"{function.__module__}.{function.__qualname__}-{own}.o"
+    with _lock:
+        code = path.read_bytes() if path is not None and path.exists() else b""
+        if not code:
+            if kept:
+                _announce()
+            code, portable = import_module("finger_pin.core.compiler").machine_code(signature, function)
+            if path is not None and portable:
+                _keep(path, code)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        _engines.append(engine)
+        return int(engine.get_function_address(SYMBOL))
 
 
-@contextmanager
-def _cache_directory() -> Iterator[None]:
-    earlier = numba.config.CACHE_DIR
-    if CACHE_FOLDER is not None:
-        numba.config.CACHE_DIR = CACHE_FOLDER
+def _machine() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(jit=True)
+
+
+def _announce() -> None:
+    often = "once for this version" if CACHE_FOLDER else f"in every run, as {_root()} cannot be written"
+    advice = "" if CACHE_FOLDER else "; FINGER_PIN_CACHE_DIR may name another folder"
+    _say(f"Compiling the model, {often}: about half a minute{advice} ...")
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Keep code for later processes; a full disk costs the next run half a minute and not this one its results."""
     try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = earlier
-
-
-def _compile(function: _Function, **kind: Any) -> _Function:
-    with _cache_directory():
-        dispatcher = numba.njit(**{"nogil": True, **_OPTIONS, **kind})(function)
-        if kind["cache"]:
-            dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
-        return dispatcher  # type: ignore[no-any-return]
+        with replacing(path) as temporary:
+            Path(temporary).write_bytes(code)
+    except OSError as error:
+        _say(f"the compile cache {CACHE_FOLDER} cannot be written: {error.strerror}; the next run compiles again")

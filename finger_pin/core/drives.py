@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Indices, Matrix, Vector, bound_at, get
-from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.binding import Indices, Kind, Matrix, Vector, bound_at, call_at
+from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.rosenbrock import DONE, FULL, INTEGRATION, TIME, advance
+from finger_pin.core.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
 
 
 class Drives(NamedTuple):
@@ -44,6 +44,23 @@ class Drives(NamedTuple):
     voltages: Matrix
 
 
+class Driven(NamedTuple):
+    """A stretch that is integrated while loops run.
+
+    Attributes:
+        drives: The loops.
+        stretch: Address of the bound `Stretch`.
+        advance: Address of `rosenbrock.advance`.
+    """
+
+    drives: Drives
+    stretch: int
+    advance: int
+
+
+DRIVEN = Kind(Driven)
+
+
 @compiled
 def _sample(drives: Any, x: Any, tension: Any) -> None:
     """Take a sample of all motors, and set their voltages."""
@@ -68,24 +85,23 @@ def _sample(drives: Any, x: Any, tension: Any) -> None:
     drives.taken[0] += 1
 
 
-@entry
-def advance_driven(block: Any, drives: Any, end: float, times: Any, states: Any, attitudes: Any, dense: Any) -> Any:
+@Unit
+def advance_driven(address: int, end: float) -> int:
     """Advance as `rosenbrock.advance` does, and sample at every multiple of the period on the way, its start included.
 
     A sample at the end itself is taken by the next call.
     """
-    integration = get(block, INTEGRATION)
+    driven = bound_at(address, DRIVEN)
+    drives, stretch = driven.drives, bound_at(driven.stretch, STRETCH)
+    integration = bound_at(stretch.integration, INTEGRATION)
     model = bound_at(integration.model, MODEL)
-    memory, recorded = integration.memory, 0
+    memory, times = integration.memory, stretch.times
     while True:
         if memory[TIME] >= drives.taken[0] * drives.period and (memory[TIME] < end or drives.taken[0] == 0):
             _sample(drives, integration.x, model.control.tension)
         goal = min(end, drives.taken[0] * drives.period)
-        status, steps = advance(
-            block, goal, times[recorded:], states[recorded:], attitudes[recorded:], dense[recorded:]
-        )
-        recorded += steps
+        status: int = call_at(driven.advance, driven.stretch, goal)
         if status != DONE or memory[TIME] >= end:
-            return status, recorded
-        if recorded == times.size and times.size > 0:
-            return FULL, recorded
+            return status
+        if stretch.taken[0] == times.size and times.size > 0:
+            return FULL

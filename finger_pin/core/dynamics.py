@@ -135,7 +135,7 @@ def exert(model: Any, address: int, time: float) -> None:
     tables, control, x, work = model.tables, model.control, model.state, model.work
     width = work.torque.size
     if tables.loaded:
-        tip_forces(control, time, tables)
+        tip_forces(control, time, 0, tables.tip_force)
         _tips(tables, work)
     for j in range(width):
         work.torque[j] = 0.0

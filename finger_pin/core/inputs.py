@@ -101,16 +101,12 @@ def input_slopes(control: Any, time: float) -> None:
 
 
 @compiled
-def tip_forces(control: Any, time: float, tables: Any) -> None:
-    """Fill the forces at the tips where they vary in time."""
+def tip_forces(control: Any, time: float, order: int, out: Any) -> None:
+    """Fill the forces at the tips where they vary in time, or a derivative of them, shape (t, 3)."""
     if control.force.harmonics.shape[0] > 0:
-        signal_values(control.force, time, tables.tip_force.reshape(-1))
-
-
-@compiled
-def tip_force_rates(control: Any, time: float, rates: Any) -> None:
-    """Fill their time derivatives, shape (t, 3)."""
-    signal_derivatives(control.force, time, 1, rates.reshape(-1))
+        for t in range(out.shape[0]):
+            for r in range(3):
+                out[t, r] = signal_derivative(control.force, 3 * t + r, time, order)
 
 
 @compiled

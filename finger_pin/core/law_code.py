@@ -11,22 +11,20 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic as _numba_intrinsic
-
-from finger_pin.core.compilation import address_of, compiled
+from finger_pin.core.compilation import address_of, compiled, intrinsic
 from finger_pin.laws.law import ContactLaw, Law, Row, Touch
-
-# Typed as what it makes of a function: one that compiled code calls without the typing context.
-_intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsic
-_constant: Callable[[Callable[..., Any]], Callable[..., Any]] = _numba_intrinsic(prefer_literal=True)
 
 # Columns of the table of rows; the signals of the law follow. Numba reads them as constants.
 LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, FORCE, RATE, SIGNALS = range(10)
 # Columns of the table of slopes: the force by l, l', z, z', N, u, phi, then z' by l, l', z, N, u, phi.
 F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE = range(7)
 R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, SLOPES = range(7, 14)
+
+#: Called by compiled code: evaluate the law at an address for a range of rows.
+call_value = intrinsic("call_value")
+#: Called by compiled code: fill slopes, or energies and powers, by the law at an address for a range of rows.
+call_filling = intrinsic("call_filling")
+_numbers, _put = intrinsic("numbers"), intrinsic("put")
 
 # Filled in for every law.
 _law: Any = None
@@ -77,43 +75,11 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
         "_COUNT": len(law.signals),
     }
     twin = FunctionType(template.__code__, world, template.__name__)
-    # Numba names what it keeps on disk after this.
+    # What is kept on disk is named after this.
     twin.__qualname__ = f"{template.__name__}[{function.__module__}.{function.__qualname__}]"
-    pointer, index = types.CPointer(types.float64), types.int64  # type: ignore[no-untyped-call]
-    tables = 2 if template in (_value, _contact_value) else 3
+    tables = "CPointer(float64), " * (2 if template in (_value, _contact_value) else 3)
     kept = function.__module__.startswith("finger_pin.laws.")
-    return address_of(types.void(*[pointer] * tables, index, index, index), twin, kept=kept)
-
-
-@_constant
-def _numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> Any:
-    """Return a tuple of numbers of a table, ``stride`` apart; their count is a constant."""
-    size = count.literal_value
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        values, place = [], arguments[1]
-        for _ in range(size):
-            values.append(builder.load(builder.gep(arguments[0], [place])))
-            place = builder.add(place, arguments[2])
-        return context.make_tuple(builder, signature.return_type, values)
-
-    tuple_of_numbers = types.UniTuple(types.float64, size)  # type: ignore[no-untyped-call]
-    return tuple_of_numbers(table, types.int64, types.int64, count), generate
-
-
-@_intrinsic
-def _put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
-    """Write a tuple of numbers into a table, ``stride`` apart."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = arguments[1]
-        for index, kind in enumerate(values):
-            value = context.cast(builder, builder.extract_value(arguments[3], index), kind, types.float64)
-            builder.store(value, builder.gep(arguments[0], [place]))
-            place = builder.add(place, arguments[2])
-        return context.get_dummy_value()
-
-    return types.void(table, types.int64, types.int64, values), generate
+    return address_of(f"void({tables}int64, int64, int64)", twin, kept=kept)
 
 
 @compiled
@@ -184,31 +150,3 @@ def _contact_account(table: Any, numbers: Any, filled: Any, stride: int, begin: 
         forces, rates = _numbers(table, FORCE * stride + k, 1, 3), _numbers(table, RATE * stride + k + 1, 1, 2)
         touch, own = _touched(table, stride, k), _numbers(numbers, k, stride, _PARAMETERS)
         _put(filled, k, stride, _law(touch, own, forces, rates, signals))
-
-
-def _call(context: Any, builder: Any, signature: Any, arguments: Any, tables: int) -> Any:
-    """Generate the call of an address with the data of some tables, their stride, and a range of rows."""
-    number, pointer = ir.IntType(64), ir.DoubleType().as_pointer()
-    arrays = [
-        context.make_array(kind)(context, builder, value)
-        for kind, value in zip(signature.args[1 : 1 + tables], arguments[1 : 1 + tables], strict=True)
-    ]
-    stride = builder.extract_value(arrays[0].shape, 1)
-    called = ir.FunctionType(ir.VoidType(), [pointer] * tables + [number] * 3)
-    function = builder.inttoptr(arguments[0], called.as_pointer())
-    builder.call(function, [*(array.data for array in arrays), stride, *arguments[1 + tables :]])
-    return context.get_dummy_value()
-
-
-@_intrinsic
-def call_value(_typing: Any, address: Any, rows: Any, parameters: Any, begin: Any, end: Any) -> Any:
-    """Evaluate the law at an address for a range of rows."""
-    signature = types.void(types.int64, rows, parameters, types.int64, types.int64)
-    return signature, lambda context, builder, sig, args: _call(context, builder, sig, args, 2)
-
-
-@_intrinsic
-def call_filling(_typing: Any, address: Any, rows: Any, parameters: Any, filled: Any, begin: Any, end: Any) -> Any:
-    """Fill slopes, or energies and powers, by the law at an address for a range of rows."""
-    signature = types.void(types.int64, rows, parameters, filled, types.int64, types.int64)
-    return signature, lambda context, builder, sig, args: _call(context, builder, sig, args, 3)

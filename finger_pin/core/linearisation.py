@@ -10,7 +10,7 @@ from finger_pin.core.binding import Indices, Matrix, Vector, call_at
 from finger_pin.core.blocks import Blocks, build_blocks
 from finger_pin.core.compilation import compiled
 from finger_pin.core.control import Control
-from finger_pin.core.inputs import input_slopes, tip_force_rates
+from finger_pin.core.inputs import input_slopes, tip_forces
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
@@ -195,7 +195,7 @@ def linearise(model: Any, address: int, time: float) -> None:
     input_slopes(control, time)
     signal_derivatives(control.guide, time, 3, work.guide_rate)
     if tables.loaded:
-        tip_force_rates(control, time, work.force_rate)
+        tip_forces(control, time, 1, work.force_rate)
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         if begin >= tables.touching:

@@ -6,15 +6,13 @@ optimised again there.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from finger_pin.core import blocks, condensation, contacts, dynamics, linearisation, path_derivatives, paths
-from finger_pin.core.binding import Vector, bound, bound_at, kind_of
-from finger_pin.core.compilation import address_of
+from finger_pin.core.binding import Kind, Vector, bound, bound_at
+from finger_pin.core.compilation import Unit
 from finger_pin.core.control import Control
 from finger_pin.core.inputs import move_base
 from finger_pin.core.linearisation import Linear, build_linear
@@ -65,7 +63,7 @@ class Model(NamedTuple):
     power: int
 
 
-MODEL = kind_of(Model)
+MODEL = Kind(Model)
 
 
 class BoundModel:
@@ -80,64 +78,44 @@ class BoundModel:
         """Bind; arrays are taken as they are, not copied. The base may be ``moved`` by others than its control."""
         size = 2 * len(work.torque) + int(tables.state.max(initial=-1)) + 1
         moved = moved or len(control.palm.harmonics) > 0
-        units = (
-            *_units(),
-            *(_units_for_paths() if len(tables.paths.columns) else (0, 0, 0, 0)),
-            *(_units_for_base() if moved else (0, 0, 0)),
-        )
+        through_space = len(tables.paths.columns) > 0
+        units = [unit.address for unit in (_evaluate, _exert, _linearise, _condense)]
+        # Compiled only for mechanisms that need them: paths through space or contacts, and a base that moves.
+        units += [unit.address if through_space else 0 for unit in (_measure, _turn, _touch, _press)]
+        units += [unit.address if moved else 0 for unit in (_carry, _sway, _power)]
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
         self._block = bound(self.model, MODEL)
         self.address = int(self._block.ctypes.data)
 
 
-@cache
-def _units() -> tuple[int, int, int, int]:
-    kind = types.int64(types.int64, types.float64)
-    evaluate, exert, linearise, condense = (
-        address_of(kind, each, kept=True) for each in (_evaluate, _exert, _linearise, _condense)
-    )
-    return evaluate, exert, linearise, condense
-
-
-@cache
-def _units_for_paths() -> tuple[int, int, int, int]:
-    """Compile what only mechanisms with paths through space or contacts need."""
-    kind = types.int64(types.int64, types.float64)
-    measure, turn, touch, press = (address_of(kind, each, kept=True) for each in (_measure, _turn, _touch, _press))
-    return measure, turn, touch, press
-
-
-@cache
-def _units_for_base() -> tuple[int, int, int]:
-    """Compile what only mechanisms on a base that moves need."""
-    kind = types.int64(types.int64, types.float64)
-    carry, sway, power = (address_of(kind, each, kept=True) for each in (_carry, _sway, _power))
-    return carry, sway, power
-
-
+@Unit
 def _evaluate(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
     dynamics.evaluate(model, address, time)
     return 1
 
 
+@Unit
 def _exert(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
     dynamics.exert(model, address, time)
     return 1
 
 
+@Unit
 def _linearise(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
     linearisation.linearise(model, address, time)
     return 1
 
 
+@Unit
 def _condense(address: int, g: float) -> int:
     model = bound_at(address, MODEL)
     return 1 if condensation.condense(model, address, g) else 0
 
 
+@Unit
 def _measure(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
     tables, work, width = model.tables, model.work, model.work.torque.size
@@ -147,6 +125,7 @@ def _measure(address: int, _time: float) -> int:
     return 1
 
 
+@Unit
 def _turn(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
     tables, work, width = model.tables, model.work, model.work.torque.size
@@ -156,24 +135,28 @@ def _turn(address: int, _time: float) -> int:
     return 1
 
 
+@Unit
 def _touch(address: int, g: float) -> int:
     model = bound_at(address, MODEL)
     contacts.block_contact_gains(model.tables, g, model.work, model.linear)
     return 1
 
 
+@Unit
 def _press(address: int, row: float) -> int:
     model = bound_at(address, MODEL)
     contacts.add_pushes(model.tables, model.work, int(row), model.linear)
     return 1
 
 
+@Unit
 def _carry(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
     move_base(model.control, time, model.tables, model.work)
     return 1
 
 
+@Unit
 def _sway(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
     width = model.work.torque.size
@@ -181,6 +164,7 @@ def _sway(address: int, _time: float) -> int:
     return 1
 
 
+@Unit
 def _power(address: int, _time: float) -> int:
     model = bound_at(address, MODEL)
     width = model.work.torque.size

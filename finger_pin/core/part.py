@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.binding import bound
 from finger_pin.core.charts import place_all
 from finger_pin.core.control import Control
-from finger_pin.core.drives import Drives, advance_driven
+from finger_pin.core.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.islands import Island
 from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau
@@ -102,7 +103,9 @@ class Part:
         place_all(tables, attitude)
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
-        self._nothing = self.room(0)
+        self._nothing, self._taken = self.room(0), np.zeros(1, dtype=np.int64)
+        # A record and loops, the blocks that hold them for compiled code, and the address of what it is given.
+        self._placed: tuple[Record | None, Drives | None, list[NDArray[np.uint8]], int] = (None, None, [], 0)
 
     def room(self, count: int) -> Record:
         """Return room for so many steps."""
@@ -116,12 +119,21 @@ class Part:
     def advance(self, end: float, record: Record | None = None) -> tuple[int, int]:
         """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
         into = self._nothing if record is None else record
-        room = (into.times, into.states, into.attitudes, into.dense)
-        if self.drives is None:
-            status, steps = core.advance(self._block, end, *room)
-        else:
-            status, steps = advance_driven(self._block, self.drives, end, *room)
-        return status, steps
+        self._taken[0] = 0
+        status = (core.advance if self.drives is None else advance_driven)(self._place(into), end)
+        return status, int(self._taken[0])
+
+    def _place(self, record: Record) -> int:
+        """Return where compiled code finds a record, with the loops of motors if any run."""
+        if self._placed[0] is not record or self._placed[1] is not self.drives:
+            room = (record.times, record.states, record.attitudes, record.dense)
+            block = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
+            blocks = [block]
+            if self.drives is not None:
+                driven = Driven(self.drives, block.ctypes.data, core.advance.address)
+                blocks.append(bound(driven, DRIVEN))
+            self._placed = record, self.drives, blocks, int(blocks[-1].ctypes.data)
+        return self._placed[-1]
 
     def restart(self, x: Array, attitude: Array) -> None:
         """Go on from another state at the same time, with no memory of earlier steps."""

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Matrix, Vector, bound_at, call_at, get, kind_of
+from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound_at, call_at
 from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import rechart
-from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.condensation import solve
 from finger_pin.core.control import HELD
 from finger_pin.core.drift import carry
@@ -63,7 +63,27 @@ class Integration(NamedTuple):
     kinks: Vector
 
 
-INTEGRATION = kind_of(Integration)
+class Stretch(NamedTuple):
+    """What is integrated further, and room for a record of at most m steps.
+
+    Attributes:
+        integration: Address of the bound `Integration`.
+        times: Times at which steps end, shape (m,); of length zero to record nothing.
+        states: States there, with the angles of free bodies since the step's start, shape (m, size).
+        attitudes: Quaternions of the free bodies there, shape (m, f, 4).
+        dense: Interpolants of the steps, shape (m, rows of the tableau's dense, size).
+        taken: Number of steps recorded so far, shape (1,).
+    """
+
+    integration: int
+    times: Vector
+    states: Matrix
+    attitudes: Layers
+    dense: Layers
+    taken: Indices
+
+
+INTEGRATION, STRETCH = Kind(Integration), Kind(Stretch)
 
 
 @compiled
@@ -145,27 +165,19 @@ def _worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
     return index
 
 
-@entry
-def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, dense: Any) -> Any:
-    """Take steps until the end, or until the record is full; return a status and the number of steps recorded.
-
-    Args:
-        block: An `Integration`, bound.
-        end: Time to reach, s.
-        times: Record of the times at which steps end, shape (m,); of length zero to record nothing.
-        states: Record of the states there, with the angles of free bodies since the step's start, shape (m, size).
-        attitudes: Record of the free bodies' quaternions there, shape (m, f, 4).
-        dense: Record of the interpolants of the steps, shape (m, rows of the tableau's dense, size).
-    """
-    integration = get(block, INTEGRATION)
+@Unit
+def advance(address: int, end: float) -> int:
+    """Take steps of the `Stretch` at an address until a time, s, or until its record is full; return a status."""
+    stretch = bound_at(address, STRETCH)
+    integration = bound_at(stretch.integration, INTEGRATION)
     model = bound_at(integration.model, MODEL)
+    times, taken = stretch.times, stretch.taken
     tables, control, tableau = model.tables, model.control, integration.tableau
     rows, kinks, r = model.work.rows, integration.kinks, integration.r
     joints = max(tables.parents.size, 1)
     x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
     k, start, reached = integration.k, integration.start, model.state
     size, count = x.size, tableau.nodes.size
-    recorded = 0
     exponent = 1.0 / tableau.order
     fresh, whole = True, 0.0
     # Right after a full record nothing has jumped.
@@ -182,16 +194,16 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
             for c in range(width, 2 * width):
                 if abs(x[c]) > FASTEST:
                     memory[CULPRIT] = c
-                    return RUNAWAY, recorded
+                    return RUNAWAY
         tries = memory[ACCEPTED] + memory[REJECTED]
         if tries >= memory[WINDOW_END]:
             if memory[WINDOW_END] > 0.0 and memory[TIME] - memory[WINDOW_START] < WINDOW * LEAST_MEAN_STEP:
                 memory[CULPRIT] = float(_worst(x, k[count - 1], rtol, atol))
-                return CREEPING, recorded
+                return CREEPING
             memory[WINDOW_START], memory[WINDOW_END] = memory[TIME], tries + WINDOW
-        if times.size > 0 and recorded == times.size:
+        if times.size > 0 and taken[0] == times.size:
             memory[HELD_STEP] = -memory[HELD_STEP]
-            return FULL, recorded
+            return FULL
         time, h = memory[TIME], memory[STEP]
         last = time + 1.01 * h >= end
         cut = last and end - time < h
@@ -203,7 +215,7 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
             for c in range(size - 1, -1, -1):
                 if not np.isfinite(start[c]):
                     memory[CULPRIT] = c
-            return NOT_FINITE, recorded
+            return NOT_FINITE
         if fresh:
             memory[JACOBIANS] += 1
         memory[FACTORISATIONS] += 1
@@ -244,13 +256,15 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 # Right after a rejection the step does not grow.
                 factor = min(factor, 1.0)
                 memory[CULPRIT] = 0.0
-            if recorded < times.size:
+            if taken[0] < times.size:
                 for row in range(tableau.dense.shape[0]):
+                    bend = stretch.dense[taken[0], row]
                     for c in range(size):
-                        value = 0.0
-                        for j in range(count):
-                            value += tableau.dense[row, j] * k[j, c]
-                        dense[recorded, row, c] = value
+                        bend[c] = 0.0
+                    for j in range(count):
+                        factor_of_stage = tableau.dense[row, j]
+                        for c in range(size):
+                            bend[c] += factor_of_stage * k[j, c]
             if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False
@@ -273,16 +287,16 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
                 # The step ends at a kink; the one before it says nothing of the next, which may be as long as before.
                 memory[STEP], memory[LAST_STEP] = max(memory[STEP], whole), 0.0
                 whole = 0.0
-            if recorded < times.size:
-                times[recorded] = memory[TIME]
+            if taken[0] < times.size:
+                times[taken[0]] = memory[TIME]
                 for c in range(size):
-                    states[recorded, c] = x[c]
+                    stretch.states[taken[0], c] = x[c]
             rechart(tables, x, integration.attitude)
-            if recorded < times.size:
-                for f in range(attitudes.shape[1]):
+            if taken[0] < times.size:
+                for f in range(stretch.attitudes.shape[1]):
                     for c in range(4):
-                        attitudes[recorded, f, c] = integration.attitude[f, c]
-                recorded += 1
+                        stretch.attitudes[taken[0], f, c] = integration.attitude[f, c]
+                taken[0] += 1
             fresh = True
         else:
             whole = 0.0
@@ -291,5 +305,5 @@ def advance(block: Any, end: float, times: Any, states: Any, attitudes: Any, den
             memory[STEP] = h * min(factor, 0.9)
             if memory[STEP] < 1e-14 * max(1.0, abs(time)):
                 memory[CULPRIT] = float(_worst(x, k[count - 1], rtol, atol))
-                return UNDERFLOW, recorded
-    return DONE, recorded
+                return UNDERFLOW
+    return DONE

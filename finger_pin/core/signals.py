@@ -2,18 +2,79 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import bound_at, call_at
+from finger_pin.core.binding import Kind, Layers, Matrix, Vector, bound_at, call_at
 from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import place_bodies
-from finger_pin.core.compilation import compiled, entry
+from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.law_code import call_filling
 from finger_pin.core.model import MODEL
 from finger_pin.core.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.tables import END, FIRST
+
+
+class States(NamedTuple):
+    """Many states of one island under given inputs, which its control must hold, and what is filled for them.
+
+    Attributes:
+        model: Address of a bound `Model`.
+        states: Shape (m, size).
+        commands: Shape (m, u).
+        forces: At the tips, shape (m, t, 3).
+        rates: Filled with the rates, shape (m, size), or (0, size) if only J^T F, energies and powers are wanted.
+        rows: Filled with the table of rows from the first place on, shape (columns, first + m or more, K), or
+            (columns, 0, K).
+        first: Where in it the first state stands.
+        torques: Filled with the sum of A^T phi, shape (m, N).
+        externals: Filled with J^T F, shape (m, N).
+        booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
+        bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
+            (m, 15 + g), or (0, 15 + g) at rest.
+        attitudes: Quaternions of free bodies, shape (m, f, 4).
+    """
+
+    model: int
+    states: Matrix
+    commands: Matrix
+    forces: Layers
+    rates: Matrix
+    rows: Layers
+    first: int
+    torques: Matrix
+    externals: Matrix
+    booked: Matrix
+    bases: Matrix
+    attitudes: Layers
+
+
+class Motions(NamedTuple):
+    """Many positions and velocities of the bodies, and what is filled for them.
+
+    With a base that moves energies are those of the motion in the world, where the base has no height.
+
+    Attributes:
+        model: Address of a bound `Model`.
+        positions: Shape (m, n).
+        velocities: Shape (m, n).
+        tips: Filled with the positions of the tips, shape (m, t, 3).
+        kinetic: Filled with energies, shape (m,).
+        potential: Likewise.
+        bases: As of `States`.
+    """
+
+    model: int
+    positions: Matrix
+    velocities: Matrix
+    tips: Layers
+    kinetic: Vector
+    potential: Vector
+    bases: Matrix
+
+
+STATES, MOTIONS = Kind(States), Kind(Motions)
 
 
 @compiled
@@ -54,37 +115,20 @@ def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: An
                 work.paths.asleep[each] = 0
 
 
-@entry
-def evaluate_many(
-    address: int,
-    states: Any,
-    commands: Any,
-    forces: Any,
-    rates: Any,
-    rows: Any,
-    torques: Any,
-    externals: Any,
-    booked: Any,
-    bases: Any,
-    attitudes: Any,
-) -> None:
-    """Evaluate states of one island under given inputs; its control must hold them.
-
-    Args:
-        address: Of a bound `Model`.
-        states: Shape (m, size).
-        commands: Shape (m, u).
-        forces: At the tips, shape (m, t, 3).
-        rates: Filled with the rates, shape (m, size), or (0, size) if only J^T F, energies and powers are wanted.
-        rows: Filled with the table of rows, shape (m, columns, K), or (0, columns, K).
-        torques: Filled with the sum of A^T phi, shape (m, N).
-        externals: Filled with J^T F, shape (m, N).
-        booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
-        bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
-            (m, 15 + g), or (0, 15 + g) at rest.
-        attitudes: Quaternions of free bodies, shape (m, f, 4).
-    """
-    model = bound_at(address, MODEL)
+@Unit
+def evaluate_many(address: int, _time: float) -> int:
+    """Evaluate the `States` at an address."""
+    many = bound_at(address, STATES)
+    states, commands, forces, rates, rows = many.states, many.commands, many.forces, many.rates, many.rows
+    first = many.first
+    torques, externals, booked, bases, attitudes = (
+        many.torques,
+        many.externals,
+        many.booked,
+        many.bases,
+        many.attitudes,
+    )
+    model = bound_at(many.model, MODEL)
     tables, control, work = model.tables, model.control, model.work
     # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
     sleepy = tables.touching > 0 and rates.shape[0] == 0 and bases.shape[0] == 0
@@ -104,7 +148,7 @@ def evaluate_many(
         _set_base(bases, m, tables, work)
         place_bodies(tables, attitudes[m])
         if rates.shape[0] > 0 or bases.shape[0] > 0:
-            call_at(model.evaluate, address, 0.0)
+            call_at(model.evaluate, many.model, 0.0)
         else:
             # Powers do not need the acceleration, and only some rows need to know where bodies are.
             for i in range(commands.shape[1]):
@@ -112,13 +156,13 @@ def evaluate_many(
             if tables.loaded or tables.paths.columns.size > 0:
                 width = work.torque.size
                 move(tables, model.state[:width], model.state[width : 2 * width], work)
-            call_at(model.exert, address, 0.0)
+            call_at(model.exert, many.model, 0.0)
         if rates.shape[0] > 0:
             for c in range(states.shape[1]):
                 rates[m, c] = model.rate[c]
-            for c in range(rows.shape[1]):
+            for c in range(rows.shape[0]):
                 for k in range(rows.shape[2]):
-                    rows[m, c, k] = work.rows[c, k]
+                    rows[c, first + m, k] = work.rows[c, k]
         for j in range(torques.shape[1]):
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]
@@ -131,12 +175,13 @@ def evaluate_many(
         if model.power != 0:
             last -= 1
             if bases.shape[0] > 0:
-                call_at(model.power, address, 0.0)
+                call_at(model.power, many.model, 0.0)
                 booked[m, last + 1] = work.base_power[0]
         if work.guide.size > 0:
             for j in range(torques.shape[1]):
                 if tables.guided[j] >= 0:
                     booked[m, last] -= work.torque[j] * states[m, torques.shape[1] + j]
+    return 1
 
 
 @compiled
@@ -151,16 +196,12 @@ def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
         work.guide[i] = bases[m, 15 + i] if bases.shape[0] > 0 else 0.0
 
 
-@entry
-def motion_many(
-    address: int, positions: Any, velocities: Any, tips: Any, kinetic: Any, potential: Any, bases: Any
-) -> None:
-    """Fill positions of the tips (m, t, 3) and energies (m,) at positions and velocities of the bodies (m, n).
-
-    With a base that moves, ``bases`` as for `evaluate_many`, energies are those of the motion in the world, where the
-    base has no height.
-    """
-    model = bound_at(address, MODEL)
+@Unit
+def motion_many(address: int, _time: float) -> int:
+    """Fill the `Motions` at an address."""
+    many = bound_at(address, MOTIONS)
+    positions, velocities, tips, bases = many.positions, many.velocities, many.tips, many.bases
+    model = bound_at(many.model, MODEL)
     tables, work = model.tables, model.work
     for m in range(positions.shape[0]):
         _set_base(bases, m, tables, work)
@@ -188,5 +229,6 @@ def motion_many(
             for r in range(3):
                 weight = bases[m, 12 + r] if bases.shape[0] > 0 else tables.gravity[r]
                 lifted -= weight * inertia[1 + r]
-        kinetic[m] = 0.5 * moving
-        potential[m] = lifted
+        many.kinetic[m] = 0.5 * moving
+        many.potential[m] = lifted
+    return 1

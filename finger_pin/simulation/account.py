@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.textbook import Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
@@ -52,7 +52,14 @@ class Account:
     residual: Array
 
 
-def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: LoopSignals, motion: Motion) -> Account:
+def account(
+    loop: ClosedLoop,
+    trajectory: Trajectory,
+    times: Array,
+    signals: LoopSignals,
+    motion: Motion,
+    known: Array | None = None,
+) -> Account:
     """Keep the energy account of a trajectory.
 
     Args:
@@ -61,9 +68,9 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
         times: Saved times, shape (m,), beginning at the trajectory's start.
         signals: The signals at those times.
         motion: Fingertip and energies of the rigid body at those times.
+        known: The integrals of all powers up to those times, `Works.values`, where they are known already.
     """
     booked = powers(signals.finger)
-    done = np.zeros((len(times), len(booked.names)))
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     parts = _apart(loop, trajectory)
@@ -71,7 +78,8 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     columns = [
         [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)] for part, _, _ in parts
     ]
-    found = [_works(*part, times, len(places)) for part, places in zip(parts, columns, strict=True)]
+    found = [Works(part, times).add(ends, states).values for part, ends, states in parts] if known is None else [known]
+    done = np.zeros((len(times), len(booked.names)))
     for own, places in zip(found, columns, strict=True):
         done[:, places] += own
     works = Flows(done, booked.names, booked.supplies)
@@ -80,9 +88,9 @@ def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: Loo
     allowed = max(_CLOSED * float(np.sum(np.max(np.abs(done), axis=0, initial=0.0))), _NOTHING)
     if allowed < float(np.max(np.abs(residual))) < np.inf:
         for part, own, places in zip(parts, found, columns, strict=True):
-            finer = _halved(part, _suspected(part[1], times, residual), len(places), 1e-3 * allowed)
+            finer = _halved(part, _suspected(part[1], times, residual), 1e-3 * allowed)
             if len(finer):
-                done[:, places] += _works(part[0], np.union1d(part[1], finer), part[2], times, len(places)) - own
+                done[:, places] += Works(part[0], times).add(np.union1d(part[1], finer), part[2]).values - own
     return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
 
 
@@ -95,13 +103,13 @@ def _suspected(ends: Array, times: Array, residual: Array) -> NDArray[np.int64]:
     return np.unique(np.concatenate([np.zeros(0, int), *(np.arange(first[i], last[i]) for i in worst)]))
 
 
-def _halved(part: _Part, steps: NDArray[np.int64], count: int, allowed: float) -> Array:
+def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
     """Return where to halve steps, and halves of them, until no work of one is wrong by more than is allowed, J."""
     loop, ends, states = part
     begin, length, found = ends[steps], np.diff(ends)[steps], []
     for _ in range(_HALVINGS):
         chunks = [slice(first, first + _CHUNK) for first in range(0, len(begin), _CHUNK)]
-        errors = [_quadrature_error(loop, begin[chunk], length[chunk], states, count) for chunk in chunks]
+        errors = [_quadrature_error(loop, begin[chunk], length[chunk], states) for chunk in chunks]
         bent = np.concatenate([np.zeros(0), *errors]) > allowed
         begin, length = begin[bent], 0.5 * length[bent]
         found.append(begin + length)
@@ -109,12 +117,10 @@ def _halved(part: _Part, steps: NDArray[np.int64], count: int, allowed: float) -
     return np.concatenate(found)
 
 
-def _quadrature_error(
-    loop: ClosedLoop, begin: Array, length: Array, states: Callable[[Array], Array], count: int
-) -> Array:
+def _quadrature_error(loop: ClosedLoop, begin: Array, length: Array, states: Callable[[Array], Array]) -> Array:
     """Return by how much the integral of any power over steps may be wrong, shape (steps,), J."""
-    one = np.tensordot(_WEIGHTS, _over(loop, begin, length, states, count, _NODES), (0, 1))
-    other = np.tensordot(_CHECK_WEIGHTS, _over(loop, begin, length, states, count, _CHECKS), (0, 1))
+    one = np.tensordot(_WEIGHTS, _over(loop, begin, length, states, _NODES), (0, 1))
+    other = np.tensordot(_CHECK_WEIGHTS, _over(loop, begin, length, states, _CHECKS), (0, 1))
     return np.asarray(np.max(np.abs(one - other), axis=1))
 
 
@@ -127,33 +133,48 @@ def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[_Part]:
     return [(loop, trajectory.breakpoints, trajectory.interpolate)]
 
 
-def _works(loop: ClosedLoop, breakpoints: Array, states: Callable[[Array], Array], times: Array, count: int) -> Array:
-    """Return the integrals of all powers from the start to the saved times, shape (m, count).
+class Works:
+    """Integrals of all powers up to the saved times, taken over steps as they come.
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
+
+    Attributes:
+        values: Shape (m, powers + 1), J.
     """
-    begin, length = breakpoints[:-1], np.diff(breakpoints)
-    works, reached = np.zeros((len(times), count)), np.zeros(count)
-    if len(length) == 0:
-        return works
-    inside = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, len(begin) - 1)
-    for first in range(0, len(begin), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        values = _over(loop, begin[part], length[part], states, count, _NODES)
+
+    def __init__(self, loop: ClosedLoop, times: Array) -> None:
+        """Begin at nothing; times have shape (m,), in order."""
+        self._loop, self._times = loop, times
+        count = len(loop.finger.mechanism.books.powers) + 1
+        self.values, self._reached = np.zeros((len(times), count)), np.zeros(count)
+
+    def add(self, ends: Array, states: Callable[[Array], Array]) -> Works:
+        """Go on over steps, given by their ends with the start first, and what maps times to packed states."""
+        for first in range(0, len(ends) - 1, _CHUNK):
+            self._add(ends[first : first + _CHUNK + 1], states)
+        return self
+
+    def _add(self, ends: Array, states: Callable[[Array], Array]) -> None:
+        begin, length = ends[:-1], np.diff(ends)
+        values = _over(self._loop, begin, length, states, _NODES)
         steps = sum(weight * values[:, node] for node, weight in enumerate(_WEIGHTS))
-        before = reached + np.cumsum(steps, axis=0) - steps
-        rows = slice(*np.searchsorted(inside, (first, first + _CHUNK)))
-        step = inside[rows] - first
-        share = np.vander((times[rows] - begin[inside[rows]]) / length[inside[rows]], 4)[:, :3] @ _PARABOLAS
-        works[rows] = before[step] + sum(share[:, node, None] * values[step, node] for node in range(len(_NODES)))
-        reached = before[-1] + steps[-1]
-    return works
+        before = self._reached + np.cumsum(steps, axis=0) - steps
+        rows = saved(self._times, ends)
+        times = self._times[rows]
+        step = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, None)
+        share = np.vander((times - begin[step]) / length[step], 4)[:, :3] @ _PARABOLAS
+        self.values[rows] = before[step] + sum(share[:, node, None] * values[step, node] for node in range(len(_NODES)))
+        self._reached = before[-1] + steps[-1]
 
 
-def _over(
-    loop: ClosedLoop, begin: Array, length: Array, states: Callable[[Array], Array], count: int, nodes: Array
-) -> Array:
+def saved(times: Array, ends: Array) -> slice:
+    """Return which of the saved times lie in steps, those at their ends among them."""
+    first, last = np.searchsorted(times, ends[0]), np.searchsorted(times, ends[-1] * (1.0 + 1e-12), side="right")
+    return slice(int(first), int(last))
+
+
+def _over(loop: ClosedLoop, begin: Array, length: Array, states: Callable[[Array], Array], nodes: Array) -> Array:
     """Return the powers at nodes of steps, times the steps' lengths, shape (steps, nodes, count)."""
     times = (begin[:, None] + length[:, None] * nodes).ravel()
-    return loop.powers(times, states(times)).reshape(-1, len(nodes), count) * length[:, None, None]
+    return loop.powers(times, states(times)).reshape(len(begin), len(nodes), -1) * length[:, None, None]

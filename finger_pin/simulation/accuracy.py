@@ -19,7 +19,7 @@ from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
 
 #: Steps between two looks at a compiled simulation.
-CHUNK = 256
+CHUNK = 128
 
 # A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
 _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
@@ -32,7 +32,7 @@ _TIGHTER = 10.0
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
 # far slower, and a motion that takes so many steps shows early how sensitive it is.
-_PATIENCE, _MOST_LOOKS = 2, 600
+_PATIENCE, _MOST_LOOKS = 2, 1200
 # The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
 _OPEN, _ROUNDING = 1e-4, 1e-13
 # A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
@@ -61,12 +61,14 @@ class Run:
         scenario: With the tolerances that it took.
         trajectory: Its solution.
         result: What was recorded of it.
+        left: Which share of all energy exchanged its account leaves open.
         coarser: What it replaces, if it is a repetition.
     """
 
     scenario: Scenario
     trajectory: Trajectory
     result: xr.Dataset
+    left: float
     coarser: Trajectory | None = None
 
 
@@ -87,28 +89,28 @@ def close_account(
         repeated: Integrates the scenario with other tolerances until it is asked to stop.
         recorded: Makes the result of a trajectory.
     """
-    run = Run(scenario, trajectory, recorded(trajectory))
-    settings, share = scenario.simulation, left_open(run.result)
-    limit, left = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED), share
+    result, settings = recorded(trajectory), scenario.simulation
+    first = run = Run(scenario, trajectory, result, left_open(result))
+    limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
     whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
     for _ in range(_MOST_REPETITIONS):
-        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < left < np.inf:
+        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < run.left < np.inf:
             break
         tighter = _tightened(run.scenario)
         other = repeated(tighter, _patient(run.trajectory))
         if other.failure or other.interrupted:
             break
-        result, before = recorded(other), left
+        result = recorded(other)
         left = left_open(result)
-        if not left < max(limit, _HELPS * before):
+        if not left < max(limit, _HELPS * run.left):
             # A power that is booked wrong, say.
             break
-        run = Run(tighter, other, result, run.trajectory)
         result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
         result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
-            f"{share:.1g} of the energy exchanged"
+            f"{first.left:.1g} of the energy exchanged"
         )
+        run = Run(tighter, other, result, left, run.trajectory)
     return run
 
 
@@ -186,6 +188,25 @@ def open_account(result: xr.Dataset) -> str:
     )
 
 
+def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
+    length, excess = result.sizes["time"], ""
+    for name in result.data_vars:
+        values = result.variables[name]
+        # The sum alone tells in most cases.
+        if np.isfinite(np.sum(values.values)):
+            continue
+        finite = np.isfinite(values.values)
+        if not finite.all():
+            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
+            if first < length:
+                length, excess = first, str(name)
+    if excess:
+        result = result.isel(time=slice(max(length, 1)))
+        result.attrs["end_time"] = float(result["time"][-1])
+    return result, excess
+
+
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
     """Return what rings undamped where a run took many short steps, and at which frequency; else empty.
 
@@ -221,7 +242,8 @@ def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
     contacts, known = finger.surroundings.contacts, 0.1 * tolerance
     stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
     depth = stiffness ** (-1.0 / exponent)
-    touched = np.any(result["contact_normal_force"].values > 0.0, axis=0)
+    # Bounces may all fall between samples: what is closer than can be told has touched.
+    touched = np.any(result["contact_gap"].values < known, axis=0)
     for index in np.flatnonzero(touched & (depth < _SEEN * known)):
         return (
             f"{contacts.names[index]} is too stiff for the tolerances: 1 N presses it in by {depth[index]:.1g} m, and "

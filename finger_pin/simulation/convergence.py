@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from finger_pin.control.closed_loop import Samples
+from finger_pin.control.own import Samples
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.core.textbook import Stop

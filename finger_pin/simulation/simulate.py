@@ -14,17 +14,17 @@ from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
 from finger_pin.analysis.passivity import micro_damping_advice
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.own import OwnController
+from finger_pin.control.own import OwnController, Samples
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.control.sampling import SampledController
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.integrator import Follow, integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
@@ -38,10 +38,12 @@ from finger_pin.simulation.accuracy import (
     check_memory,
     close_account,
     estimate_error,
+    finite_part,
     open_account,
     ringing,
     too_stiff,
 )
+from finger_pin.simulation.following import Following
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -177,10 +179,14 @@ def simulate(
     def recorded(found: Trajectory) -> xr.Dataset:
         # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return record(scenario, loop, found, method)
+            return record(scenario, loop, found, method, following=following if found is first else None)
 
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
-    run = close_account(scenario, _integrate(scenario, loop, method, watch, chunk, stop), repeated, recorded)
+    # Only what is a function of time and state can be evaluated beside the integration.
+    pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
+    following = Following(loop, scenario.sample_times()) if pure and observe is None else None
+    first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
+    run = close_account(scenario, first, repeated, recorded)
     trajectory, result = run.trajectory, run.result
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
@@ -202,7 +208,7 @@ def simulate(
         result.attrs["account"] = gap
     if slow:
         result.attrs["ringing"] = slow
-    result, excess = _finite_part(result)
+    result, excess = finite_part(result)
     if trajectory.failure:
         if isinstance(answers, OwnController) and answers.problem_time >= reached:
             raise IntegrationError(reached, answers.problem, "another controller", result)
@@ -219,25 +225,6 @@ def simulate(
     return result
 
 
-def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
-    length, excess = result.sizes["time"], ""
-    for name in result.data_vars:
-        values = result.variables[name]
-        # The sum alone tells in most cases.
-        if np.isfinite(np.sum(values.values)):
-            continue
-        finite = np.isfinite(values.values)
-        if not finite.all():
-            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
-            if first < length:
-                length, excess = first, str(name)
-    if excess:
-        result = result.isel(time=slice(max(length, 1)))
-        result.attrs["end_time"] = float(result["time"][-1])
-    return result, excess
-
-
 def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:
     """Return how the controller is sampled, or None if it is continuous."""
     settings, method = scenario.controller.sampling, scenario.simulation.method
@@ -251,7 +238,13 @@ def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | No
 
 
 def _integrate(
-    scenario: Scenario, loop: ClosedLoop, method: str, watch: Watch, chunk: int, stop: Stop | None
+    scenario: Scenario,
+    loop: ClosedLoop,
+    method: str,
+    watch: Watch,
+    chunk: int,
+    stop: Stop | None,
+    follow: Follow | None = None,
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
@@ -270,6 +263,7 @@ def _integrate(
             chunk=chunk,
             together=chunk == _CHUNK_OBSERVED,
             stop=stop,
+            follow=follow,
         )
     if method == "CVODE":
         return integrate_cvode(

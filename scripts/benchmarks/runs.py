@@ -14,7 +14,7 @@ from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
 from finger_pin.core.binding import bound_at, call_at
-from finger_pin.core.compilation import entry
+from finger_pin.core.compilation import Unit
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepper import TABLEAUS, Stepper
@@ -122,14 +122,10 @@ def has_sundials() -> bool:
     return importlib.util.find_spec("sksundae") is not None
 
 
-@entry
-def _rate(address: int, time: float, x: Any, rate: Any) -> None:
+@Unit
+def _evaluate(address: int, time: float) -> int:
     model = bound_at(address, MODEL)
-    for c in range(x.size):
-        model.state[c] = x[c]
-    call_at(model.evaluate, address, time)
-    for c in range(x.size):
-        rate[c] = model.rate[c]
+    return call_at(model.evaluate, address, time)
 
 
 def sundials(scenario: Scenario, rtol: float) -> Job:
@@ -140,11 +136,12 @@ def sundials(scenario: Scenario, rtol: float) -> Job:
     times, joints = scenario.sample_times(), len(loop.finger.routing.joints)
     atol = rtol * loop.finger.layout.scales()
     (part,) = stepper(loop, "Rodas5P", rtol).parts
-    state = np.empty(loop.finger.layout.size)
+    model = part.model.model
 
     def rhs(time: float, x: Array, rate: Array) -> None:
-        state[:] = x
-        _rate(part.model.address, time, state, rate)
+        model.state[:] = x
+        _evaluate(part.model.address, time)
+        rate[:] = model.rate
 
     def job() -> tuple[Array, Any]:
         solver = CVODE(rhs, method="BDF", rtol=rtol, atol=atol, max_num_steps=10**7)

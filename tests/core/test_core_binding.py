@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from finger_pin.core.binding import Indices, Layers, Matrix, Vector, bound, get, kind_of
-from finger_pin.core.compilation import entry
+from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound, bound_at
+from finger_pin.core.compilation import Unit
 
 
 class Inner(NamedTuple):
@@ -23,13 +23,13 @@ class Outer(NamedTuple):
     layers: Layers
 
 
-KIND = kind_of(Outer)
+KIND = Kind(Outer)
 
 
-@entry
-def weigh(block, out):
+@Unit
+def weigh(address, _number):
     """Sum every field with a weight of its own, by its shape; change the vector in place."""
-    value = get(block, KIND)
+    value = bound_at(address, KIND)
     total = value.factor * value.inner.count + (100.0 if value.inner.flag else 200.0)
     for i in range(value.indices.size):
         total += 1e3 * (i + 1) * value.indices[i]
@@ -40,7 +40,7 @@ def weigh(block, out):
         total += (i + 1) * value.layers[i].sum()
     for i in range(value.vector.size):
         value.vector[i] += 1.0
-    out[0] = total
+    return int(2.0 * total)
 
 
 @pytest.fixture
@@ -55,13 +55,13 @@ def outer():
 
 
 def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
-    block, out = bound(outer, KIND), np.zeros(1)
-    weigh(block, out)
+    block = bound(outer, KIND)
+    total = weigh(block.ctypes.data)
     table = sum((3 * i + 7 * j) * outer.inner.table[i, j] for i in range(2) for j in range(3))
-    assert out[0] == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + (1 + 2) * 4
+    assert 0.5 * total == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + (1 + 2) * 4
     outer.inner.table[1, 2] += 1.0
-    weigh(block, out)
-    assert out[0] == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + 3 + 14 + (1 + 2) * 4
+    total = weigh(block.ctypes.data)
+    assert 0.5 * total == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + 3 + 14 + (1 + 2) * 4
     np.testing.assert_array_equal(outer.vector, [2.0, 2.0])
 
 

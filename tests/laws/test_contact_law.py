@@ -86,7 +86,7 @@ def test_value_and_slopes_are_finite_without_normal_force_and_at_rest():
 
 def test_compiled_it_is_what_it_is_in_numpy(drawn):
     touch, p = drawn
-    value, slopes = inlined(CONTACT.value), inlined(CONTACT.slopes)
+    value, slopes = inlined(CONTACT.value).made, inlined(CONTACT.slopes).made
 
     @numba.njit(_nrt=False)
     def run(seen, p, found, slope):

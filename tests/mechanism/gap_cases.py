@@ -7,7 +7,7 @@ import numpy as np
 from finger_pin.core.law_code import inlined
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 
-_value, _slopes = inlined(PRISM.value), inlined(PRISM.slopes)
+_value, _slopes = inlined(PRISM.value).made, inlined(PRISM.slopes).made
 
 
 @numba.njit(_nrt=False)
