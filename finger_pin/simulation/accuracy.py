@@ -30,9 +30,9 @@ _TIGHTER = 10.0
 # Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
 # is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
-# The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
-# far slower, and a motion that takes so many steps shows early how sensitive it is.
-_PATIENCE, _MOST_LOOKS = 2, 1200
+# The repetition stops after so many times the run's looks at it and a few more, or so many at most: at a tighter
+# tolerance it may be far slower, and a motion that takes so many steps shows early how sensitive it is.
+_PATIENCE, _FEW, _MOST_LOOKS = 2, 8, 1200
 # The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
 _OPEN, _ROUNDING = 1e-4, 1e-13
 # A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
@@ -159,7 +159,7 @@ def _tightened(scenario: Scenario) -> Scenario:
 
 def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
     """Return what asks to stop after more looks than a trajectory took, or so many at most."""
-    looks, most = count(), min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), most)
+    looks, most = count(), min(_PATIENCE * (_FEW + trajectory.statistics.steps // CHUNK), most)
     return lambda: next(looks) >= most
 
 

@@ -212,6 +212,11 @@ def test_a_finger_that_exchanges_less_than_a_microjoule_closes_its_account_at_to
     assert fp.check_convergence(scenario, result).rtol == pytest.approx(1e-9)
 
 
+def test_a_run_of_few_steps_may_take_many_times_as_many_to_close_its_account():
+    result = fp.simulate(wild_scenario(854))
+    assert result.attrs["rtol"] < 1e-7 and share_left_open(result) < 1e-5
+
+
 def test_the_error_of_a_repeated_run_is_its_difference_to_the_run_that_it_replaces(monkeypatch):
     monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
     repeated = fp.simulate(wild_scenario(446))
