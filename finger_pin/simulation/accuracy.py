@@ -108,7 +108,7 @@ def close_account(
         result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
         result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
-            f"{first.left:.1g} of the energy exchanged"
+            f"{first.left:.2g} of the energy exchanged"
         )
         run = Run(tighter, other, result, left, run.trajectory)
     return run
@@ -140,6 +140,9 @@ def estimate_error(
         other, rtol = repeated(tighter, _patient(trajectory, _MOST_LOOKS)), tighter.simulation.rtol
     times = scenario.sample_times()
     times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
+    if len(times) < 2:
+        # It was stopped before it could say anything.
+        return error, ""
     difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]
     error = float(np.sqrt(np.mean(difference**2)))
     if error <= expected:

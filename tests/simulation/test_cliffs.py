@@ -225,3 +225,11 @@ def test_the_error_of_a_repeated_run_is_its_difference_to_the_run_that_it_replac
     assert (repeated.attrs["rtol"], replaced.attrs["rtol"]) == (1e-7, 1e-6)
     difference = float(np.sqrt(np.mean((repeated.joint_position - replaced.joint_position) ** 2)))
     assert repeated.attrs["estimated_error"] == pytest.approx(difference, rel=1e-9)
+
+
+def test_a_repetition_that_is_stopped_at_once_leaves_the_estimate_that_was_carried_along(monkeypatch):
+    monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
+    short = fp.load_scenario("stick_slip", {"simulation.duration": 0.1, "simulation.sample_rate": 10.0})
+    reached = [0.0]
+    result = fp.simulate(short, progress=reached.append, stop=lambda: reached[-1] >= 0.1)
+    assert result.attrs["estimated_error"] > 0.0
