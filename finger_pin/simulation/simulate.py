@@ -98,7 +98,8 @@ def simulate(
         stop: Asked now and then; when it returns true the simulation ends there.
 
     Returns:
-        Every signal of the model at the scenario's sample rate, and the energy account.
+        Every signal of the model at the scenario's sample rate, and the energy account. Where that does not close to
+        ten times the tolerances, nor to 1e-5, the run is repeated at tighter ones: attribute ``repeated`` says so.
 
     Raises:
         InputError: If the control period is not positive, the method cannot sample, the controller must be sampled,
