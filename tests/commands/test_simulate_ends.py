@@ -156,7 +156,7 @@ def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_tha
             drawing.wait()
     with Drawing() as drawing:
         os.kill(drawing.process.pid, signal.SIGKILL)
-        drawing.process.wait()
+        drawing.process.join()
         drawing.start(result, tmp_path)
         with pytest.raises(NotDrawn, match="killed"):
             drawing.wait()
@@ -166,7 +166,7 @@ def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_tha
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {"fig6.png", "losses.png", "energy.png"}
     with Drawing() as drawing:
         pass
-    assert drawing.process.returncode == -signal.SIGKILL
+    assert drawing.process.exitcode == -signal.SIGKILL
 
 
 def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(run, here, quick, monkeypatch):
