@@ -6,6 +6,7 @@ import gc
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -13,7 +14,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from finger_pin.commands.imports import undocumented
+from finger_pin.commands.imports import undocumented, without
 from finger_pin.exceptions import FingerPinError
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 #: An error number, and what went wrong; (0, "") if nothing did.
 Answer = tuple[int, str]
 
-# Where a process can be copied, the one that draws has what this one has imported.
-_COPIED = "fork" in multiprocessing.get_all_start_methods()
+# Where a process can safely be copied, the one that draws has what this one has imported.
+_COPIED = sys.platform == "linux"
 _CONTEXT: Any = multiprocessing.get_context("fork" if _COPIED else "spawn")
 
 
@@ -93,12 +94,21 @@ def _serve(pipe: Connection, other: Connection) -> None:
         signal.signal(number, signal.SIG_DFL)
     # It lives too shortly for garbage.
     gc.disable()
-    with undocumented():
-        from finger_pin.views.plots import saving
-    with suppress(EOFError):
+    try:
+        with without("dask", "xarray"), undocumented():
+            from finger_pin.views.plots import saving
         result, folder = pipe.recv()
-        names = list(saving.figures_of(result))
-        pipe.send(_drawn_side_by_side(partial(saving.draw_all, result, folder), names))
+    except EOFError:
+        return
+    except Exception as error:
+        pipe.send(_told(error))
+        return
+    pipe.send(_drawn_side_by_side(partial(saving.draw_all, result, folder), list(saving.figures_of(result))))
+
+
+def _told(error: Exception) -> Answer:
+    # Some libraries have negative numbers of their own.
+    return max(getattr(error, "errno", None) or 0, 0), f"{type(error).__name__}: {error}"
 
 
 def _drawn_side_by_side(draw: Callable[[list[str]], object], names: list[str]) -> Answer:
@@ -108,8 +118,7 @@ def _drawn_side_by_side(draw: Callable[[list[str]], object], names: list[str]) -
         try:
             draw(own)
         except Exception as error:
-            # Some libraries have negative numbers of their own.
-            return max(getattr(error, "errno", None) or 0, 0), f"{type(error).__name__}: {error}"
+            return _told(error)
         return 0, ""
 
     shares = min(len(names), (os.cpu_count() or 1) if _COPIED else 1)
