@@ -11,3 +11,6 @@ gc.set_threshold(2_000_000)
 # without them can be copied.
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+# To look for plugins of pydantic takes reading the metadata of every package that is installed.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

@@ -24,6 +24,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
 
+import llvmlite
 import platformdirs
 from llvmlite import binding as llvm
 
@@ -42,7 +43,7 @@ def _root() -> str:
 def _digest() -> str:
     package = Path(__file__).parent.parent
     processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-    digest = hashlib.sha256(f"{metadata.version('numba')} {metadata.version('llvmlite')} {processor}".encode())
+    digest = hashlib.sha256(f"{metadata.version('numba')} {llvmlite.__version__} {processor}".encode())
     for source in sorted([path for room in _COMPILED for path in package.glob(room)]):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
