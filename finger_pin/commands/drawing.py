@@ -112,7 +112,7 @@ def _told(error: Exception) -> Answer:
 
 
 def _drawn_side_by_side(draw: Callable[[list[str]], object], names: list[str]) -> Answer:
-    """Draw figures, in as many copies of this process as there are processors, where there are copies."""
+    """Draw figures, each in a copy of this process of its own where there are copies: they take unlike times."""
 
     def drawn(own: list[str]) -> Answer:
         try:
@@ -121,16 +121,15 @@ def _drawn_side_by_side(draw: Callable[[list[str]], object], names: list[str]) -
             return _told(error)
         return 0, ""
 
-    shares = min(len(names), (os.cpu_count() or 1) if _COPIED else 1)
+    alone = names[:1] if _COPIED else names
     others = []
-    for share in range(1, shares):
+    for name in names[len(alone) :]:
         ours, theirs = _CONTEXT.Pipe(duplex=False)
-        own = names[share::shares]
-        other = _CONTEXT.Process(target=lambda pipe, own: pipe.send(drawn(own)), args=(theirs, own))
+        other = _CONTEXT.Process(target=lambda pipe, name: pipe.send(drawn([name])), args=(theirs, name))
         other.start()
         theirs.close()
         others.append((other, ours))
-    answers = [drawn(names[::shares])]
+    answers = [drawn(alone)]
     for other, ours in others:
         try:
             answers.append(ours.recv())
