@@ -217,6 +217,12 @@ def test_a_run_of_few_steps_may_take_many_times_as_many_to_close_its_account():
     assert result.attrs["rtol"] < 1e-7 and share_left_open(result) < 1e-5
 
 
+def test_an_account_is_closed_though_the_first_repetition_leaves_as_much_open():
+    # At a tenth of the tolerances too, a step passes over a limiter that would have pressed in its middle alone.
+    result = fp.simulate(wild_scenario(1451))
+    assert result.attrs["rtol"] == pytest.approx(1e-8) and share_left_open(result) < 1e-6
+
+
 def test_the_error_of_a_repeated_run_is_its_difference_to_the_run_that_it_replaces(monkeypatch):
     monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
     repeated = fp.simulate(wild_scenario(446))
