@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,7 +47,13 @@ def simulate(
     if listed:
         print_text(listing())
         return
-    with Interrupts() as interrupts, without("dask", "xarray"), Drawing() if figures else nullcontext() as drawing:
+    with ExitStack() as stack:
+        interrupts = stack.enter_context(Interrupts())
+        stack.enter_context(without("dask", "xarray"))
+        # Both this process and the one that draws need it.
+        import xarray  # noqa: F401
+
+        drawing = stack.enter_context(Drawing()) if figures else None
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
@@ -65,12 +71,9 @@ def simulate(
                 raise problem
             with noted("earlier results are as they were"):
                 with interrupts.patient():
-                    folder.write(result)
-                if interrupts.requested:
-                    # After an interruption the data are kept, and the views are not drawn: that takes too long.
-                    problem = problem or KeyboardInterrupt()
-                else:
-                    problem = draw(result, folder, drawing) or problem
+                    write(result, folder, None if interrupts.requested else drawing)
+                trouble = draw(result, folder, drawing, interrupts)
+                problem = (problem or trouble) if interrupts.requested else (trouble or problem)
                 with interrupts.patient():
                     folder.publish()
         if not quiet:
@@ -136,11 +139,26 @@ def compute(
     return result, None
 
 
-def draw(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> BaseException | None:
-    """Draw animation and figures, all or none; return what went wrong if anything did."""
+def write(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> None:
+    """Write the data, while another process begins to draw the figures."""
     try:
         if drawing is not None:
             drawing.start(result, folder.stage / "figures")
+        folder.write(result)
+    except BaseException:
+        if drawing is not None:
+            drawing.stop()
+        raise
+
+
+def draw(
+    result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None, interrupts: Interrupts
+) -> BaseException | None:
+    """Draw the animation and wait for the figures, all or none; return what went wrong if anything did."""
+    try:
+        if interrupts.requested:
+            # The data are kept, and the views are not drawn: that takes too long.
+            raise KeyboardInterrupt
         from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")

@@ -19,10 +19,12 @@ import threading
 from collections.abc import Callable
 from functools import cache, cached_property
 from importlib import import_module, metadata
+from itertools import count
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
 
+import llvmlite
 import platformdirs
 from llvmlite import binding as llvm
 
@@ -33,9 +35,6 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 _COMPILED = ("core/*.py", "laws/*.py", "mechanism/pieces.py", "mechanism/spans/*.py", "mechanism/gaps/*.py")
 _LOGGER = logging.getLogger("finger_pin")
 
-#: The name of the one function that a piece of machine code is there for.
-SYMBOL = "unit"
-
 
 def _root() -> str:
     return os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin")
@@ -44,7 +43,7 @@ def _root() -> str:
 def _digest() -> str:
     package = Path(__file__).parent.parent
     processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-    digest = hashlib.sha256(f"{metadata.version('numba')} {metadata.version('llvmlite')} {processor}".encode())
+    digest = hashlib.sha256(f"{metadata.version('numba')} {llvmlite.__version__} {processor}".encode())
     for source in sorted([path for room in _COMPILED for path in package.glob(room)]):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
@@ -135,8 +134,8 @@ class Unit:
         return self._call(address, number)
 
 
-# Machine code lives as long as the engine that holds it; two threads may ask for the same.
-_engines: list[Any] = []
+_number = count()
+# Two threads may ask for the same.
 _lock = threading.RLock()
 
 
@@ -149,30 +148,31 @@ def address_of(signature: str, function: FunctionType, *, kept: bool) -> int:
         kept: Whether it is found on disk by later processes; for functions of this package only, whose digest names
             the folder, and of others that call nothing else.
     """
-    path = None
-    if kept and CACHE_FOLDER is not None:
-        text = function.__code__
-        own = hashlib.sha256(text.co_code + repr((text.co_names, text.co_consts)).encode()).hexdigest()[:8]
-        path = Path(CACHE_FOLDER) / f"{function.__module__}.{function.__qualname__}-{own}.o"
+    text = function.__code__
+    own = hashlib.sha256(text.co_code + repr((text.co_names, text.co_consts)).encode()).hexdigest()[:8]
+    name = f"{function.__module__}.{function.__qualname__}-{own if kept else next(_number)}"
+    path = Path(CACHE_FOLDER) / f"{name}.o" if kept and CACHE_FOLDER is not None else None
     with _lock:
         code = path.read_bytes() if path is not None and path.exists() else b""
         if not code:
             if kept:
                 _announce()
-            code, portable = import_module("finger_pin.core.compiler").machine_code(signature, function)
+            code, portable = import_module("finger_pin.core.compiler").machine_code(signature, function, name)
             if path is not None and portable:
                 _keep(path, code)
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        engine = _engine()
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        _engines.append(engine)
-        return int(engine.get_function_address(SYMBOL))
+        return int(engine.get_function_address(name))
 
 
-def _machine() -> Any:
+@cache
+def _engine() -> Any:
+    """Return what holds all machine code."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    return llvm.Target.from_default_triple().create_target_machine(jit=True)
+    machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
 
 
 def _announce() -> None:

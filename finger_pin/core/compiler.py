@@ -15,7 +15,7 @@ from numba.core.registry import cpu_target
 from numba.core.sigutils import normalize_signature
 from numba.extending import typeof_impl
 
-from finger_pin.core.compilation import SYMBOL, Later
+from finger_pin.core.compilation import Later
 
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
@@ -91,8 +91,8 @@ def inlined(function: Callable[..., Any], **options: Any) -> Any:
     return numba.njit(**{**_OPTIONS, **options}, pipeline_class=_TextCompiler)(function)
 
 
-def machine_code(signature: str, function: FunctionType) -> tuple[bytes, bool]:
-    """Compile a function for C; return an object file, and whether it needs nothing of numba's.
+def machine_code(signature: str, function: FunctionType, name: str) -> tuple[bytes, bool]:
+    """Compile a function for C under a name; return an object file, and whether it needs nothing of numba's.
 
     Nothing tells the caller of an exception: the functions are those that raise none.
     """
@@ -102,15 +102,15 @@ def machine_code(signature: str, function: FunctionType) -> tuple[bytes, bool]:
         dispatcher.compile(result(*arguments))
         (compiled,) = dispatcher.overloads.values()
         target = cpu_target.target_context
-        module = target.create_module(SYMBOL)
+        module = target.create_module(name)
         kinds = [target.get_value_type(kind) for kind in arguments]
-        outer = ir.Function(module, ir.FunctionType(target.get_value_type(result), kinds), SYMBOL)
+        outer = ir.Function(module, ir.FunctionType(target.get_value_type(result), kinds), name)
         called = target.call_conv.get_function_type(result, arguments)
         inner = ir.Function(module, called, compiled.fndesc.llvm_func_name)
         builder = ir.IRBuilder(outer.append_basic_block())
         _, value = target.call_conv.call_function(builder, inner, result, arguments, outer.args)
         builder.ret(value)
-        whole = _Whole(target.codegen(), SYMBOL)
+        whole = _Whole(target.codegen(), name)
         whole.add_ir_module(module)
         whole.add_linking_library(compiled.library)
         whole.finalize()

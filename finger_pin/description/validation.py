@@ -37,7 +37,7 @@ class Description(BaseModel):
         file_keys: Further keys of its table in a file, which loading resolves.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
     file_keys: ClassVar[tuple[str, ...]] = ()
 
 

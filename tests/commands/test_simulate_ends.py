@@ -143,9 +143,18 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
     assert contents(here) == before
 
 
-def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_that_started_it(tmp_path):
+def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_that_started_it(
+    tmp_path, monkeypatch, capfd
+):
     result = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
     (tmp_path / "file").touch()
+    with monkeypatch.context() as broken:
+        broken.setitem(sys.modules, "finger_pin.views.plots", None)
+        with Drawing() as drawing:
+            drawing.process.join()
+            drawing.start(result, tmp_path)
+            with pytest.raises(NotDrawn, match="plots"):
+                drawing.wait()
     with Drawing() as drawing:
         drawing.start(result, tmp_path / "file")
         with pytest.raises(FileExistsError):
@@ -156,7 +165,7 @@ def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_tha
             drawing.wait()
     with Drawing() as drawing:
         os.kill(drawing.process.pid, signal.SIGKILL)
-        drawing.process.wait()
+        drawing.process.join()
         drawing.start(result, tmp_path)
         with pytest.raises(NotDrawn, match="killed"):
             drawing.wait()
@@ -166,7 +175,8 @@ def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_tha
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {"fig6.png", "losses.png", "energy.png"}
     with Drawing() as drawing:
         pass
-    assert drawing.process.returncode == -signal.SIGKILL
+    assert drawing.process.exitcode == -signal.SIGKILL
+    assert capfd.readouterr().err == ""
 
 
 def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(run, here, quick, monkeypatch):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from finger_pin.description.routing import Array
 
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.
-BINS = 800
+BINS = 640
 
 
 def names(result: xr.Dataset, coordinate: str) -> list[str]:
