@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.binding import call_at
 from finger_pin.core.compilation import compiled
+from finger_pin.core.error_norm import step_error
 from finger_pin.core.law_code import SIDE
 from finger_pin.core.tables import END, FIRST, KINK
 
@@ -53,3 +55,50 @@ def turn(tables: Any, rows: Any, kinks: Any) -> None:
             for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
                 if kinks[k] * rows[column, k] < 0.0:
                     rows[SIDE, k] = -rows[SIDE, k]
+
+
+@compiled
+def price(integration: Any, model: Any, time: float, h: float, r: Any) -> Any:
+    """Return what it costs that rows are held on a side that they have left, as a multiple of the tolerance."""
+    tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
+    call_at(model.evaluate, integration.model, time)
+    turn(tables, rows, kinks)
+    for c in range(size):
+        r[c] = model.rate[c]
+    call_at(model.evaluate, integration.model, time)
+    turn(tables, rows, kinks)
+    for c in range(size):
+        r[c] = h * (model.rate[c] - r[c])
+    return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
+
+
+@compiled
+def passed(integration: Any, model: Any, time: float, h: float, r: Any) -> Any:
+    """Return the share of a step after which a row has left its side in the middle, if that costs too much; else 1.
+
+    A row that is back at the end would not be seen there.
+    """
+    tableau, x, k, state = integration.tableau, integration.x, integration.k, model.state
+    last, size = tableau.nodes.size - 1, x.size
+    for c in range(size):
+        bend = 0.0
+        for row in range(tableau.dense.shape[0] - 1, -1, -1):
+            value = 0.0
+            for j in range(last + 1):
+                value += tableau.dense[row, j] * k[j, c]
+            bend = value + 0.5 * bend
+        state[c] = 0.5 * (x[c] + state[c] + 0.5 * bend)
+    call_at(model.evaluate, integration.model, time + 0.5 * h)
+    share = strayed(model.tables, model.work.rows, integration.kinks)
+    if share < 1.0 and price(integration, model, time + 0.5 * h, h, r) <= 1.0:
+        share = 1.0
+    for c in range(size):
+        state[c] = x[c]
+    for j in range(last):
+        of_stage = tableau.stage[last, j]
+        for c in range(size):
+            state[c] += of_stage * k[j, c]
+    for c in range(size):
+        state[c] += k[last, c]
+    call_at(model.evaluate, integration.model, time + h)
+    return share if share == 1.0 else 0.5 * share

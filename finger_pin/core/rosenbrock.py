@@ -13,7 +13,8 @@ from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.condensation import solve
 from finger_pin.core.control import HELD
 from finger_pin.core.drift import carry
-from finger_pin.core.kinks import hold, release, strayed, turn
+from finger_pin.core.error_norm import step_error, worst
+from finger_pin.core.kinks import hold, passed, price, release, strayed
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau
 
@@ -93,12 +94,14 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
     What depends on the start alone, f(t, x) and the linearisation, is kept for a second try.
 
     Returns:
-        0 if tried, 1 if g - J is singular, 2 if f(t, x) is not finite.
+        0 if tried, 1 if g - J is singular, 2 if f(t, x) is not finite; -1 if tried, and at a stage a row was on the
+        other side of its kink than where it is held.
     """
     tableau, x, k, r, start = integration.tableau, integration.x, integration.k, integration.r, integration.start
     size, state, rate = x.size, model.state, model.rate
     tables, rows, kinks = model.tables, model.work.rows, integration.kinks
     g = 1.0 / (h * tableau.gamma)
+    outcome = 0
     for i in range(tableau.nodes.size):
         for c in range(size):
             r[c], rate[c], state[c] = 0.0, start[c], x[c]
@@ -125,44 +128,15 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:
                 return 1
+        elif i < tableau.nodes.size - 1 and strayed(tables, rows, kinks) < 1.0:
+            outcome = -1
         for c in range(size):
             r[c] += rate[c]
         r[size] = h * tableau.time[i]
         solve(model.linear, r, k[i])
     for c in range(size):
         state[c] += k[tableau.nodes.size - 1, c]
-    return 0
-
-
-@compiled
-def _error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
-    """Return the error of a step as a multiple of the tolerance, root mean square over the state.
-
-    It is infinite where the end is not finite: an infinite scale would make any error small.
-    """
-    total = 0.0
-    for c in range(x.size):
-        if not np.isfinite(end[c]):
-            return np.inf
-        scale = atol[c] + rtol * max(abs(x[c]), abs(end[c]))
-        total += (difference[c] / scale) ** 2
-    return np.sqrt(total / x.size)
-
-
-@compiled
-def _worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
-    """Return the index of the first state whose error is no number, else of that with the largest error.
-
-    Errors are compared as multiples of the tolerance.
-    """
-    worst, index = -1.0, 0
-    for c in range(x.size):
-        ratio = abs(difference[c]) / (atol[c] + rtol * abs(x[c]))
-        if np.isnan(ratio):
-            return c
-        if ratio > worst:
-            worst, index = ratio, c
-    return index
+    return outcome
 
 
 @Unit
@@ -198,7 +172,7 @@ def advance(address: int, end: float) -> int:
         tries = memory[ACCEPTED] + memory[REJECTED]
         if tries >= memory[WINDOW_END]:
             if memory[WINDOW_END] > 0.0 and memory[TIME] - memory[WINDOW_START] < WINDOW * LEAST_MEAN_STEP:
-                memory[CULPRIT] = float(_worst(x, k[count - 1], rtol, atol))
+                memory[CULPRIT] = float(worst(x, k[count - 1], rtol, atol))
                 return CREEPING
             memory[WINDOW_START], memory[WINDOW_END] = memory[TIME], tries + WINDOW
         if times.size > 0 and taken[0] == times.size:
@@ -220,28 +194,26 @@ def advance(address: int, end: float) -> int:
             memory[JACOBIANS] += 1
         memory[FACTORISATIONS] += 1
         memory[EVALUATIONS] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
-        if outcome == 0:
-            error = _error(x, reached, k[count - 1], rtol, atol)
+        if outcome <= 0:
+            error = step_error(x, reached, k[count - 1], rtol, atol)
         fresh = False
         if error <= 1.0:
-            share = strayed(tables, rows, kinks)
-            if share < 1.0:
+            share, dear = strayed(tables, rows, kinks), False
+            if h > 1e-12 * max(1.0, abs(time)):
                 # A row was held on a side that it has left: what that cost is an error too.
-                call_at(model.evaluate, integration.model, time + h)
-                turn(tables, rows, kinks)
-                for c in range(size):
-                    r[c] = model.rate[c]
-                call_at(model.evaluate, integration.model, time + h)
-                turn(tables, rows, kinks)
-                for c in range(size):
-                    r[c] = h * (model.rate[c] - r[c])
-                memory[EVALUATIONS] += 2
-                if h > 1e-12 * max(1.0, abs(time)) and not _error(x, reached, r, rtol, atol) <= 1.0:
-                    memory[REJECTED] += 1
-                    memory[CULPRIT] = -1.0
-                    whole = max(whole, h)
-                    memory[STEP] = h * min(0.9, max(0.1, 1.02 * share))
-                    continue
+                if share < 1.0:
+                    dear = not price(integration, model, time + h, h, r) <= 1.0
+                    memory[EVALUATIONS] += 2
+                elif outcome < 0:
+                    share = passed(integration, model, time, h, r)
+                    dear = share < 1.0
+                    memory[EVALUATIONS] += 4
+            if dear:
+                memory[REJECTED] += 1
+                memory[CULPRIT] = -1.0
+                whole = max(whole, h)
+                memory[STEP] = h * min(0.9, max(0.1, 1.02 * share))
+                continue
         if not error <= 1e30:
             factor = 0.1
         else:
@@ -304,6 +276,6 @@ def advance(address: int, end: float) -> int:
             memory[CULPRIT] = -1.0
             memory[STEP] = h * min(factor, 0.9)
             if memory[STEP] < 1e-14 * max(1.0, abs(time)):
-                memory[CULPRIT] = float(_worst(x, k[count - 1], rtol, atol))
+                memory[CULPRIT] = float(worst(x, k[count - 1], rtol, atol))
                 return UNDERFLOW
     return DONE

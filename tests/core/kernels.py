@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
+from finger_pin.core import error_norm
 from finger_pin.core.binding import Kind, Matrix, Vector, bound_at, call, call_at
 from finger_pin.core.compilation import Unit
 from finger_pin.core.condensation import solve
 from finger_pin.core.model import MODEL
 from finger_pin.core.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
-from finger_pin.core.rosenbrock import _worst
 from finger_pin.core.tables import Tables
 from finger_pin.core.work import Work
 
@@ -62,7 +62,7 @@ ERRORS = Kind(Errors)
 @Unit
 def _blamed(address, _number):
     errors = bound_at(address, ERRORS)
-    return _worst(errors.x, errors.difference, errors.rtol, errors.atol)
+    return error_norm.worst(errors.x, errors.difference, errors.rtol, errors.atol)
 
 
 def worst(*arguments):

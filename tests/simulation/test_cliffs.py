@@ -217,6 +217,17 @@ def test_a_run_of_few_steps_may_take_many_times_as_many_to_close_its_account():
     assert result.attrs["rtol"] < 1e-7 and share_left_open(result) < 1e-5
 
 
+def test_an_account_is_closed_though_the_first_repetition_leaves_as_much_open():
+    result = fp.simulate(wild_scenario(1301))
+    assert result.attrs["rtol"] == pytest.approx(1e-8) and share_left_open(result) < 1e-5
+
+
+def test_no_step_passes_over_a_limiter_that_presses_in_its_middle_alone():
+    # A joint creeps out of its limiter along the clamp of (2): a step begins and ends past it, and not in between.
+    result = fp.simulate(wild_scenario(1451))
+    assert share_left_open(result) < 1e-5 and "repeated" not in result.attrs
+
+
 def test_the_error_of_a_repeated_run_is_its_difference_to_the_run_that_it_replaces(monkeypatch):
     monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
     repeated = fp.simulate(wild_scenario(446))

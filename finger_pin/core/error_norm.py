@@ -1,0 +1,40 @@
+"""The error of a step in units of the tolerances."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.compilation import compiled
+
+
+@compiled
+def step_error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any:
+    """Return the error of a step as a multiple of the tolerance, root mean square over the state.
+
+    It is infinite where the end is not finite: an infinite scale would make any error small.
+    """
+    total = 0.0
+    for c in range(x.size):
+        if not np.isfinite(end[c]):
+            return np.inf
+        scale = atol[c] + rtol * max(abs(x[c]), abs(end[c]))
+        total += (difference[c] / scale) ** 2
+    return np.sqrt(total / x.size)
+
+
+@compiled
+def worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
+    """Return the index of the first state whose error is no number, else of that with the largest error.
+
+    Errors are compared as multiples of the tolerance.
+    """
+    largest, index = -1.0, 0
+    for c in range(x.size):
+        ratio = abs(difference[c]) / (atol[c] + rtol * abs(x[c]))
+        if np.isnan(ratio):
+            return c
+        if ratio > largest:
+            largest, index = ratio, c
+    return index
