@@ -7,7 +7,6 @@ from collections.abc import Callable
 from itertools import count
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import Stop, Trajectory
@@ -16,6 +15,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.recorded import Recording
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 256
@@ -85,14 +85,14 @@ def estimate_error(
     )
 
 
-def open_account(result: xr.Dataset) -> str:
+def open_account(result: Recording) -> str:
     """Return what to say if a result's energy account does not close to a ten thousandth of all energy exchanged."""
     exchanged = sum(
-        float(np.abs(values.values).max())
-        for name, values in result.variables.items()
-        if str(name).startswith("energy_exchanged_")
+        float(np.abs(values).max())
+        for name, (_, values, _) in result.variables.items()
+        if name.startswith("energy_exchanged_")
     )
-    residual = float(np.abs(result.variables["energy_residual"].values).max())
+    residual = float(np.abs(result.variables["energy_residual"][1]).max())
     if not residual > max(_OPEN * exchanged, _NOTHING):
         return ""
     share = residual / exchanged if exchanged else np.inf
@@ -124,7 +124,7 @@ def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
     )
 
 
-def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
+def too_stiff(result: Recording, finger: Finger, tolerance: float) -> str:
     """Return what to say if bodies have touched whose contact is too stiff for the tolerance; else empty.
 
     Args:
@@ -137,7 +137,7 @@ def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
     contacts, known = finger.surroundings.contacts, 0.1 * tolerance
     stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
     depth = stiffness ** (-1.0 / exponent)
-    touched = np.any(result["contact_normal_force"].values > 0.0, axis=0)
+    touched = np.any(result.variables["contact_normal_force"][1] > 0.0, axis=0)
     for index in np.flatnonzero(touched & (depth < _SEEN * known)):
         return (
             f"{contacts.names[index]} is too stiff for the tolerances: 1 N presses it in by {depth[index]:.1g} m, and "

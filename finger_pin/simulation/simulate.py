@@ -7,9 +7,9 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
@@ -41,8 +41,12 @@ from finger_pin.simulation.accuracy import (
     ringing,
     too_stiff,
 )
+from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -66,6 +70,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
+    recorded: Callable[[Recording], None] | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario, from rest on its reference unless something else is asked for.
 
@@ -94,6 +99,7 @@ def simulate(
         progress: Called with the simulated time, s, now and then.
         observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
+        recorded: Called with the result as plain arrays, before xarray is imported to make a Dataset of it.
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account.
@@ -182,25 +188,28 @@ def simulate(
     slow = ringing(loop, trajectory)
     # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        result = record(scenario, loop, trajectory, method)
+        recording = record(scenario, loop, trajectory, method)
     if margin is not None:
-        result.attrs["self_locking_margin"] = margin
+        recording.attrs["self_locking_margin"] = margin
     if driving:
-        result.attrs["micro_damping"] = driving
+        recording.attrs["micro_damping"] = driving
     if own:
-        result.attrs["own"] = own
+        recording.attrs["own"] = own
     if np.isfinite(error):
-        result.attrs["estimated_error"] = error
-    inaccurate = inaccurate or too_stiff(result, loop.finger, scenario.simulation.atol_scale)
+        recording.attrs["estimated_error"] = error
+    inaccurate = inaccurate or too_stiff(recording, loop.finger, scenario.simulation.atol_scale)
     if inaccurate:
-        result.attrs["accuracy"] = inaccurate
+        recording.attrs["accuracy"] = inaccurate
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=2)
-    gap = open_account(result)
+    gap = open_account(recording)
     if gap and not trajectory.failure:
-        result.attrs["account"] = gap
+        recording.attrs["account"] = gap
     if slow:
-        result.attrs["ringing"] = slow
-    result, excess = _finite_part(result)
+        recording.attrs["ringing"] = slow
+    excess = _finite_part(recording)
+    if recorded is not None:
+        recorded(recording)
+    result = recording.dataset()
     if trajectory.failure:
         if isinstance(answers, OwnController) and answers.problem_time >= reached:
             raise IntegrationError(reached, answers.problem, "another controller", result)
@@ -211,29 +220,28 @@ def simulate(
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:
-        raise IntegrationError(float(result.attrs["end_time"]), f"{excess} is not finite after that", _ADVICE, result)
+        raise IntegrationError(result.attrs["end_time"], f"{excess} is not finite after that", _ADVICE, result)
     if trajectory.interrupted:
         raise Interrupted(reached, result)
     return result
 
 
-def _finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
-    length, excess = result.sizes["time"], ""
-    for name in result.data_vars:
-        values = result.variables[name]
+def _finite_part(recording: Recording) -> str:
+    """Cut a result before its first sample that is not finite; return the first variable that is not, else empty."""
+    length, excess = len(recording.time), ""
+    for name, (_, values, _) in recording.variables.items():
         # The sum alone tells in most cases.
-        if np.isfinite(np.sum(values.values)):
+        if np.isfinite(np.sum(values)):
             continue
-        finite = np.isfinite(values.values)
+        finite = np.isfinite(values)
         if not finite.all():
-            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
+            first = int(np.argmin(finite.reshape(len(values), -1).all(axis=1)))
             if first < length:
-                length, excess = first, str(name)
+                length, excess = first, name
     if excess:
-        result = result.isel(time=slice(max(length, 1)))
-        result.attrs["end_time"] = float(result["time"][-1])
-    return result, excess
+        recording.cut(max(length, 1))
+        recording.attrs["end_time"] = float(recording.time[-1])
+    return excess
 
 
 def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:

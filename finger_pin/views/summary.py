@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 import tomllib
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.analysis import (
     critical_friction,
@@ -20,6 +20,9 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views.trees import is_tree
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SETTLING = 1.0
 _LONG = 2.0
