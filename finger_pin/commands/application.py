@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from functools import wraps
@@ -80,7 +81,9 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
     @wraps(command)
     def told(*arguments: Any, **options: Any) -> int:
         try:
-            return int(command(*arguments, **options) or DONE)
+            with warnings.catch_warnings():
+                warnings.showwarning = lambda message, *_: complain(program, f"warning: {message}")
+                return int(command(*arguments, **options) or DONE)
         except KeyboardInterrupt as error:
             problem: BaseException = error
             code, text = INTERRUPTED, "interrupted"

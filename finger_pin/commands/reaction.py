@@ -60,6 +60,8 @@ def reaction(
             entries = changed | {FORCE: list(force)}
             result = simulate(load_scenario(scenario, entries))
             studies[label] = joint_reactions(result)
+            # Only now is it known that the scenario serves; the other forces would take long before nothing is written.
+            output.mkdir(parents=True, exist_ok=True)
             other = simulate(load_scenario(scenario, entries | corrected(loaded, studies[label])))
             moved = np.rad2deg(other.joint_position.values - result.joint_position.values)
             motions[label] = np.sqrt(np.mean(moved**2, axis=0)).tolist()
@@ -108,7 +110,6 @@ def write_csv(rows: list[dict[str, Any]], path: Path) -> None:
     """Write all rows, whole or not at all."""
     from finger_pin.files import replacing
 
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()

@@ -21,23 +21,14 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
     import numpy as np
 
     import finger_pin as fp
-    from finger_pin.analysis import critical_friction, self_locking_map, self_locking_margin
+    from finger_pin.analysis import self_locking_map, self_locking_margin
+    from finger_pin.views.locking_text import summarize_locking
     from finger_pin.views.plots import plot_critical_friction, plot_runaway, plot_self_locking_map, save_figure
 
     loaded = fp.load_scenario(scenario)
     finger, margin = loaded.finger, self_locking_margin(loaded)
-    lines = ["Joint friction at which the finger locks, mm"]
-    for joint in finger.joints:
-        lines.append(f"  {joint:12} {1e3 * critical_friction(finger, joints=[joint]).coefficient:8.3f}")
-    lines.append(f"  {'all joints':12} {1e3 * critical_friction(finger).coefficient:8.3f}")
-    lines.append(
-        f"On its reference, {loaded.name} stays a factor {margin.margin:.3g} below, least at {margin.time:.3g} s"
-    )
-    if finger.actuators:
-        pulled = self_locking_margin(loaded, servos=True)
-        lines.append(
-            f"With its gears and what its motors can pull, a factor {pulled.margin:.3g}, at {pulled.time:.3g} s"
-        )
+    text = summarize_locking(loaded)
+    output.mkdir(parents=True, exist_ok=True)
     figures = {
         "critical_friction": plot_critical_friction(finger),
         "map": plot_self_locking_map(self_locking_map(fp.Finger(finger))),
@@ -45,7 +36,7 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
     if np.isfinite(margin.margin):
         with warnings.catch_warnings():
             # Runs on both sides are the point.
-            warnings.simplefilter("ignore", fp.SelfLockingWarning)
+            warnings.simplefilter("ignore", fp.ScenarioWarning)
             runs = {
                 f"{share:g} of critical": fp.simulate(scaled(scenario, loaded, share * margin.margin))
                 for share in SHARES
@@ -53,7 +44,7 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
         figures["runs"] = plot_runaway(runs)
     for title, figure in figures.items():
         save_figure(figure, output / f"{title}.png")
-    print_text("\n".join([*lines, f"Figures are in {output}"]))
+    print_text(f"{text}\n\nFigures are in {output}")
 
 
 def scaled(name: str, scenario: Scenario, factor: float) -> Scenario:

@@ -145,7 +145,7 @@ def compute(
                 progress=progress,
                 observe=observe,
                 stop=lambda: interrupts.requested,
-                recorded=None if check else begin,
+                plain=None if check else begin,
             )
         except (IntegrationError, Interrupted) as error:
             if check and error.result is not None:

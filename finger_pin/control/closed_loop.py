@@ -6,37 +6,32 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.guides import Guides
 from finger_pin.control.hand import HandController, joined_controller
-from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.own import OwnController, OwnMeasuringController, OwnReference
+from finger_pin.control.own import Samples, choose_controller, choose_reference
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
-from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
-from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.evaluation import CompiledFinger, Room
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
 
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
-#: Times, shape (m,), s, and values, one row for each.
-Samples = tuple[ArrayLike, ArrayLike]
+_Acting = tuple[Array, Array, Array | None]
 
 
 class Dynamics(Protocol):
@@ -136,8 +131,8 @@ class ClosedLoop:
         alone = len(acting) == 1
         loop = cls(
             finger=finger,
-            controller=_controller(controller, scenario, finger),
-            reference=_reference(reference, scenario, finger.routing),
+            controller=choose_controller(controller, scenario, finger),
+            reference=choose_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
             # Fingers that may touch something are not apart.
@@ -210,14 +205,36 @@ class ClosedLoop:
 
     def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
         """Return all signals at one time and state, or at times (m,) and states (m, size)."""
-        state = self.finger.layout.unpack(x)
-        reference = self.reference.at(time)
-        control = self.controller.command(time, reference, state.position, state.velocity)
-        command = self._command(time, control)
+        reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        finger = self.dynamics.evaluate(x, command, self.force(time), self.base(time))
-        return LoopSignals(reference, control, finger)
+        return LoopSignals(reference, control, self.dynamics.evaluate(x, *acting))
+
+    def fill(self, room: Room, time: Array, x: Array) -> tuple[ReferenceSignals, ControlSignals, Array]:
+        """Fill a room of the compiled core with what the mechanism does at times (m,) and states (m, size).
+
+        Returns:
+            What is desired and planned, and the inputs of the mechanism.
+        """
+        assert isinstance(self.dynamics, CompiledFinger)
+        reference, control, acting = self._acting(time, x)
+        self.dynamics.mechanism.fill(room, x, *acting)
+        return reference, control, acting[0]
+
+    def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
+        """Return what is desired and planned, and what acts: inputs of the mechanism, F, and how palm or objects move.
+
+        Inputs are tensions, voltages of motors in position drive, inputs of a tree.
+        """
+        state, reference = self.finger.layout.unpack(x), self.reference.at(time)
+        control = self.controller.command(time, reference, state.position, state.velocity)
+        command = control.tension[..., : self.finger.routing.actuated]
+        if self.drives is not None:
+            command = command.copy()
+            command[..., self.drives.channels] = self.drives.voltages(time)
+        if control.inputs is not None:
+            command = np.concatenate([command, control.inputs], axis=-1)
+        return reference, control, (command, self.force(time), self.base(time))
 
     def base(self, time: Array | float) -> Array | None:
         """Return how palm and objects are moved at one time, shape (27 + g,), or at times (m,); None at rest."""
@@ -237,21 +254,11 @@ class ClosedLoop:
                 objects = objects[0], lifted
         return replace(found, objects=objects)
 
-    def _command(self, time: Array | float, control: ControlSignals) -> Array:
-        """Return the inputs of the mechanism: tensions, voltages of motors in position drive, inputs of a tree."""
-        command = control.tension[..., : self.finger.routing.actuated]
-        if self.drives is not None:
-            command = command.copy()
-            command[..., self.drives.channels] = self.drives.voltages(time)
-        return command if control.inputs is None else np.concatenate([command, control.inputs], axis=-1)
-
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""
-        state, reference = self.finger.layout.unpack(x), self.reference.at(time)
-        control = self.controller.command(time, reference, state.position, state.velocity)
-        rows, external = self.dynamics.powers(x, self._command(time, control), self.force(time), self.base(time))
-        joints = state.velocity.shape[-1]
-        fingertip = np.sum(external[:, :joints] * state.velocity, axis=-1)
+        rows, external = self.dynamics.powers(x, *self._acting(time, x)[2])
+        velocity = self.finger.layout.unpack(x).velocity
+        fingertip = np.sum(external[:, : velocity.shape[-1]] * velocity, axis=-1)
         return np.concatenate([rows, fingertip[:, None]], axis=1)
 
     def rhs(self, time: float, x: Array) -> Array:
@@ -270,25 +277,3 @@ def _remembering_nothing(controller: Controller) -> Controller | None:
         known = [each for each in own if each is not None]
         return HandController(known, controller.routing) if len(known) == len(own) else None
     return None
-
-
-def _controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:
-    if given is None:
-        return build_controller(scenario, finger)
-    if isinstance(given, tuple | list):
-        return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
-    if isinstance(given, own | RoutedController):
-        return given
-    kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
-    return kind(given, finger.routing, scenario.simulation.start_time)
-
-
-def _reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> Reference:
-    if given is None:
-        return SignalReference.from_scenario(scenario, routing)
-    if isinstance(given, tuple | list):
-        return SignalReference.from_samples(given, scenario, routing)
-    if isinstance(given, SignalReference):
-        return given
-    return OwnReference(given, routing.joints, scenario.simulation.start_time)

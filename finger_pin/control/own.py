@@ -1,7 +1,7 @@
-"""Controllers and references of a user's own: asked for one time at a time, and checked.
+"""Controllers and references that a caller gives in place of the scenario's.
 
-They need not work on arrays of times. A wrong answer is refused at the first call. One that comes later ends the
-simulation there, and what was computed is kept.
+A user's own are asked for one time at a time, and checked: they need not work on arrays of times. A wrong answer is
+refused at the first call. One that comes later ends the simulation there, and what was computed is kept.
 """
 
 from __future__ import annotations
@@ -9,12 +9,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from finger_pin.control.build import build_controller
+from finger_pin.control.compensated import CompensatedController
+from finger_pin.control.hand import HandController
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.proportional import Controller, ControlSignals
-from finger_pin.control.reference import Reference, ReferenceSignals
+from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.passive_loop import PassiveTensionLoop
+from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
+from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.routed import RoutedController
 from finger_pin.description.routing import Array, Routing
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+
+#: Times, shape (m,), s, and values, one row for each.
+Samples = tuple[ArrayLike, ArrayLike]
 
 # Rounding, N.
 _LEAST = -1e-6
@@ -169,3 +181,35 @@ def _numbers(value: object) -> Array:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         return np.full((), np.nan)
+
+
+def choose_controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:
+    """Return what a caller gives as controller, ready to be asked, or the scenario's if nothing is given.
+
+    Raises:
+        InputError: If it does not fit the finger.
+    """
+    if given is None:
+        return build_controller(scenario, finger)
+    if isinstance(given, tuple | list):
+        return OpenLoopTensions.from_samples(given, scenario, finger.routing)
+    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
+    if isinstance(given, own | RoutedController):
+        return given
+    kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
+    return kind(given, finger.routing, scenario.simulation.start_time)
+
+
+def choose_reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> Reference:
+    """Return what a caller gives as reference, ready to be asked, or the scenario's if nothing is given.
+
+    Raises:
+        InputError: If it does not fit the finger.
+    """
+    if given is None:
+        return SignalReference.from_scenario(scenario, routing)
+    if isinstance(given, tuple | list):
+        return SignalReference.from_samples(given, scenario, routing)
+    if isinstance(given, SignalReference):
+        return given
+    return OwnReference(given, routing.joints, scenario.simulation.start_time)

@@ -10,7 +10,7 @@ from finger_pin.control.signal import Signal
 from finger_pin.description.hand import PATH, HandDescription
 from finger_pin.description.routing import Array
 from finger_pin.laws.palm import base_motion
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 
 
 @dataclass(frozen=True, eq=False)

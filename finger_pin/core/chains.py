@@ -13,6 +13,9 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import FREE_JOINTS
 
+# Less of a unit axis is rounding.
+_STILL = 1e-8
+
 
 class Chains(NamedTuple):
     """The bodies of `Tables`, and where the joints of the model are among them.
@@ -88,9 +91,9 @@ def _coordinates(model: pin.Model, index: int) -> list[_Body]:
     joint.calc(data, np.zeros(1) if joint.nq == 1 else pin.neutral(model), np.zeros(1))
     subspace = np.asarray(data.S)[:, 0] if np.ndim(data.S) == 2 else np.asarray(data.S)
     linear, angular = subspace[:3], subspace[3:]
-    if np.allclose(angular, 0.0):
+    if np.max(np.abs(angular)) < _STILL:
         return [_Body(PRISMATIC, linear)]
-    if np.allclose(linear, 0.0):
+    if np.max(np.abs(linear)) < _STILL:
         return [_Body(0, angular)]
     raise InputError(f"joint {model.names[index]}", "must turn about or slide along a fixed axis", joint.shortname())
 

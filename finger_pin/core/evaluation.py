@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,12 +20,34 @@ from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import GUIDES, Mechanism
-from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.rows import RowSignals
 
 # Fewer states than this are not worth a second thread.
 _FEW = 1000
+
+
+class Room(NamedTuple):
+    """What `evaluate_many` fills for m states, beside the packed states, shape (m, size).
+
+    The rows are those of more states, these from the ``first`` on: compiled code takes them whole.
+    """
+
+    packed: Array
+    rates: Array
+    rows: Array
+    first: int
+    torques: Array
+    externals: Array
+    booked: Array
+
+    def part(self, at: slice) -> Room:
+        """Return the room of some of the states, the same memory."""
+        first = self.first + at.indices(len(self.packed))[0]
+        own = (self.packed, self.rates, self.torques, self.externals, self.booked)
+        packed, rates, torques, externals, booked = (values[at] for values in own)
+        return Room(packed, rates, self.rows, first, torques, externals, booked)
 
 
 class CompiledMechanism:
@@ -51,20 +75,37 @@ class CompiledMechanism:
 
     def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
-        mechanism, several = self.mechanism, np.ndim(x) > 1
-        packed, filled = self._filled(x, command, force, base)
-        rates, rows, torques, externals, booked = filled
+        room = self.room(len(np.atleast_2d(x)))
+        self.fill(room, x, command, force, base)
+        return self.found(room, slice(None) if np.ndim(x) > 1 else 0)
+
+    def room(self, count: int, *, booked_only: bool = False) -> Room:
+        """Return room for what is computed of so many states: all, or energies, powers and J^T F only."""
+        mechanism, work = self.mechanism, self._model().model.work
+        width, kept = mechanism.coordinates, 0 if booked_only else count
+        return Room(
+            packed=np.zeros((count, mechanism.size)),
+            rates=np.zeros((kept, self._charts.size)),
+            rows=np.zeros((len(work.rows), kept, work.rows.shape[1])),
+            first=0,
+            torques=np.zeros((count, width)),
+            externals=np.zeros((count, width)),
+            booked=np.zeros((count, len(mechanism.books.stored) + len(mechanism.books.powers))),
+        )
+
+    def found(self, room: Room, at: slice | int = slice(None)) -> Evaluation:
+        """Return what fills a room, or what does so at one place."""
+        mechanism, rates, rows = self.mechanism, room.rates, room.rows[:, room.first :][:, : len(room.packed)]
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         acceleration, rate = rates[:, width : 2 * width], rates
         if mechanism.positions != width:
-            q, v, _ = mechanism.split(packed)
+            acceleration, (q, v, _) = acceleration.copy(), mechanism.split(room.packed)
             for i in self._charts.angles:
                 # From the second derivatives of the angles to the angular acceleration.
                 a, b, c = v[:, i], v[:, i + 1], v[:, i + 2]
                 acceleration[:, i : i + 3] += np.stack([b * c, -a * c, a * b], axis=1)
             moving = mechanism.body.position_rate(q[:, : mechanism.body.model.nq], v[:, :joints])
-            rate = np.concatenate([moving, v[:, joints:], rates[:, width:]], axis=1)
-        at = slice(None) if several else 0
+            rate = np.concatenate([moving, v[:, joints:], acceleration, rates[:, 2 * width :]], axis=1)
         found, begin = {}, 0
         for table in mechanism.rows:
             end = begin + table.count
@@ -79,30 +120,29 @@ class CompiledMechanism:
         return Evaluation(
             mechanism.books,
             found,
-            torques[at],
-            externals[at],
+            room.torques[at],
+            room.externals[at],
             acceleration[at],
             rate[at],
-            base_power=booked[at][..., -1:] if mechanism.moved else None,
-            booked=booked[at],
+            base_power=room.booked[at][..., -1:] if mechanism.moved else None,
+            booked=room.booked[at],
         )
 
     def powers(
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
-        _, (_, _, _, externals, booked) = self._filled(x, command, force, base, booked_only=True)
-        return booked[:, len(self.mechanism.books.stored) :], externals
+        room = self.room(len(x), booked_only=True)
+        self.fill(room, x, command, force, base)
+        return room.booked[:, len(self.mechanism.books.stored) :], room.externals
 
-    def _filled(
-        self, x: Array, command: Array, force: Array | None, base: Array | None, *, booked_only: bool = False
-    ) -> tuple[Array, tuple[Array, ...]]:
-        """Return packed states, and what `evaluate_many` fills for them: all, or energies, powers and J^T F only."""
+    def fill(self, room: Room, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> None:
+        """Fill a room with what is computed of packed states, shape (size,) or (m, size)."""
         mechanism, tables = self.mechanism, self._tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
-        packed = _rows(x, np.atleast_2d(x).shape)
-        count, width, tips = len(packed), mechanism.coordinates, len(tables.tip_body)
+        room.packed[:] = x
+        count, tips = len(room.packed), len(tables.tip_body)
         commands = _rows(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
         forces = np.zeros((count, tips, 3))
@@ -110,15 +150,13 @@ class CompiledMechanism:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
         bases = _bases(base, count, int(tables.guided.max(initial=-1)) + 1)
-        states, attitudes = self._charts.to_core(packed)
-        books = len(mechanism.books.stored) + len(mechanism.books.powers)
-        kept = 0 if booked_only else count
-        rates, rows = np.zeros((kept, states.shape[1])), np.zeros((kept, *self._model().model.work.rows.shape))
-        torques, externals, booked = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, books))
+        states, attitudes = self._charts.to_core(room.packed)
 
         def fill(model: BoundModel, part: slice) -> None:
-            given = (states, commands, forces, rates, rows, torques, externals, booked, bases, attitudes)
-            call(evaluate_many, States(model.address, *(each[part] for each in given)), STATES)
+            own = room.part(part)
+            filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
+            given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part])
+            call(evaluate_many, States(model.address, *given), STATES)
 
         if count < _FEW:
             fill(self._model(loaded), slice(None))
@@ -126,7 +164,6 @@ class CompiledMechanism:
             half = count // 2
             models = (self._model(loaded), self._model(loaded, 1))
             in_threads(lambda each: fill(*each), list(zip(models, (slice(half), slice(half, None)), strict=True)))
-        return packed, (rates, np.moveaxis(rows, 1, 0), torques, externals, booked)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n).
@@ -148,14 +185,15 @@ class CompiledFinger:
 
     Attributes:
         finger: The finger.
+        mechanism: What evaluates its mechanism.
     """
 
     def __init__(self, finger: Finger) -> None:
         """Read a finger."""
         self.finger = finger
-        self._mechanism = CompiledMechanism(finger.mechanism)
+        self.mechanism = CompiledMechanism(finger.mechanism)
         # Fingertip and energies are those of the finger alone.
-        self._alone = self._mechanism
+        self._alone = self.mechanism
         if finger.surroundings is not None:
             self._alone = CompiledMechanism(Mechanism(finger.rigid_body, [], moved=finger.mechanism.moved))
 
@@ -163,14 +201,14 @@ class CompiledFinger:
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
-        found = self._mechanism.evaluate(x, command, fingertip_force, base)
+        found = self.mechanism.evaluate(x, command, fingertip_force, base)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
-        return self._mechanism.powers(x, command, fingertip_force, base)
+        return self.mechanism.powers(x, command, fingertip_force, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""

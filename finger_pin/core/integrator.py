@@ -20,6 +20,9 @@ from finger_pin.description.routing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
+#: Takes some steps: their ends, the start of the first among them, and what maps times within to packed states.
+Follow = Callable[[Array, Callable[[Array], Array]], None]
+
 # Slices of a simulation of several islands, between which it can be watched.
 _SLICES = 200
 
@@ -41,7 +44,7 @@ class _Recorder:
     def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
         self._stepper, self._index = stepper, index
         part = self.part
-        self.start = (part.time, part.x.copy(), part.attitude.copy())
+        self.start = self._begin = (part.time, part.x.copy(), part.attitude.copy())
         self.kept = [part.room(0)]
         self.room = part.room(chunk)
         self.taken = 0
@@ -49,8 +52,10 @@ class _Recorder:
 
     def advance(self, end: float, chunks: int = -1) -> int:
         """Go to a time, or until some chunks are full; return the status."""
+        part = self.part
         while chunks != 0:
-            status, steps = self.part.advance(end, self.room)
+            self._begin = (part.time, part.x.copy(), part.attitude.copy())
+            status, steps = part.advance(end, self.room)
             self.kept.append(self.room.first(steps))
             self.taken += steps
             chunks -= 1
@@ -72,6 +77,10 @@ class _Recorder:
         """Return the steps that were taken."""
         joined = {name: np.concatenate([getattr(record, name) for record in self.kept]) for name in vars(self.kept[0])}
         return _Steps(self.part, *self.start, Record(**joined))
+
+    def latest(self) -> _Steps:
+        """Return the steps of the last chunk."""
+        return _Steps(self.part, *self._begin, self.kept[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +129,7 @@ def integrate_compiled(
     chunk: int = 256,
     together: bool = False,
     stop: Stop | None = None,
+    follow: Follow | None = None,
 ) -> Trajectory:
     """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
 
@@ -134,6 +144,7 @@ def integrate_compiled(
         together: Whether islands stop at the same times to be watched, which cuts some of their steps; otherwise a
             state that is watched has each where it has got to.
         stop: Asked now and then; true ends the integration there.
+        follow: Called with the steps of every chunk of a single island.
     """
     # Advancing by nothing compiles, which is no part of an integration's cost.
     stepper.advance(stepper.time)
@@ -164,22 +175,18 @@ def integrate_compiled(
         if jump and stepper.time == goal:
             for part in stepper.parts:
                 part.memory[core.TIME] = end
+        if alone and follow is not None:
+            latest = recorders[0].latest()
+            follow(latest.times, _states(stepper, [latest]))
         if watch is not None:
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()
     steps = [recorder.steps() for recorder in recorders]
     memories = [recorder.part.memory for recorder in recorders]
-
-    def interpolate(at: Array) -> Array:
-        found = [each.interpolate(at) for each in steps]
-        if alone and not len(steps[0].attitude):
-            return found[0][0]
-        return stepper.joined([state for state, _ in found], [attitude for _, attitude in found])
-
     ends = np.unique(np.concatenate([each.times for each in steps]))
     return Trajectory(
         breakpoints=ends[ends <= stepper.time],
-        interpolate=interpolate,
+        interpolate=_states(stepper, steps),
         statistics=Statistics(
             steps=sum(recorder.taken for recorder in recorders),
             evaluations=int(sum(memory[core.EVALUATIONS] for memory in memories)),
@@ -195,6 +202,18 @@ def integrate_compiled(
         if alone or any(len(each.attitude) for each in steps)
         else tuple(_apart(each, stepper) for each in steps),
     )
+
+
+def _states(stepper: Stepper, steps: list[_Steps]) -> Callable[[Array], Array]:
+    """Return what maps times to packed states, from the steps of all islands."""
+
+    def interpolate(at: Array) -> Array:
+        found = [each.interpolate(at) for each in steps]
+        if len(steps) == 1 and not len(steps[0].attitude):
+            return found[0][0]
+        return stepper.joined([state for state, _ in found], [attitude for _, attitude in found])
+
+    return interpolate
 
 
 def _apart(steps: _Steps, stepper: Stepper) -> tuple[NDArray[np.int64], Array, Callable[[Array], Array]]:

@@ -258,11 +258,13 @@ def advance(address: int, end: float) -> int:
                 memory[CULPRIT] = 0.0
             if taken[0] < times.size:
                 for row in range(tableau.dense.shape[0]):
+                    bend = stretch.dense[taken[0], row]
                     for c in range(size):
-                        value = 0.0
-                        for j in range(count):
-                            value += tableau.dense[row, j] * k[j, c]
-                        stretch.dense[taken[0], row, c] = value
+                        bend[c] = 0.0
+                    for j in range(count):
+                        factor_of_stage = tableau.dense[row, j]
+                        for c in range(size):
+                            bend[c] += factor_of_stage * k[j, c]
             if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False

@@ -25,7 +25,9 @@ class States(NamedTuple):
         commands: Shape (m, u).
         forces: At the tips, shape (m, t, 3).
         rates: Filled with the rates, shape (m, size), or (0, size) if only J^T F, energies and powers are wanted.
-        rows: Filled with the table of rows, shape (m, columns, K), or (0, columns, K).
+        rows: Filled with the table of rows from the first place on, shape (columns, first + m or more, K), or
+            (columns, 0, K).
+        first: Where in it the first state stands.
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
         booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
@@ -40,6 +42,7 @@ class States(NamedTuple):
     forces: Layers
     rates: Matrix
     rows: Layers
+    first: int
     torques: Matrix
     externals: Matrix
     booked: Matrix
@@ -117,6 +120,7 @@ def evaluate_many(address: int, _time: float) -> int:
     """Evaluate the `States` at an address."""
     many = bound_at(address, STATES)
     states, commands, forces, rates, rows = many.states, many.commands, many.forces, many.rates, many.rows
+    first = many.first
     torques, externals, booked, bases, attitudes = (
         many.torques,
         many.externals,
@@ -156,9 +160,9 @@ def evaluate_many(address: int, _time: float) -> int:
         if rates.shape[0] > 0:
             for c in range(states.shape[1]):
                 rates[m, c] = model.rate[c]
-            for c in range(rows.shape[1]):
+            for c in range(rows.shape[0]):
                 for k in range(rows.shape[2]):
-                    rows[m, c, k] = work.rows[c, k]
+                    rows[c, first + m, k] = work.rows[c, k]
         for j in range(torques.shape[1]):
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]

@@ -105,6 +105,7 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
             present[*place, key] = what, as_table(as_table(each).get(f"{what}s"))
     if hand:
         present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
+    present["environment", "objects"] = "object", siblings
     field = find_field(Scenario, owner) if owner else None
     if tuple(owner) not in present and (field is None or get_origin(field.annotation) is not dict):
         return

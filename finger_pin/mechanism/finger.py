@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,12 +17,13 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.finger_signals import FingerSignals, JointForces, MotorForces, TendonForces
+from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.foreign_model import on_model
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import Motion, RigidBody
+from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals, further_states
 from finger_pin.mechanism.state import Layout
@@ -31,8 +32,6 @@ from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 from finger_pin.mechanism.urdf import build_rigid_body
-
-_TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
 
 
 class Finger:
@@ -102,14 +101,8 @@ class Finger:
         self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
         self.visuals: pin.GeometryModel | None = None
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
-        self.layout = Layout(
-            self.routing.joints,
-            self.routing.tendons,
-            self.routing.passive,
-            further_states(self.further),
-            ringing,
-            self.actuators.names,
-        )
+        states = further_states(self.further)
+        self.layout = Layout(joints, self.routing.tendons, self.routing.passive, states, ringing, motors)
         pulling = self.tendons.rows(self.actuators)
         if self.paths:
             pulling = [along_paths(description, self.paths, table) for table in pulling]
@@ -233,51 +226,14 @@ class Finger:
 
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        joints, bodies = len(self.routing.joints), int(self.mechanism.body.model.nv)
-        halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
-        delivered, motors = driven.force, None
-        torque = self._pulled_torque(x, driven) + (halves.force @ halves.rows.arm)[..., :joints]
-        if self.actuators.names:
-            elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
-            delivered = delivered + elastic.force @ self.actuators.pulled.T
-            torque = torque + self._pulled_torque(x, elastic)
-            motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
-
-        def both(of: Callable[[RowSignals], Array]) -> Array:
-            return np.concatenate([of(driven), of(passive)], axis=-1)
-
-        return FingerSignals(
-            state=self.layout.unpack(x),
-            command=command,
-            fingertip_force=np.asarray(np.zeros(3) if fingertip_force is None else fingertip_force, dtype=float),
-            tendons=TendonForces(
-                curvature=both(lambda tendons: tendons.row.curvature),
-                coefficient=both(lambda tendons: tendons["coefficient"]),
-                velocity=both(lambda tendons: tendons.row.speed),
-                friction=both(lambda tendons: tendons["friction"]),
-                normal=both(lambda tendons: tendons["normal_force"]),
-                level=both(lambda tendons: tendons["level"]),
-                stiction_rate=both(lambda tendons: tendons.rate),
-                entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
-                strands=np.concatenate([delivered, halves.force], axis=-1),
-                passive_acceleration=found.acceleration[..., bodies : bodies + self.routing.passive],
-            ),
-            joints=JointForces(
-                reaction=pins["normal_force"],
-                friction=pins["friction"],
-                level=pins["level"],
-                stiction_rate=pins.rate,
-            ),
-            limiter_depth=limiter["depth"],
-            limiter_torque=-limiter.force,
-            spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
-            tendon_torque=torque,
-            external_torque=found.external[..., :joints],
-            acceleration=found.acceleration[..., :joints],
-            rate=found.rate,
-            mechanism=found,
-            motors=motors,
-        )
+        halves = found.rows["passive_halves"]
+        torque = (halves.force @ halves.rows.arm)[..., : len(self.routing.joints)]
+        for pulling in ("driven_tendons", "elastic_tendons"):
+            if pulling in found.rows:
+                torque = torque + self._pulled_torque(x, found.rows[pulling])
+        force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
+        bodies, pulled = int(self.mechanism.body.model.nv), self.actuators.pulled
+        return FingerSignals.of(found, self.layout.unpack(x), command, force, torque, bodies, pulled)
 
     def coupling_at(self, position: Array) -> Array:
         """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""

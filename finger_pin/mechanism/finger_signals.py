@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Evaluation
+from finger_pin.mechanism.rows import RowSignals
 from finger_pin.mechanism.state import State
+
+_TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,3 +115,62 @@ class FingerSignals:
     rate: Array
     mechanism: Evaluation
     motors: MotorForces | None = None
+
+    @classmethod
+    def of(
+        cls, found: Evaluation, state: State, command: Array, force: Array, torque: Array, bodies: int, pulled: Array
+    ) -> FingerSignals:
+        """Take the rows' signals apart by the paper's names.
+
+        Args:
+            found: What evaluating the mechanism gave.
+            state: The state, unpacked.
+            command: f^a, shape (..., a), N.
+            force: F, N.
+            torque: H_c2^T f, shape (..., n), N m.
+            bodies: Number of velocities of the rigid body, before those of passive tendons.
+            pulled: Which tendons the motors' spools pull, as `Actuators.pulled`.
+        """
+        joints, passive_tendons = torque.shape[-1], state.passive_position.shape[-1]
+        halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
+        delivered, motors = driven.force, None
+        if "motors" in found.rows:
+            elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
+            delivered = delivered + elastic.force @ pulled.T
+            motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
+
+        def both(of: Callable[[RowSignals], Array]) -> Array:
+            return np.concatenate([of(driven), of(passive)], axis=-1)
+
+        return cls(
+            state=state,
+            command=command,
+            fingertip_force=force,
+            tendons=TendonForces(
+                curvature=both(lambda tendons: tendons.row.curvature),
+                coefficient=both(lambda tendons: tendons["coefficient"]),
+                velocity=both(lambda tendons: tendons.row.speed),
+                friction=both(lambda tendons: tendons["friction"]),
+                normal=both(lambda tendons: tendons["normal_force"]),
+                level=both(lambda tendons: tendons["level"]),
+                stiction_rate=both(lambda tendons: tendons.rate),
+                entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
+                strands=np.concatenate([delivered, halves.force], axis=-1),
+                passive_acceleration=found.acceleration[..., bodies : bodies + passive_tendons],
+            ),
+            joints=JointForces(
+                reaction=pins["normal_force"],
+                friction=pins["friction"],
+                level=pins["level"],
+                stiction_rate=pins.rate,
+            ),
+            limiter_depth=limiter["depth"],
+            limiter_torque=-limiter.force,
+            spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
+            tendon_torque=torque,
+            external_torque=found.external[..., :joints],
+            acceleration=found.acceleration[..., :joints],
+            rate=found.rate,
+            mechanism=found,
+            motors=motors,
+        )

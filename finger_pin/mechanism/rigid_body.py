@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,47 +10,10 @@ import pinocchio as pin
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.kinematics import Kinematics
 
 # The two halves of a free body; a quaternion of the spherical one has four numbers.
 FREE_JOINTS = ("JointModelTranslation", "JointModelSpherical")
-
-
-@dataclass(frozen=True, eq=False)
-class Kinematics:
-    """Positions and velocities of the rigid body; leading dimensions such as time are kept.
-
-    Attributes:
-        tip: p, fingertip position, shape (..., 3), m; of several shape (..., t, 3).
-        tip_velocity: p', shape (..., 3), m/s, of the first.
-        jacobian: J of (6), shape (..., 3, n), of the first.
-        directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
-        kinetic_energy: Shape (...,), J.
-        potential_energy: Of gravity, shape (...,), J.
-    """
-
-    tip: Array
-    tip_velocity: Array
-    jacobian: Array
-    directions: Array
-    kinetic_energy: Array
-    potential_energy: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Where the fingertip is and what energy the rigid body has; leading dimensions are kept.
-
-    Attributes:
-        tip: p, shape (..., 3), m; of several shape (..., t, 3).
-        kinetic_energy: Shape (...,), J.
-        potential_energy: Of gravity, shape (...,), J.
-        objects: Both energies of free objects around it; None without surroundings.
-    """
-
-    tip: Array
-    kinetic_energy: Array
-    potential_energy: Array
-    objects: tuple[Array, Array] | None = None
 
 
 class RigidBody:

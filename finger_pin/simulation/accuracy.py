@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
@@ -18,7 +19,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recorded import Recording
 
 #: Steps between two looks at a compiled simulation.
-CHUNK = 256
+CHUNK = 128
 
 # A run at tolerance tol is expected to be within so many times tol, rad, and never worse than the second number.
 _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
@@ -31,9 +32,14 @@ _TIGHTER = 10.0
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
 # far slower, and a motion that takes so many steps shows early how sensitive it is.
-_PATIENCE, _MOST_LOOKS = 2, 600
-# The share of the energy exchanged to which an account has to close, and what is too little to count, J.
-_OPEN, _NOTHING = 1e-4, 1e-12
+_PATIENCE, _MOST_LOOKS = 2, 1200
+# The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
+_OPEN, _ROUNDING = 1e-4, 1e-13
+# A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
+# most, and not if it took more steps.
+_CLOSED, _WELL_CLOSED = 10.0, 1e-5
+_MOST_REPETITIONS, _MOST_STEPS = 3, 200_000
+_TOLERANCES = ("rtol", "atol_scale")
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
@@ -47,31 +53,87 @@ def expected_error(scenario: Scenario) -> float:
     return min(_EXPECTED * max(settings.rtol, settings.atol_scale), _MOST_EXPECTED)
 
 
-def estimate_error(
-    scenario: Scenario, trajectory: Trajectory, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
-) -> tuple[float, str]:
-    """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run whose energy account has been seen to.
 
-    Where the estimate that the integration carried along is large, or the finger is close to self-locking, where the
-    linearised flow does not show how far slips go, the run is repeated at a tighter tolerance, and the difference
-    counts.
+    Attributes:
+        scenario: With the tolerances that it took.
+        trajectory: Its solution.
+        result: What was recorded of it.
+        left: Which share of all energy exchanged its account leaves open.
+        coarser: What it replaces, if it is a repetition.
+    """
+
+    scenario: Scenario
+    trajectory: Trajectory
+    result: Recording
+    left: float
+    coarser: Trajectory | None = None
+
+
+def close_account(
+    scenario: Scenario,
+    trajectory: Trajectory,
+    repeated: Callable[[Scenario, Stop], Trajectory],
+    recorded: Callable[[Trajectory], Recording],
+) -> Run:
+    """Record a run, and repeat it at tighter tolerances as long as its energy account does not close to ten times them.
+
+    Small forces and slow drifts are within the tolerances of the state and yet may be all that a run's energy is. The
+    result says at which tolerances it ran.
 
     Args:
         scenario: What was simulated.
         trajectory: Its solution.
         repeated: Integrates the scenario with other tolerances until it is asked to stop.
+        recorded: Makes the result of a trajectory.
+    """
+    result, settings = recorded(trajectory), scenario.simulation
+    first = run = Run(scenario, trajectory, result, left_open(result))
+    limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
+    whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
+    for _ in range(_MOST_REPETITIONS):
+        if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < run.left < np.inf:
+            break
+        tighter = _tightened(run.scenario)
+        other = repeated(tighter, _patient(run.trajectory))
+        if other.failure or other.interrupted:
+            break
+        result = recorded(other)
+        result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
+        result.attrs["repeated"] = (
+            f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
+            f"{first.left:.1g} of the energy exchanged"
+        )
+        run = Run(tighter, other, result, left_open(result), run.trajectory)
+    return run
+
+
+def estimate_error(
+    scenario: Scenario, run: Run, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
+) -> tuple[float, str]:
+    """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
+
+    Where the estimate that the integration carried along is large, or the finger is close to self-locking, where the
+    linearised flow does not show how far slips go, the run is repeated at a tighter tolerance, and the difference
+    counts; or the difference to the coarser one that it replaces.
+
+    Args:
+        scenario: What was asked for.
+        run: What was simulated.
+        repeated: Integrates the scenario with other tolerances until it is asked to stop.
         margin: Of the joints' friction to what locks the finger; infinite where not known.
     """
+    trajectory, other = run.trajectory, run.coarser
     expected, error = expected_error(scenario), trajectory.estimated_error
     doubted = error > _DOUBTED * expected or (margin < _CLOSE_TO_LOCKING and np.isfinite(error))
     if not doubted or trajectory.failure or trajectory.interrupted:
         return error, ""
-    settings = scenario.simulation
-    tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in ("rtol", "atol_scale")}
-    looks = count()
-    most = min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), _MOST_LOOKS)
-    tightened = scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
-    other = repeated(tightened, lambda: next(looks) >= most)
+    rtol = run.scenario.simulation.rtol
+    if other is None:
+        tighter = _tightened(run.scenario)
+        other, rtol = repeated(tighter, _patient(trajectory, _MOST_LOOKS)), tighter.simulation.rtol
     times = scenario.sample_times()
     times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
     difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]
@@ -79,27 +141,65 @@ def estimate_error(
     if error <= expected:
         return error, ""
     return error, (
-        f"the run errs by about {error:.1g} rad rms: repeated at rtol {tighter['rtol']:g} it differs by that. "
+        f"the run errs by about {error:.1g} rad rms: repeated at rtol {rtol:g} it differs by that. "
         "The motion is sensitive, as close to self-locking or in a loop that hunts; "
         "try a smaller simulation.rtol and atol_scale"
     )
 
 
+def _tightened(scenario: Scenario) -> Scenario:
+    settings = scenario.simulation
+    tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in _TOLERANCES}
+    return scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
+
+
+def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
+    """Return what asks to stop after more looks than a trajectory took, or so many at most."""
+    looks, most = count(), min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), most)
+    return lambda: next(looks) >= most
+
+
+def left_open(result: Recording) -> float:
+    """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding."""
+    most = {
+        name.removeprefix("energy_"): float(np.abs(values).max())
+        for name, (_, values, _) in result.variables.items()
+        if name.startswith("energy_")
+    }
+    residual = most.pop("residual")
+    exchanged = sum(value for name, value in most.items() if name.startswith("exchanged_"))
+    if not residual > _ROUNDING * max(most.values()):
+        return 0.0
+    return residual / exchanged if exchanged else np.inf
+
+
 def open_account(result: Recording) -> str:
     """Return what to say if a result's energy account does not close to a ten thousandth of all energy exchanged."""
-    exchanged = sum(
-        float(np.abs(values).max())
-        for name, (_, values, _) in result.variables.items()
-        if name.startswith("energy_exchanged_")
-    )
-    residual = float(np.abs(result.variables["energy_residual"][1]).max())
-    if not residual > max(_OPEN * exchanged, _NOTHING):
+    share = left_open(result)
+    if not share > _OPEN:
         return ""
-    share = residual / exchanged if exchanged else np.inf
     return (
         f"the energy account closes only to {share:.1g} of the energy exchanged: an impact or a kink was passed too "
         "coarsely; try a smaller simulation.rtol and atol_scale"
     )
+
+
+def finite_part(result: Recording) -> str:
+    """Cut a result before its first sample that is not finite; return the first variable that is not, else empty."""
+    length, excess = len(result.time), ""
+    for name, (_, values, _) in result.variables.items():
+        # The sum alone tells in most cases.
+        if np.isfinite(np.sum(values)):
+            continue
+        finite = np.isfinite(values)
+        if not finite.all():
+            first = int(np.argmin(finite.reshape(len(values), -1).all(axis=1)))
+            if first < length:
+                length, excess = first, name
+    if excess:
+        result.cut(max(length, 1))
+        result.attrs["end_time"] = float(result.time[-1])
+    return excess
 
 
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
@@ -137,7 +237,8 @@ def too_stiff(result: Recording, finger: Finger, tolerance: float) -> str:
     contacts, known = finger.surroundings.contacts, 0.1 * tolerance
     stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
     depth = stiffness ** (-1.0 / exponent)
-    touched = np.any(result.variables["contact_normal_force"][1] > 0.0, axis=0)
+    # Bounces may all fall between samples: what is closer than can be told has touched.
+    touched = np.any(result.variables["contact_gap"][1] < known, axis=0)
     for index in np.flatnonzero(touched & (depth < _SEEN * known)):
         return (
             f"{contacts.names[index]} is too stiff for the tolerances: 1 N presses it in by {depth[index]:.1g} m, and "

@@ -15,7 +15,7 @@ from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Books
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rigid_body import Kinematics, Motion
+from finger_pin.mechanism.kinematics import Kinematics, Motion
 
 #: The power that the fingertip force supplies.
 FINGERTIP = "fingertip"

@@ -19,9 +19,10 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.rigid_body import Motion
+from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.following import Following
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.touching import contact_coordinates, contact_variables
 
@@ -79,18 +80,27 @@ _EXCHANGED = {
 
 
 def record(
-    scenario: Scenario, loop: ClosedLoop, trajectory: Trajectory, method: str, times: Array | None = None
+    scenario: Scenario,
+    loop: ClosedLoop,
+    trajectory: Trajectory,
+    method: str,
+    times: Array | None = None,
+    following: Following | None = None,
 ) -> Recording:
     """Return all signals of a trajectory at times, by default the scenario's, as far as the trajectory goes.
 
-    The signals are recomputed from the states by the evaluation that the dynamics use.
+    The signals are recomputed from the states by the evaluation that the dynamics use; what has followed the motion
+    knows them already, at the scenario's times.
     """
     times = scenario.sample_times() if times is None else times
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
-    signals = loop.evaluate(times, trajectory.interpolate(times))
-    state = signals.finger.state
-    motion = loop.motion(times, state)
-    kept = account(loop, trajectory, times, signals, motion)
+    known = following.finish(len(times)) if following is not None else None
+    if known is None:
+        signals, done = loop.evaluate(times, trajectory.interpolate(times)), None
+        motion = loop.motion(times, signals.finger.state)
+    else:
+        signals, motion, done = known
+    kept = account(loop, trajectory, times, signals, motion, done)
     routing = loop.finger.routing
     further = loop.finger.further
     variables = _signals(loop, times, signals, motion) | contact_variables(loop.finger, signals.finger)

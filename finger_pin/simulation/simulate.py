@@ -14,17 +14,17 @@ from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
 from finger_pin.analysis.passivity import micro_damping_advice
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals, Samples
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.own import OwnController
+from finger_pin.control.own import OwnController, Samples
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.control.sampling import SampledController
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.integrator import Follow, integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.controller import SamplingSettings
@@ -36,11 +36,14 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import (
     CHUNK,
     check_memory,
+    close_account,
     estimate_error,
+    finite_part,
     open_account,
     ringing,
     too_stiff,
 )
+from finger_pin.simulation.following import Following
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
@@ -70,7 +73,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
-    recorded: Callable[[Recording], None] | None = None,
+    plain: Callable[[Recording], None] | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario, from rest on its reference unless something else is asked for.
 
@@ -99,7 +102,7 @@ def simulate(
         progress: Called with the simulated time, s, now and then.
         observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
-        recorded: Called with the result as plain arrays, before xarray is imported to make a Dataset of it.
+        plain: Called with the result as plain arrays, before xarray is imported to make a Dataset of it.
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account.
@@ -174,21 +177,25 @@ def simulate(
         if observe is not None:
             observe(time, loop.evaluate(time, x))
 
+    def repeated(other: Scenario, enough: Stop) -> Trajectory:
+        asked = stop or (lambda: False)
+        return _integrate(other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or asked())
+
+    def recorded(found: Trajectory) -> Recording:
+        # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return record(scenario, loop, found, method, following=following if found is first else None)
+
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
-    trajectory = _integrate(scenario, loop, method, watch, chunk, stop)
+    # Only what is a function of time and state can be evaluated beside the integration.
+    pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
+    following = Following(loop, scenario.sample_times()) if pure and observe is None else None
+    first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
+    run = close_account(scenario, first, repeated, recorded)
+    trajectory, recording = run.trajectory, run.result
     reached = float(trajectory.breakpoints[-1])
-    error, inaccurate = estimate_error(
-        scenario,
-        trajectory,
-        lambda other, enough: _integrate(
-            other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or (stop is not None and stop())
-        ),
-        margin=math.inf if margin is None else margin,
-    )
+    error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
-    # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        recording = record(scenario, loop, trajectory, method)
     if margin is not None:
         recording.attrs["self_locking_margin"] = margin
     if driving:
@@ -206,9 +213,9 @@ def simulate(
         recording.attrs["account"] = gap
     if slow:
         recording.attrs["ringing"] = slow
-    excess = _finite_part(recording)
-    if recorded is not None:
-        recorded(recording)
+    excess = finite_part(recording)
+    if plain is not None:
+        plain(recording)
     result = recording.dataset()
     if trajectory.failure:
         if isinstance(answers, OwnController) and answers.problem_time >= reached:
@@ -226,24 +233,6 @@ def simulate(
     return result
 
 
-def _finite_part(recording: Recording) -> str:
-    """Cut a result before its first sample that is not finite; return the first variable that is not, else empty."""
-    length, excess = len(recording.time), ""
-    for name, (_, values, _) in recording.variables.items():
-        # The sum alone tells in most cases.
-        if np.isfinite(np.sum(values)):
-            continue
-        finite = np.isfinite(values)
-        if not finite.all():
-            first = int(np.argmin(finite.reshape(len(values), -1).all(axis=1)))
-            if first < length:
-                length, excess = first, name
-    if excess:
-        recording.cut(max(length, 1))
-        recording.attrs["end_time"] = float(recording.time[-1])
-    return excess
-
-
 def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:
     """Return how the controller is sampled, or None if it is continuous."""
     settings, method = scenario.controller.sampling, scenario.simulation.method
@@ -257,7 +246,13 @@ def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | No
 
 
 def _integrate(
-    scenario: Scenario, loop: ClosedLoop, method: str, watch: Watch, chunk: int, stop: Stop | None
+    scenario: Scenario,
+    loop: ClosedLoop,
+    method: str,
+    watch: Watch,
+    chunk: int,
+    stop: Stop | None,
+    follow: Follow | None = None,
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
@@ -276,6 +271,7 @@ def _integrate(
             chunk=chunk,
             together=chunk == _CHUNK_OBSERVED,
             stop=stop,
+            follow=follow,
         )
     if method == "CVODE":
         return integrate_cvode(

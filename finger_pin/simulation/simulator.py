@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.control.closed_loop import Samples
 from finger_pin.control.compiled import core_signal
 from finger_pin.control.guides import Guides
+from finger_pin.control.own import Samples
 from finger_pin.control.reference import Reference
 from finger_pin.core.control import held_control
 from finger_pin.core.evaluation import CompiledFinger

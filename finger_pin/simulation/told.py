@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from finger_pin.control.closed_loop import ClosedLoop, Samples
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.own import Samples
 from finger_pin.control.reference import Reference, SignalReference
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger

@@ -15,7 +15,8 @@ from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, ScenarioWarning, SelfLockingWarning, StudyError
 from finger_pin.simulation.simulate import simulate
-from finger_pin.studies.processes import Lost, Pool, usable_cores
+from finger_pin.studies.machine import usable_cores
+from finger_pin.studies.processes import Lost, Pool
 
 _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 

@@ -10,7 +10,7 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.simulation.simulate import simulate
 from finger_pin.studies import runs as runs
 from finger_pin.studies.fingerprint import source_digest
-from finger_pin.studies.processes import WARM
+from finger_pin.studies.machine import WARM
 
 # Processes would begin by importing the script that asks, and so run it again where it has no guard. They need nothing
 # of it: what it has defined itself is sent to them by value.

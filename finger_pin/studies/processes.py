@@ -12,14 +12,12 @@ notebook defines it. So they never import the script that asks, and it needs no 
 from __future__ import annotations
 
 import multiprocessing
-import multiprocessing.forkserver
 import os
 import pickle
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -28,10 +26,10 @@ from typing import Any, Self, TypeVar
 
 import cloudpickle
 
-from finger_pin.core.compilation import CACHE_FOLDER, is_cached
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.simulation.simulate import simulate
+from finger_pin.studies.machine import process_context, usable_cores
 from finger_pin.studies.runs import Record, Stop, Task, execute
 
 _Item = TypeVar("_Item")
@@ -40,10 +38,6 @@ _Result = TypeVar("_Result")
 _POLL, _GLANCE = 0.1, 1e-3
 # A process may die for a reason outside, such as memory that others took; work that ends two of them is reported.
 _ATTEMPTS = 2
-#: Variable of the environment: whether the server that processes are copied from loads compiled code.
-WARM = "FINGER_PIN_WARM"
-# Matrices of a finger are too small for several threads to help, and the cores are taken by the processes.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -197,48 +191,6 @@ class Pool:
         worker.process.kill()
         worker.process.join()
         worker.connection.close()
-
-
-def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        # Only Linux binds processes to cores.
-        return os.cpu_count() or 1
-
-
-def process_context() -> multiprocessing.context.BaseContext:
-    """Return how to start processes: from a clean server where the cache serves them, else as copies of this one.
-
-    The server begins to start at once, so that it is there when processes are.
-    """
-    methods = multiprocessing.get_all_start_methods()
-    if CACHE_FOLDER is None and "fork" in methods:
-        return multiprocessing.get_context("fork")
-    if "forkserver" in methods:
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["finger_pin.studies.preloaded"])
-        # Its processes have the environment in which it was started. What is not compiled yet is compiled here, once.
-        with _environment({**dict.fromkeys(_THREADS, "1"), WARM: "1" if is_cached() else "0"}):
-            multiprocessing.forkserver.ensure_running()
-        return context
-    return multiprocessing.get_context("spawn")
-
-
-@contextmanager
-def _environment(entries: Mapping[str, str]) -> Iterator[None]:
-    """Give processes that are started meanwhile other variables of the environment."""
-    earlier = {name: os.environ.get(name) for name in entries}
-    os.environ.update(entries)
-    try:
-        yield
-    finally:
-        for name, value in earlier.items():
-            if value is None:
-                os.environ.pop(name)
-            else:
-                os.environ[name] = value
 
 
 def _serve(connection: Connection[Any, Any]) -> None:

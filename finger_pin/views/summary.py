@@ -10,15 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger_pin.analysis import (
-    critical_friction,
     locking_advice,
-    self_locking_map,
-    self_locking_margin,
 )
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
-from finger_pin.mechanism.finger import Finger
+from finger_pin.views.account import account
 from finger_pin.views.trees import is_tree
 
 if TYPE_CHECKING:
@@ -28,7 +23,6 @@ _SETTLING = 1.0
 _LONG = 2.0
 # What counts as sliding, m/s.
 _CREEP = 1e-6
-_SUPPLIES = ("actuators", "electrical", "fingertip", "palm", "objects")
 
 
 def summarize(result: xr.Dataset) -> str:
@@ -53,65 +47,13 @@ def summarize(result: xr.Dataset) -> str:
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
-def summarize_locking(scenario: Scenario) -> str:
-    """Return when a scenario's finger locks itself, as plain text: with or without tendon friction, at which posture.
-
-    Args:
-        scenario: Of a finger with force closure.
-
-    Raises:
-        InputError: If there is no force closure.
-    """
-    finger = scenario.finger
-    static = expand(finger.joint_friction.stiction, len(finger.joints))
-    alone = [(name, critical_friction(finger, joints=[name]).coefficient) for name in finger.joints]
-    together = critical_friction(finger).coefficient
-    rows = [(name, _millimetres(value), f"{1e3 * own:.3f}") for (name, value), own in zip(alone, static, strict=True)]
-    rows.append(("all joints", _millimetres(together), f"{1e3 * max(static):.3f}"))
-    blocks = [
-        [
-            "Joint friction at which the finger locks in its worst direction, mm,",
-            "without tendon friction, so at any posture alike; and M^c, what it has",
-            *_table(("moving", "locks at", "has"), rows),
-        ]
-    ]
-    found = self_locking_map(Finger(finger))
-    least = np.unravel_index(int(np.argmin(found.coefficient)), found.coefficient.shape)
-    angles = zip(found.joints, (axis[index] for axis, index in zip(found.angles, least, strict=True)), strict=True)
-    where = ", ".join(f"{name} {np.rad2deg(angle):.3g} deg" for name, angle in angles)
-    if found.uniform:
-        where = f"every posture of {' and '.join(found.joints)}"
-    blocks.append(
-        [
-            "With the friction of the tendons, all joints moving in their worst directions, mm:",
-            f"  locks at {_millimetres(float(found.coefficient.min()))}, at {where}",
-            f"  {_verdict(found.actual / float(found.coefficient.min()))}",
-        ]
-    )
-    margin = self_locking_margin(scenario)
-    posture = ", ".join(f"{each:.3g}" for each in np.rad2deg(margin.position))
-    line = "  nothing moves, or nothing locks it"
-    if np.isfinite(margin.margin):
-        line = f"  {_verdict(1.0 / margin.margin)}, at {margin.time:.3g} s and ({posture}) deg"
-    blocks.append([f"With the friction of the tendons, in the motion of {scenario.name} where it is closest:", line])
-    return "\n\n".join("\n".join(block) for block in blocks)
-
-
-def _verdict(share: float) -> str:
-    """Return what a share of the critical friction means."""
-    what = "it locks" if share >= 1.0 else "it does not lock"
-    return f"{what}: its friction is {share:.3g} times what locks it"
-
-
-def _millimetres(length: float) -> str:
-    return f"{1e3 * length:.3f}" if np.isfinite(length) else "never"
-
-
 def _head(result: xr.Dataset) -> list[str]:
     attributes = result.attrs
     title = " ".join(str(attributes["title"]).split())
     tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
-    return [title, f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"]
+    run = f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"
+    repeated = f"It was {attributes['repeated']}" if "repeated" in attributes else ""
+    return [title, run, *textwrap.wrap(repeated, 80)]
 
 
 def _own(result: xr.Dataset) -> list[str]:
@@ -134,7 +76,7 @@ def _tracking(result: xr.Dataset) -> list[str]:
         (str(joint), f"{np.sqrt(np.mean(column**2)):.4f}", f"{np.max(np.abs(column)):.4f}")
         for joint, column in zip(result["joint"].values, degrees.T, strict=True)
     ]
-    return [f"Tracking error, deg ({span})", *_table(("", "rms", "max"), rows)]
+    return [f"Tracking error, deg ({span})", *table(("", "rms", "max"), rows)]
 
 
 def _contacts(result: xr.Dataset) -> list[list[str]]:
@@ -152,13 +94,13 @@ def _contacts(result: xr.Dataset) -> list[list[str]]:
         shares = (f"{100.0 * np.mean(each):.1f} %" for each in (touching, sliding))
         greatest = (float(contact[f"contact_{force}"].max()) for force in ("normal_force", "friction"))
         rows.append((name, *(f"{each:.3f}" for each in greatest), *shares))
-    return [["Contacts, N, and parts of the time", *_table(("", "normal", "friction", "touching", "sliding"), rows)]]
+    return [["Contacts, N, and parts of the time", *table(("", "normal", "friction", "touching", "sliding"), rows)]]
 
 
 def _joints(result: xr.Dataset) -> list[str]:
     position = result["joint_position"]
     rows = [_range(str(name), np.asarray(position.sel(joint=name))) for name in result["joint"].values]
-    return ["Positions of the joints, rad or m", *_table(("", "least", "greatest"), rows)]
+    return ["Positions of the joints, rad or m", *table(("", "least", "greatest"), rows)]
 
 
 def _actuators(result: xr.Dataset) -> list[list[str]]:
@@ -166,7 +108,7 @@ def _actuators(result: xr.Dataset) -> list[list[str]]:
         return []
     force = result["actuator_force"]
     rows = [_range(str(name), np.asarray(force.sel(actuator=name))) for name in result["actuator"].values]
-    return [["Forces of the actuators, N or N m", *_table(("", "least", "greatest"), rows)]]
+    return [["Forces of the actuators, N or N m", *table(("", "least", "greatest"), rows)]]
 
 
 def _tension(result: xr.Dataset) -> list[str]:
@@ -182,7 +124,7 @@ def _tension(result: xr.Dataset) -> list[str]:
             for distal, half in pairs
             for row in (_range(f"{distal[0]}, proximal half", half), (f"{distal[0]}, distal half", *distal[1:]))
         ]
-    return ["Tension, N", *_table(("", "least", "greatest"), rows)]
+    return ["Tension, N", *table(("", "least", "greatest"), rows)]
 
 
 def _motors(result: xr.Dataset) -> list[list[str]]:
@@ -204,7 +146,7 @@ def _motors(result: xr.Dataset) -> list[list[str]]:
     slack = slack_time(result)
     listed = ", ".join(f"{name} {time:.3g} s" for name, time in slack.items() if time > 0.0) or "none"
     head = ("", "peak A", "rms A", "peak W", "mean W")
-    return [["Motors, at their terminals", *_table(head, rows), f"  slack at the spools: {listed}"]]
+    return [["Motors, at their terminals", *table(head, rows), f"  slack at the spools: {listed}"]]
 
 
 def slack_time(result: xr.Dataset) -> dict[str, float]:
@@ -221,24 +163,14 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
 
 
 def _energy(result: xr.Dataset) -> list[str]:
-    exchanged = {
-        name.removeprefix("energy_exchanged_"): result[name]
-        for name in map(str, result)
-        if name.startswith("energy_exchanged_")
-    }
-    stored = sum(
-        _final(result[name]) - float(result[name][0])
-        for name in map(str, result)
-        if name.startswith("energy_") and name.removeprefix("energy_exchanged_") == name and name != "energy_residual"
-    )
-    supplied = [name for name in _SUPPLIES if name in exchanged]
-    supplies = [_final(exchanged[name]) for name in supplied]
-    came_in = sum(max(value, 0.0) for value in (*supplies, -stored))
-    entries = [(_label(exchanged[name]), _final(exchanged[name])) for name in supplied]
-    entries += [(_label(values), _final(values)) for name, values in exchanged.items() if name not in _SUPPLIES]
+    energies = account(result)
+    stored = sum(_final(values) - float(values[0]) for values in energies.stored.values())
+    came_in = sum(max(value, 0.0) for value in (*map(_final, energies.supplied.values()), -stored))
+    exchanged = (*energies.supplied.values(), *energies.lost.values())
+    entries = [(_label(values), _final(values)) for values in exchanged]
     entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
     rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]
-    return ["Energy, and its share of what was supplied or drawn from store", *_table(("", "mJ", "share"), rows)]
+    return ["Energy, and its share of what was supplied or drawn from store", *table(("", "mJ", "share"), rows)]
 
 
 def _convergence(result: xr.Dataset) -> list[list[str]]:
@@ -251,7 +183,7 @@ def _convergence(result: xr.Dataset) -> list[list[str]]:
         for joint, column in zip(result["joint"].values, np.nanmax(difference, axis=0), strict=True)
     ]
     verdict = textwrap.wrap(str(result.attrs["convergence"]), 80)
-    return [["Difference from the run at a tighter tolerance, rad", *_table(("", "largest"), rows), *verdict]]
+    return [["Difference from the run at a tighter tolerance, rad", *table(("", "largest"), rows), *verdict]]
 
 
 def _cost(result: xr.Dataset) -> list[str]:
@@ -287,7 +219,7 @@ def _share(value: float, total: float) -> str:
     return f"{percent:.2f} %" if percent == 0.0 or abs(percent) >= 0.01 else f"{percent:.1e} %"
 
 
-def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Return lines of aligned columns: the first to the left, numbers to the right."""
     first, *widths = (max(map(len, column)) for column in zip(header, *rows, strict=True))
     return [

@@ -42,7 +42,7 @@ def _study(name: str, quick: bool) -> dict[str, Any]:
     exact, agreement = truth(scenario)
     say(f"  {name}: truth; two methods differ by {agreement['rms']:.1e} rad")
     wanted = _TEXTBOOK.get(name, {})
-    # With contact, what is coarser is far from the target, and its energy account takes many times the run.
+    # With contact, what is coarser is far from the target.
     tolerances = _TOLERANCES if wanted else _TOLERANCES[2:]
     if quick:
         tolerances, wanted = tolerances[1::2], _QUICK_TEXTBOOK if wanted else {}

@@ -10,6 +10,7 @@ import finger_pin as fp
 from finger_pin.analysis import fingertip_loads, joint_reactions, pin_wrench
 from finger_pin.commands.application import run as run_command
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
+from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.reaction import plot_reaction
 
 FORCE = np.array([0.4, -0.7, 0.5])
@@ -199,3 +200,12 @@ def test_the_command_tells_wrong_input_in_one_line_and_writes_nothing(tmp_path, 
     error = capsys.readouterr().err.splitlines()
     assert len(error) == 2 and "fig6" in error[0] and "controller.gain" in error[1]
     assert not target.exists()
+
+
+def test_a_folder_that_cannot_be_made_is_told_after_the_first_motion(tmp_path, capsys, monkeypatch):
+    (tmp_path / "file").write_text("")
+    made = []
+    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", lambda given: made.append(given) or simulate(given))
+    settings = ["--set", "simulation.duration=0.02", "--output", str(tmp_path / "file" / "out")]
+    assert run_command("reaction", settings) == 1
+    assert "cannot be written" in capsys.readouterr().err and len(made) == 1

@@ -4,7 +4,9 @@ import csv
 
 import pytest
 
+import finger_pin as fp
 from finger_pin.commands import application
+from finger_pin.views.locking_text import summarize_locking
 
 SCRIPTS = ("conclusions", "self_locking", "force_capability")
 
@@ -91,11 +93,18 @@ def test_one_conclusion_is_written_as_figure_and_table_and_shown(run, tmp_path):
     assert run("conclusions", scenario, "--only", "a", "--output", "quiet", "--quiet") == (0, "", [])
 
 
-@pytest.mark.parametrize(
-    ("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ()), ("self_locking", ())]
-)
-def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, monkeypatch, name, arguments):
+def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_figures(run, tmp_path, monkeypatch):
     monkeypatch.setattr("finger_pin.commands.self_locking.SHARES", (0.5,))
+    scenario = tmp_path / "short.toml"
+    scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')
+    code, out, lines = run("self_locking", scenario, "--output", "out")
+    assert (code, lines) == (0, [])
+    assert out == f"{summarize_locking(fp.load_scenario(scenario))}\n\nFigures are in out\n"
+    assert {each.stem for each in (tmp_path / "out").iterdir()} == {"critical_friction", "map", "runs"}
+
+
+@pytest.mark.parametrize(("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ())])
+def test_a_folder_that_cannot_be_made_is_told_in_one_line(run, tmp_path, name, arguments):
     (tmp_path / "file").write_text("")
     scenario = tmp_path / "short.toml"
     scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')

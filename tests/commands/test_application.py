@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tomllib
+import warnings
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,14 @@ def test_what_is_raised_on_purpose_becomes_one_line_with_its_notes_and_an_exit_c
     (line,) = lines
     assert line.startswith(f"broken.py: {says}")
     assert line.endswith("; a note\\nof two lines")
+
+
+def test_a_warning_is_one_line_and_no_failure(capsys):
+    def warning():
+        warnings.simplefilter("always")
+        warnings.warn("the motion\nis sensitive", fp.ScenarioWarning, stacklevel=1)
+
+    assert told(warning, capsys) == (0, ["warning.py: warning: the motion\\nis sensitive"])
 
 
 def test_a_defect_of_the_program_is_not_told_as_a_wrong_input(capsys):

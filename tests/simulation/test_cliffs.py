@@ -70,7 +70,7 @@ def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in
     exact = fp.simulate(fp.load_scenario("fig6", tight))
     error = float(np.sqrt(np.mean((result.joint_position - exact.joint_position) ** 2)))
     assert 0.1 * error < result.attrs["estimated_error"] < 100.0 * error
-    assert "accuracy" not in result.attrs
+    assert "accuracy" not in result.attrs and "repeated" not in result.attrs
     assert "Estimated error of the joint angles" in summarize(result)
 
 
@@ -186,3 +186,35 @@ def test_an_impact_from_deep_inside_a_stiff_limiter_is_booked_to_a_hundred_thous
 def test_the_account_closes_where_a_limiter_that_would_have_to_pull_lets_go_of_a_joint_inside_it():
     # A limiter loses 0.8 J in the first millisecond, the last of it without a force: past the clamp of (2).
     assert share_left_open(fp.simulate(wild_scenario(328))) < 1e-6
+
+
+def test_a_power_that_bends_at_the_very_end_of_a_step_is_booked_to_a_millionth():
+    # A limiter lets go in the last twentieth of a step, where no node of a quadrature inside the step is.
+    result = fp.simulate(wild_scenario(1146))
+    assert share_left_open(result) < 1e-6 and "repeated" not in result.attrs
+
+
+def test_a_finger_that_exchanges_less_than_a_microjoule_closes_its_account_at_tolerances_that_it_names():
+    scenario = wild_scenario(446)
+    result = fp.simulate(scenario)
+    works = [abs(values).max() for name, values in result.items() if name.startswith("energy_exchanged_")]
+    assert 0.0 < sum(works) < 1e-6
+    assert share_left_open(result) < 1e-5
+    assert (result.attrs["rtol"], result.attrs["atol_scale"]) == (1e-7, 1e-7)
+    tighter = scenario.simulation.model_copy(update={"rtol": 1e-7, "atol_scale": 1e-7})
+    alone = fp.simulate(scenario.model_copy(update={"simulation": tighter}))
+    np.testing.assert_array_equal(result.joint_position, alone.joint_position)
+    said = " ".join(summarize(result).split())
+    assert "rtol 1e-07" in said and "repeated at rtol 1e-07: at 1e-06 the energy account closes only to" in said
+    # What it is compared with is tighter again.
+    assert fp.check_convergence(scenario, result).rtol == pytest.approx(1e-9)
+
+
+def test_the_error_of_a_repeated_run_is_its_difference_to_the_run_that_it_replaces(monkeypatch):
+    monkeypatch.setattr(accuracy, "_DOUBTED", 0.0)
+    repeated = fp.simulate(wild_scenario(446))
+    monkeypatch.setattr(accuracy, "_MOST_REPETITIONS", 0)
+    replaced = fp.simulate(wild_scenario(446))
+    assert (repeated.attrs["rtol"], replaced.attrs["rtol"]) == (1e-7, 1e-6)
+    difference = float(np.sqrt(np.mean((repeated.joint_position - replaced.joint_position) ** 2)))
+    assert repeated.attrs["estimated_error"] == pytest.approx(difference, rel=1e-9)

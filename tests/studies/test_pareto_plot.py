@@ -30,6 +30,13 @@ def test_designs_front_and_start_lie_where_they_are_and_what_breaks_a_bound_is_l
     assert axes.get_xlabel() == "long a (N)"
 
 
+def test_designs_whose_numbers_would_be_printed_over_each_other_have_one_number():
+    front = made(["a", "b"])
+    close = front.isel(sample=[1]).assign(a=front.a[[1]] + 1e-3, front=("sample", [3]))
+    _, magnified = plot_pareto(xr.concat([front, close], "sample", combine_attrs="override")).axes
+    assert [text.get_text() for text in magnified.texts] == ["1", "2"]
+
+
 def test_what_lies_far_out_is_counted_and_left_out_of_view():
     near = made(["a", "b"]).isel(sample=[0])
     far = near.copy(deep=True)

@@ -100,7 +100,8 @@ def test_what_is_typed_works_with_a_metric_of_its_own(tmp_path):
 def test_the_server_compiles_nothing_where_this_process_is_about_to(tmp_path):
     code = (
         "import os\n"
-        "from finger_pin.studies.processes import WARM, Pool\n"
+        "from finger_pin.studies.machine import WARM\n"
+        "from finger_pin.studies.processes import Pool\n"
         "with Pool(1) as pool:\n"
         "    print(list(pool.do(os.getenv, [WARM], lambda: False)))\n"
     )

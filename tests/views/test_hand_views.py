@@ -44,6 +44,19 @@ def test_figures_have_a_row_for_each_finger_or_show_one_as_a_finger(hand, draw_f
     assert len(one.axes) > len(figure.axes) / 5 and not any("little" in axes.get_ylabel() for axes in one.axes)
 
 
+def test_lines_of_fingers_that_differ_look_as_their_names_in_the_legend(hand):
+    tips = hand.sel(joint=["thumb.distal", "index.medial", "index.distal"])
+    figure = plots.plot_fig6(tips.drop_dims("tendon").assign(tendon_tension=hand.tendon_tension))
+    looks = {
+        text.get_text(): handle.get_color()
+        for text, handle in zip(figure.legends[0].get_texts(), figure.legends[0].get_lines(), strict=True)
+    }
+    assert set(looks) == {"distal", "medial"} and looks["distal"] != looks["medial"]
+    rows = [axes for axes in figure.axes if any(name in axes.get_ylabel() for name in ("thumb (°)", "index (°)"))]
+    drawn = [(line.get_label(), line.get_color()) for axes in rows for line in axes.get_lines()]
+    assert len(drawn) == 6 and all(looks[name] == colour for name, colour in drawn)
+
+
 def test_the_summary_names_every_finger(hand):
     text = summarize(hand)
     assert all(f"{name}.medial" in text and f"{name}.T5, distal half" in text for name in FINGERS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.views.summary import summarize_locking
+from finger_pin.views.locking_text import summarize_locking
 
 WORDS = {False: "it does not lock", True: "it locks"}
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-import xarray as xr
-from matplotlib.collections import PolyCollection
+from made_up import SIZES, assert_shows, columns, lines, synthetic
 from matplotlib.image import imread
 
 from finger_pin.exceptions import InputError
@@ -12,106 +11,12 @@ from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
-STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
-LOST = (
-    "tendon_coulomb",
-    "tendon_viscous",
-    "tendon_micro_damping",
-    "joint_coulomb",
-    "joint_viscous",
-    "joint_micro_damping",
-    "limiter",
-    "joint_springs",
-    "slack",
-)
 UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "supplied")
-
-
-def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
-    """A Dataset with the variables and dimensions of a result, of made-up numbers with spikes."""
-    random = np.random.default_rng(seed)
-    tendons = actuated + passive
-
-    def noise(*shape):
-        values = random.normal(size=shape)
-        values.reshape(samples, -1)[random.integers(0, samples, 3)] *= 30.0
-        return values
-
-    variables = {
-        name: (("time", "joint"), 0.01 * noise(samples, joints))
-        for name in (
-            "joint_position",
-            "joint_reference",
-            "tracking_error",
-            "joint_torque_command",
-            "joint_torque",
-            "joint_friction",
-        )
-    }
-    for name in ("tendon_command", "tendon_tension"):
-        variables[name] = (("time", "tendon"), 5.0 + noise(samples, tendons))
-    if passive == 1:
-        variables["passive_tension_proximal"] = ("time", 5.0 + noise(samples))
-    elif passive:
-        variables["passive_tension_proximal"] = (("time", "passive_tendon"), 5.0 + noise(samples, passive))
-    total = np.zeros(samples)
-    for name in STORED:
-        values = 0.0 * total if name == "limiter" else 1e-3 * np.abs(noise(samples))
-        variables[f"energy_{name}"] = ("time", values)
-        total = total + values - values[0]
-    for name in LOST:
-        values = 0.0 * total if name == "slack" else 1e-3 * np.cumsum(random.random(samples)) / samples
-        variables[f"energy_exchanged_{name}"] = ("time", values)
-        total = total + values
-    variables["energy_exchanged_actuators"] = ("time", total)
-    variables["energy_exchanged_fingertip"] = ("time", 0.0 * total)
-    variables["energy_residual"] = ("time", 1e-12 * noise(samples))
-    names = [f"T{index + 1}" for index in range(tendons)]
-    coordinates = {
-        "time": np.arange(samples) * 1e-3,
-        "joint": [f"joint_{index}" for index in range(joints)],
-        "tendon": names,
-    }
-    if passive > 1:
-        coordinates["passive_tendon"] = names[actuated:]
-    return xr.Dataset(variables, coordinates)
-
-
-SIZES = {
-    "paper": (4, 4, 1),
-    "planar": (2, 3, 0),
-    "two passive": (4, 4, 2),
-    "many": (9, 6, 3),
-}
 
 
 @pytest.fixture(scope="module", params=SIZES.values(), ids=SIZES.keys())
 def result(request):
     return synthetic(*request.param)
-
-
-def lines(axes):
-    return {line.get_label(): line for line in axes.get_lines()}
-
-
-def columns(figure):
-    """Panels of the left and the right column of a figure, each from the top."""
-    panels = sorted(figure.axes, key=lambda axes: (round(axes.get_position().x0, 3), -axes.get_position().y0))
-    first = round(panels[0].get_position().x0, 3)
-    left = [axes for axes in panels if round(axes.get_position().x0, 3) == first]
-    return left, panels[len(left) :]
-
-
-def assert_shows(line, time, values):
-    """Every point of the line is a sample, and the ends and extremes of every short window are among them."""
-    x, y = line.get_data()
-    kept = np.searchsorted(time, x)
-    np.testing.assert_array_equal(time[kept], x)
-    np.testing.assert_allclose(y, values[kept], rtol=1e-12)
-    assert kept[0] == 0 and kept[-1] == len(time) - 1
-    assert np.all(np.diff(kept) > 0)
-    assert y.max() == pytest.approx(values.max(), rel=1e-12)
-    assert y.min() == pytest.approx(values.min(), rel=1e-12)
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 2 * BINS, 2 * BINS + 1, 5001, 8001, 20000])
@@ -198,29 +103,6 @@ def test_losses_show_forces_and_torques_before_and_after_friction(result):
         assert_shows(drawn["of the tendons"], time, 1e3 * joint["joint_torque"].values)
         net = 1e3 * (joint["joint_torque"] - joint["joint_friction"]).values
         assert_shows(drawn["after joint friction"], time, net)
-
-
-def test_energy_shows_what_is_stored_supplied_and_lost(result):
-    left, (balance, residual) = columns(plots.plot_energy(result))
-    time = result["time"].values
-    shown = [name for name in STORED if np.any(result[f"energy_{name}"])]
-    assert "limiter" not in shown and len(left) == len(shown)
-    for axes, name in zip(left, shown, strict=True):
-        assert_shows(axes.get_lines()[0], time, 1e3 * result[f"energy_{name}"].values)
-    supplied = result["energy_exchanged_actuators"].values
-    assert_shows(lines(balance)["supplied"], time, 1e3 * supplied)
-    # Every loss lies on those before it. The made-up account closes, so the stored energy on top of them all ends where
-    # the supplied energy does.
-    areas = {each.get_label(): each for each in balance.collections if isinstance(each, PolyCollection)}
-    level = np.cumsum([result[f"energy_exchanged_{name}"].values[-1] for name in LOST if name != "slack"])
-    assert len(areas) == len(level) + 1
-    for area, height in zip(areas.values(), [*level, supplied[-1]], strict=True):
-        x, y = area.get_paths()[0].vertices.T
-        assert np.isclose(y[x == time[-1]], 1e3 * height).any()
-    assert "tensions cut at zero" not in areas and list(areas)[-1] == "change of stored energy"
-    assert residual.get_yscale() == "log"
-    worst = np.abs(result["energy_residual"].values).max() / np.abs(supplied).max()
-    assert residual.get_lines()[0].get_ydata().max() == pytest.approx(worst)
 
 
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])

@@ -31,13 +31,15 @@ def plot_contact(result: xr.Dataset) -> Figure:
     below = ["sliding (mm/s)"] + (["moved (mm)"] if "object_position" in result else [])
     figure = new_figure(12.0, max(6.4, 1.5 * len(shown)))
     panels = stack(figure, 0.0, 6.4, [labelled(name, "N") for name in shown] or ["force (N)"])
-    title(panels[0], "(a) contact forces" if shown else "(a) contact forces: nothing ever touched")
+    closed = int((result["contact_normal_force"].max("time") > 0.0).sum())
+    note = f": the {len(shown)} of {closed} that push hardest" if len(shown) < closed else ""
+    title(panels[0], f"(a) contact forces{note}" if shown else "(a) contact forces: nothing ever touched")
     cone, *others = _right(figure, below)
     for index, (axes, name) in enumerate(zip(panels, shown, strict=False)):
         contact = result.sel(contact=name)
         time = result["time"].values
         level = contact["contact_level"].values
-        shade(axes, time, np.zeros(len(time)), level, color=SKY, alpha=0.35, label="friction can be")
+        shade(axes, time, np.zeros(len(time)), level, color=SKY, alpha=0.35, label="most that friction can be")
         trace(axes, time, contact["contact_normal_force"].values, label="normal force", color=BLUE, linewidth=1.1)
         trace(axes, time, contact["contact_friction"].values, label="friction", color=VERMILLION, linewidth=1.1)
         style = series(index)
@@ -45,6 +47,7 @@ def plot_contact(result: xr.Dataset) -> Figure:
         trace(others[0], time, _MILLI * contact["contact_slip"].values, label=name, linewidth=0.8, **style)
     if shown:
         legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=3)
+        cone.lines[-1].set_label("most that friction can be")
         cone.legend(loc="upper left")
     title(others[0], "(c) speed of sliding")
     if len(others) > 1:

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.views.account import account
 from finger_pin.views.plots.lines import shade, trace
 from finger_pin.views.plots.panels import labelled, logarithmic, stack, title
 from finger_pin.views.plots.style import (
@@ -35,6 +36,9 @@ _STORED = {
     "passive_tendon": "passive tendons",
     "limiter": "limiters",
     "joint_springs": "joints' springs",
+    "tendon_spring": "tendons' springs",
+    "tendon_limit": "tendons' limits",
+    "coupling": "couplings",
     "tendon_bristles": "tendon bristles",
     "joint_bristles": "joint bristles",
     "contacts": "contacts",
@@ -44,7 +48,6 @@ _STORED = {
     "elastic_tendons": "tendons on spools",
     "gearboxes": "gear bristles",
 }
-_SUPPLIED = ("actuators", "electrical", "fingertip", "palm", "objects")
 _LOST = {
     "tendon_coulomb": ("tendons sliding", VERMILLION),
     "tendon_viscous": ("tendons viscous", ORANGE),
@@ -62,7 +65,13 @@ _LOST = {
     "gearbox_coulomb": ("gears sliding", "slategrey"),
     "gearbox_viscous": ("gears viscous", "lightsteelblue"),
     "elastic_damping": ("tendons stretching", "olive"),
+    "tendon_spring_damping": ("tendons' dampers", "yellowgreen"),
+    "tendon_limit_limiter": ("tendons' limits", "darkolivegreen"),
+    "tendon_dry_friction_coulomb": ("tendons sliding dry", "sienna"),
+    "coupling_damping": ("couplings", "mediumpurple"),
 }
+#: Of what has no colour of its own: rows that a user has added.
+_OTHER = "rosybrown"
 _MILLI = 1e3
 
 
@@ -78,33 +87,37 @@ def plot_energy(result: xr.Dataset) -> Figure:
         result: Dataset of `simulate`, of any finger.
     """
     time = result["time"].values
-    stored = {name: result[f"energy_{name}"].values for name in _STORED if f"energy_{name}" in result}
+    energies = account(result)
+    order = sorted(energies.stored, key=[*_STORED, *energies.stored].index)
+    stored = {name: energies.stored[name].values for name in order}
     shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
-    given = [result.get(f"energy_exchanged_{name}") for name in _SUPPLIED]
-    supplied = np.asarray(sum(each.values for each in given if each is not None))
+    supplied = np.sum([each.values for each in energies.supplied.values()], axis=0)
     figure = new_figure(11.0, max(6.6, 1.35 * len(shown)))
-    strips = stack(figure, 0.0, 5.0, [labelled(_STORED[name], "mJ") for name in shown], bottom=0.5)
+    strips = stack(figure, 0.0, 5.0, [labelled(_STORED.get(name, name), "mJ") for name in shown], bottom=0.5)
     title(strips[0], "(a) stored energy")
     for axes, values in zip(strips, shown.values(), strict=True):
         trace(axes, time, _MILLI * values, color=BLUE, linewidth=1.1)
     labels = ["energy (mJ)", "|residual| / supplied"]
     above, below = stack(figure, 5.1, 10.8, labels, heights=[2.2, 1.0], gap=0.4, bottom=0.5)
-    _balance(above, result, supplied, np.asarray(sum(stored.values())))
+    lost = {name: each.values for name, each in energies.lost.items()}
+    _balance(above, time, supplied, lost, np.asarray(sum(stored.values())))
     _residual(below, result, supplied)
     return figure
 
 
-def _balance(axes: Axes, result: xr.Dataset, supplied: Array, stored: Array) -> None:
-    time = result["time"].values
+def _balance(axes: Axes, time: Array, supplied: Array, lost: dict[str, Array], stored: Array) -> None:
     level = np.zeros(len(time))
-    for name, (label, colour) in _LOST.items():
-        lost = f"energy_exchanged_{name}"
-        if lost in result and np.any(result[lost].values):
-            above = level + _MILLI * result[lost].values
+    for name in sorted(lost, key=[*_LOST, *lost].index):
+        label, colour = _LOST.get(name, (name.replace("_", " "), _OTHER))
+        if np.any(lost[name]):
+            above = level + _MILLI * lost[name]
             shade(axes, time, level, above, color=colour, alpha=0.8, label=label)
             level = above
     change = _MILLI * (stored - stored[0])
-    shade(axes, time, level, level + change, color=GREY, alpha=0.35, label="change of stored energy")
+    shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
+    if np.min(change) < 0.0:
+        taken = {"facecolor": "none", "edgecolor": BLACK, "hatch": "////", "alpha": 0.5}
+        shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **taken)
     trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=1.6)
     if axes.dataLim.y0 >= 0.0:
         axes.set_ylim(bottom=0.0)

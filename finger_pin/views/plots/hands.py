@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, trace
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 #: A column of such a figure: its title, variable, factor and unit.
 Column = tuple[str, str, float, str]
 _HEIGHT, _WIDTH = 1.5, 4.6
+_KINDS = ("joint", "tendon")
 
 
 def fingers_of(result: xr.Dataset) -> list[str]:
@@ -55,22 +56,28 @@ def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
 def plot_by_finger(result: xr.Dataset, columns: Sequence[Column]) -> Figure:
     """Draw variables of joints or tendons of a hand: a row for each finger, a column for each variable."""
     parts = {name: finger_of(result, name) for name in fingers_of(result)}
-    figure = new_figure(0.3 + _WIDTH * len(columns), 1.2 + _HEIGHT * len(parts))
+    # Fingers may differ: the same name has the same look in all rows, and another name another one.
+    looks = {kind: dict.fromkeys(name for part in parts.values() for name in names(part, kind)) for kind in _KINDS}
+    most = max(map(len, looks.values()))
+    width = 5 if most <= 5 else 4
+    bottom = 0.9 + 0.2 * ((most - 1) // width)
+    figure = new_figure(0.3 + _WIDTH * len(columns), 0.3 + bottom + _HEIGHT * len(parts))
     for index, (text, variable, factor, unit) in enumerate(columns):
         left = 0.1 + _WIDTH * index
         labels = [labelled(name, unit) for name in parts]
-        panels = stack(figure, left, left + _WIDTH - 0.15, labels, bottom=0.9)
+        panels = stack(figure, left, left + _WIDTH - 0.15, labels, bottom=bottom)
         title(panels[0], f"({'abcdef'[index]}) {text}")
+        kind = next(each for each in _KINDS if each in result[variable].dims)
+        lines: dict[str, Line2D] = {}
         for axes, part in zip(panels, parts.values(), strict=True):
-            _lines(axes, part, variable, factor)
-        longest = max(panels, key=lambda axes: len(axes.get_lines()))
-        legend(panels[-1], longest.get_lines(), columns=5)
+            lines |= _lines(axes, part, kind, list(looks[kind]), factor * part[variable].transpose("time", kind).values)
+        legend(panels[-1], [lines[name] for name in looks[kind]], columns=width)
     return figure
 
 
-def _lines(axes: Axes, part: xr.Dataset, variable: str, factor: float) -> None:
-    dimension = "joint" if "joint" in part[variable].dims else "tendon"
-    time, values = part["time"].values, factor * part[variable].transpose("time", dimension).values
-    for index, name in enumerate(names(part, dimension)):
-        column: Array = np.asarray(values[:, index])
-        trace(axes, time, column, label=name, **series(index))
+def _lines(axes: Axes, part: xr.Dataset, kind: str, looks: list[str], values: Array) -> dict[str, Line2D]:
+    time = part["time"].values
+    return {
+        name: trace(axes, time, column, label=name, **series(looks.index(name)))
+        for name, column in zip(names(part, kind), values.T, strict=True)
+    }

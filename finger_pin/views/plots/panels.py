@@ -84,7 +84,7 @@ def legend(axes: Axes, handles: Sequence[Artist], columns: int) -> None:
     assert figure is not None
     box = axes.get_position()
     figure.legend(
-        handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2,
+        handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2, frameon=False,
         loc="lower center", bbox_to_anchor=(0.5 * (box.x0 - _LABELS / figure.get_figwidth() + box.x1), 0.0),
     )  # fmt: skip
 

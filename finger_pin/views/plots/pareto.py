@@ -15,8 +15,8 @@ from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figu
 
 # Percentiles of the designs that are in view whatever they are, and the room around them, in shares of their span.
 _IN_VIEW, _ROOM = (0.0, 95.0), 0.08
-# Of more designs on a front than this not all are numbered.
-_NUMBERED = 16
+# Designs of a front that are nearer to one with a number than this have none, in parts of the panel.
+_APART = (0.035, 0.04)
 
 
 @styled
@@ -92,12 +92,15 @@ def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: s
     falls = second in result.attrs["minimise"].split(", ")
     close.step(x[order], y[order], where="post" if falls else "pre", color=VERMILLION, linewidth=1.0, alpha=0.6)
     close.plot(x[order], y[order], "o", color=VERMILLION, markersize=5.0)
-    every = -(-len(order) // _NUMBERED)
-    for row in order[::every]:
-        close.annotate(str(front[row]), (x[row], y[row]), xytext=(5, 4), textcoords="offset points", fontsize=8.5)
     for values, limit in ((x[order], close.set_xlim), (y[order], close.set_ylim)):
         span = np.ptp(values) or 0.02 * abs(values[0]) or 1.0
         limit(values.min() - 0.35 * span, values.max() + 0.35 * span)
+    numbered: list[np.ndarray] = []
+    for row in order:
+        at = close.transAxes.inverted().transform(close.transData.transform((x[row], y[row])))
+        if all(np.any(np.abs(at - other) > _APART) for other in numbered):
+            numbered.append(at)
+            close.annotate(str(front[row]), (x[row], y[row]), xytext=(5, 4), textcoords="offset points", fontsize=8.5)
     close.set_title(f"the front: {len(order)} designs")
     close.xaxis.set_major_locator(MaxNLocator(6))
     whole.indicate_inset(

@@ -15,7 +15,7 @@ from finger_pin.views.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, 
 
 # Signed: what micro-damping or a slack tendon gives back is no more than rounding here.
 _LOST = {
-    "heat in windings": (("motor_heat",), VERMILLION),
+    "windings": (("motor_heat",), VERMILLION),
     "gears": (("gearbox_coulomb", "gearbox_viscous"), ORANGE),
     "tendons": (("elastic_damping", "tendon_coulomb", "tendon_viscous"), SKY),
     "joints": (("joint_coulomb", "joint_viscous", "joint_springs", "limiter"), GREEN),
@@ -99,4 +99,4 @@ def _power(axes: Axes, result: xr.Dataset) -> None:
     trace(axes, time, result["power_electrical"].values, label="electrical", color=BLACK, linewidth=1.0)
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     title(axes, "(d) electrical power, and where it goes")
-    axes.legend(loc="upper right", ncols=2)
+    legend(axes, axes.get_legend_handles_labels()[0], columns=5)

@@ -40,7 +40,11 @@ STYLE: Any = {
     "grid.linewidth": 0.7,
     "lines.linewidth": 1.4,
     "lines.solid_joinstyle": "round",
-    "legend.frameon": False,
+    # What a legend covers shows through; its text can be read.
+    "legend.facecolor": "white",
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.85,
+    "legend.fancybox": False,
     "legend.fontsize": 9.5,
     "legend.handlelength": 1.8,
     "xtick.labelsize": 9.5,
@@ -50,7 +54,7 @@ STYLE: Any = {
     "xtick.labelcolor": "black",
     "ytick.labelcolor": "black",
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.limits": (-4, 4),
     # Parsing mathematical text takes a third of the time of a drawing; plain text has superscripts too.
     "axes.formatter.use_mathtext": False,
     "mathtext.fontset": "dejavusans",

@@ -1,0 +1,52 @@
+"""The figure of the energy account, from made-up results of fingers of several sizes."""
+
+import numpy as np
+import pytest
+from made_up import LOST, SIZES, STORED, assert_shows, columns, lines, synthetic
+from matplotlib.collections import PolyCollection
+
+from finger_pin.views import plots
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+def test_energy_shows_what_is_stored_supplied_and_lost(size):
+    result = synthetic(*size)
+    left, (balance, residual) = columns(plots.plot_energy(result))
+    time = result["time"].values
+    shown = [name for name in STORED if np.any(result[f"energy_{name}"])]
+    assert "limiter" not in shown and len(left) == len(shown)
+    for axes, name in zip(left, shown, strict=True):
+        assert_shows(axes.get_lines()[0], time, 1e3 * result[f"energy_{name}"].values)
+    supplied = result["energy_exchanged_actuators"].values
+    assert_shows(lines(balance)["supplied"], time, 1e3 * supplied)
+    # Every loss lies on those before it; what was put into store is on top, and ends where the supplied energy does.
+    areas = {each.get_label(): each for each in balance.collections if isinstance(each, PolyCollection)}
+    level = np.cumsum([result[f"energy_exchanged_{name}"].values[-1] for name in LOST if name != "slack"])
+    # Where less is supplied than lost, the rest comes from the store.
+    x, y = areas.pop("taken from store").get_paths()[0].vertices.T
+    least = np.argmin(result[[f"energy_{name}" for name in STORED]].to_array().sum("variable").values)
+    assert y[x == time[least]].min() == pytest.approx(1e3 * supplied[least])
+    assert len(areas) == len(level) + 1
+    for area, height in zip(areas.values(), [*level, max(level[-1], supplied[-1])], strict=True):
+        x, y = area.get_paths()[0].vertices.T
+        assert np.isclose(y[x == time[-1]], 1e3 * height).any()
+    assert "tensions cut at zero" not in areas and list(areas)[-1] == "put into store"
+    assert residual.get_yscale() == "log"
+    worst = np.abs(result["energy_residual"].values).max() / np.abs(supplied).max()
+    assert residual.get_lines()[0].get_ydata().max() == pytest.approx(worst)
+
+
+def test_what_rows_of_ones_own_store_lose_and_supply_is_in_the_account():
+    result, bare = synthetic(), synthetic()
+    own = 1e-2 * np.linspace(0.0, 1.0, result.sizes["time"])
+    result["energy_band"] = "time", own
+    result["energy_exchanged_band_damping"] = "time", own, {"long_name": "energy lost in band_damping"}
+    result["energy_exchanged_band_pump"] = "time", 2.0 * own, {"long_name": "energy supplied by band_pump"}
+    left, (balance, _) = columns(plots.plot_energy(result))
+    assert_shows(
+        next(axes for axes in left if "band" in axes.get_ylabel()).get_lines()[0], result.time.values, 1e3 * own
+    )
+    assert "band damping" in [each.get_label() for each in balance.collections]
+    _, (before, _) = columns(plots.plot_energy(bare))
+    added = lines(balance)["supplied"].get_ydata()[-1] - lines(before)["supplied"].get_ydata()[-1]
+    assert added == pytest.approx(2e3 * own[-1])
