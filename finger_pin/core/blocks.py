@@ -128,9 +128,13 @@ def _join(tables: Any, work: Any, blocks: Any) -> None:
 
 
 @compiled
-def partition(tables: Any, work: Any, blocks: Any) -> None:
-    """Find the blocks of a step, after the slopes of all laws."""
+def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
+    """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
     paths = tables.paths
+    for index in range(blocks.touch_start[blocks.number[0]]):
+        for k in range(blocks.touches[index], blocks.touches[index] + 3):
+            for c in range(gain.shape[1]):
+                gain[k, c] = 0.0
     _join(tables, work, blocks)
     coordinates = rows = touches = states = 0
     for s in range(blocks.loose.size):

@@ -17,7 +17,8 @@ from finger_pin.core.stepper import in_threads
 from finger_pin.core.tables import build_tables
 from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.evaluation import Evaluation
+from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.evaluation import Evaluation, Touching
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
@@ -41,13 +42,14 @@ class Room(NamedTuple):
     torques: Array
     externals: Array
     booked: Array
+    touches: Array
 
     def part(self, at: slice) -> Room:
         """Return the room of some of the states, the same memory."""
         first = self.first + at.indices(len(self.packed))[0]
-        own = (self.packed, self.rates, self.torques, self.externals, self.booked)
-        packed, rates, torques, externals, booked = (values[at] for values in own)
-        return Room(packed, rates, self.rows, first, torques, externals, booked)
+        own = (self.packed, self.rates, self.torques, self.externals, self.booked, self.touches)
+        packed, rates, torques, externals, booked, touches = (values[at] for values in own)
+        return Room(packed, rates, self.rows, first, torques, externals, booked, touches)
 
 
 class CompiledMechanism:
@@ -91,6 +93,7 @@ class CompiledMechanism:
             torques=np.zeros((count, width)),
             externals=np.zeros((count, width)),
             booked=np.zeros((count, len(mechanism.books.stored) + len(mechanism.books.powers))),
+            touches=np.zeros((kept, self._tables.touching // CONTACT.arms, 9)),
         )
 
     def found(self, room: Room, at: slice | int = slice(None)) -> Evaluation:
@@ -126,6 +129,7 @@ class CompiledMechanism:
             rate[at],
             base_power=room.booked[at][..., -1:] if mechanism.moved else None,
             booked=room.booked[at],
+            touching=Touching(*np.split(room.touches[at], 3, axis=-1)) if room.touches.size else None,
         )
 
     def powers(
@@ -155,7 +159,7 @@ class CompiledMechanism:
         def fill(model: BoundModel, part: slice) -> None:
             own = room.part(part)
             filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
-            given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part])
+            given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part], own.touches)
             call(evaluate_many, States(model.address, *given), STATES)
 
         if count < _FEW:

@@ -103,19 +103,21 @@ class _Steps:
         times, record = self.times, self.record
         if len(times) == 1:
             return np.repeat(self.start[None], len(at), axis=0), np.repeat(self.attitude[None], len(at), axis=0)
-        begins = np.concatenate([self.start[None], record.states[:-1]])
-        attitudes = np.concatenate([self.attitude[None], record.attitudes[:-1]])
+        step = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+        # Only the steps that are asked for: there may be hundreds of thousands.
+        first = step == 0
+        begins = np.where(first[:, None], self.start, record.states[step - 1])
+        attitudes = np.where(first[:, None, None], self.attitude, record.attitudes[step - 1])
         width = (len(self.part.tables.parents)) + len(self.part.tables.lumps)
         for i in self.part.tables.charts:
-            angles, rates = slice(i, i + 3), slice(width + i, width + i + 3)
-            begins[1:, rates] = angular_velocity(begins[1:, angles], begins[1:, rates])
-            begins[1:, angles] = 0.0
-        step = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+            angles, rates, later = slice(i, i + 3), slice(width + i, width + i + 3), ~first
+            begins[later, rates] = angular_velocity(begins[later, angles], begins[later, rates])
+            begins[later, angles] = 0.0
         s = ((at - times[step]) / (times[step + 1] - times[step]))[:, None]
         bend = record.dense[step, -1]
         for row in range(record.dense.shape[1] - 2, -1, -1):
             bend = record.dense[step, row] + s * bend
-        return (1.0 - s) * begins[step] + s * (record.states[step] + (1.0 - s) * bend), attitudes[step]
+        return (1.0 - s) * begins + s * (record.states[step] + (1.0 - s) * bend), attitudes
 
 
 def integrate_compiled(

@@ -131,7 +131,7 @@ def _turn(address: int, _time: float) -> int:
     tables, work, width = model.tables, model.work, model.work.torque.size
     path_derivatives.linearise_paths(tables, model.state[width : 2 * width], work, model.linear)
     if tables.touching:
-        blocks.partition(tables, work, model.linear.blocks)
+        blocks.partition(tables, work, model.linear.blocks, model.linear.gain)
     return 1
 
 

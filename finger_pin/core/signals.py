@@ -10,8 +10,9 @@ from finger_pin.core.binding import Kind, Layers, Matrix, Vector, bound_at, call
 from finger_pin.core.broad_phase import settle, wake
 from finger_pin.core.charts import place_bodies
 from finger_pin.core.compilation import Unit, compiled
-from finger_pin.core.law_code import call_filling
+from finger_pin.core.law_code import FORCE, call_filling
 from finger_pin.core.model import MODEL
+from finger_pin.core.paths import turn_out
 from finger_pin.core.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.tables import END, FIRST
 
@@ -34,6 +35,8 @@ class States(NamedTuple):
         bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
             (m, 15 + g), or (0, 15 + g) at rest.
         attitudes: Quaternions of free bodies, shape (m, f, 4).
+        touches: Filled with what contacts do in space, forces, points and normals, shape (m, contacts, 9), or
+            (0, contacts, 9).
     """
 
     model: int
@@ -48,6 +51,7 @@ class States(NamedTuple):
     booked: Matrix
     bases: Matrix
     attitudes: Layers
+    touches: Layers
 
 
 class Motions(NamedTuple):
@@ -115,6 +119,25 @@ def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: An
                 work.paths.asleep[each] = 0
 
 
+@compiled
+def _touch(paths: Any, work: Any, out: Any) -> None:
+    """Fill the forces of contacts on the second body, the points, and the normals; zero where they are open."""
+    own = work.paths
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
+        k = paths.row[e]
+        if work.rows[FORCE, k] == 0.0:
+            continue
+        # Contacts come before all other rows.
+        touch = out[k // 3]
+        turn_out(own.frame[e], own.out[e], 4, touch[3:6])
+        for r in range(3):
+            touch[3 + r] += own.origin[e, r]
+            touch[6 + r] = own.wrench[e, 0, 3 + r]
+            for i in range(3):
+                touch[r] -= work.rows[FORCE, k + i] * own.wrench[e, i, 3 + r]
+
+
 @Unit
 def evaluate_many(address: int, _time: float) -> int:
     """Evaluate the `States` at an address."""
@@ -163,6 +186,8 @@ def evaluate_many(address: int, _time: float) -> int:
             for c in range(rows.shape[0]):
                 for k in range(rows.shape[2]):
                     rows[c, first + m, k] = work.rows[c, k]
+            if tables.touching:
+                _touch(tables.paths, work, many.touches[m])
         for j in range(torques.shape[1]):
             torques[m, j] = work.torque[j]
             externals[m, j] = work.external[j]

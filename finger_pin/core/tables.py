@@ -1,4 +1,4 @@
-"""A mechanism as plain arrays, for the compiled core: bodies, rows, tips, and the memory to work in."""
+"""A mechanism as plain arrays, for the compiled core: bodies, rows and tips."""
 
 from __future__ import annotations
 

@@ -42,6 +42,21 @@ class Books:
 
 
 @dataclass(frozen=True, eq=False)
+class Touching:
+    """What contacts do in space, base frame; zero where they are open. Shapes (..., c, 3).
+
+    Attributes:
+        force: On the second body of the pair, N.
+        point: Midway between the surfaces, m.
+        normal: Unit vector from the second body towards the first.
+    """
+
+    force: Array
+    point: Array
+    normal: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Everything at one state or at many; leading dimensions are kept.
 
@@ -55,6 +70,7 @@ class Evaluation:
         base_power: That of a base that moves, shape (..., 1), W.
         guided_power: That of what moves coordinates along paths, shape (...,), W.
         booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
+        touching: What contacts do in space, where it is known.
     """
 
     books: Books
@@ -66,6 +82,7 @@ class Evaluation:
     base_power: Array | None = None
     guided_power: Array | None = None
     booked: Array | None = None
+    touching: Touching | None = None
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return the energies that the rows store, J, and their powers, W, by name; shapes (...,)."""

@@ -14,6 +14,7 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.contacts import add_free_objects, check_start, contact_rows, finger_solids, object_solids
+from finger_pin.mechanism.evaluation import Touching
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -21,21 +22,6 @@ from finger_pin.mechanism.rows import Rows
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
-
-
-@dataclass(frozen=True, eq=False)
-class Touching:
-    """What contacts do in space, base frame; zero where they are open. Shapes (m, c, 3).
-
-    Attributes:
-        force: On the second body of the pair, N.
-        point: Midway between the surfaces, m.
-        normal: Unit vector from the second body towards the first.
-    """
-
-    force: Array
-    point: Array
-    normal: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,8 +108,8 @@ def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
     loop, ends, states = part
     begin, length, found = ends[steps], np.diff(ends)[steps], []
     for _ in range(_HALVINGS):
-        parts = [slice(first, first + _CHUNK) for first in range(0, len(begin), _CHUNK)]
-        errors = [_quadrature_error(loop, begin[part], length[part], states) for part in parts]
+        chunks = [slice(first, first + _CHUNK) for first in range(0, len(begin), _CHUNK)]
+        errors = [_quadrature_error(loop, begin[chunk], length[chunk], states) for chunk in chunks]
         bent = np.concatenate([np.zeros(0), *errors]) > allowed
         begin, length = begin[bent], 0.5 * length[bent]
         found.append(begin + length)

@@ -30,14 +30,14 @@ _TIGHTER = 10.0
 # Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
 # is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
-# The repetition stops after so many times the run's looks at it, or so many at most: at a tighter tolerance it may be
-# far slower, and a motion that takes so many steps shows early how sensitive it is.
-_PATIENCE, _MOST_LOOKS = 2, 1200
+# The repetition stops after so many times the run's looks at it and a few more, or so many at most: at a tighter
+# tolerance it may be far slower, and a motion that takes so many steps shows early how sensitive it is.
+_PATIENCE, _FEW, _MOST_LOOKS = 2, 8, 1200
 # The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
 _OPEN, _ROUNDING = 1e-4, 1e-13
 # A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
-# most, and not if it took more steps.
-_CLOSED, _WELL_CLOSED = 10.0, 1e-5
+# most, not if it took more steps, and only as long as a repetition leaves less than a share of that open.
+_CLOSED, _WELL_CLOSED, _HELPS = 10.0, 1e-5, 0.5
 _MOST_REPETITIONS, _MOST_STEPS = 3, 200_000
 _TOLERANCES = ("rtol", "atol_scale")
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
@@ -101,12 +101,16 @@ def close_account(
         if other.failure or other.interrupted:
             break
         result = recorded(other)
+        left = left_open(result)
+        if not left < max(limit, _HELPS * run.left):
+            # A power that is booked wrong, say.
+            break
         result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
         result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
-            f"{first.left:.1g} of the energy exchanged"
+            f"{first.left:.2g} of the energy exchanged"
         )
-        run = Run(tighter, other, result, left_open(result), run.trajectory)
+        run = Run(tighter, other, result, left, run.trajectory)
     return run
 
 
@@ -136,6 +140,9 @@ def estimate_error(
         other, rtol = repeated(tighter, _patient(trajectory, _MOST_LOOKS)), tighter.simulation.rtol
     times = scenario.sample_times()
     times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
+    if len(times) < 2:
+        # It was stopped before it could say anything.
+        return error, ""
     difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]
     error = float(np.sqrt(np.mean(difference**2)))
     if error <= expected:
@@ -155,7 +162,7 @@ def _tightened(scenario: Scenario) -> Scenario:
 
 def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
     """Return what asks to stop after more looks than a trajectory took, or so many at most."""
-    looks, most = count(), min(_PATIENCE * (1 + trajectory.statistics.steps // CHUNK), most)
+    looks, most = count(), min(_PATIENCE * (_FEW + trajectory.statistics.steps // CHUNK), most)
     return lambda: next(looks) >= most
 
 

@@ -33,7 +33,7 @@ def contact_variables(finger: Finger, signals: FingerSignals) -> Variables:
     found = signals.mechanism.rows[around.contacts.group]
     touch, arms = found.row, CONTACT.arms
     assert isinstance(touch, Touch)
-    space = around.touching(state.position, state.object_pose, found.force)
+    space = signals.mechanism.touching or around.touching(state.position, state.object_pose, found.force)
     friction = np.hypot(found.force[:, 1::arms], found.force[:, 2::arms])
     text = "distance of the surfaces, negative where they penetrate; far apart, no more than it"
     table = {

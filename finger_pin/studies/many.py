@@ -6,12 +6,13 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
-from finger_pin.description.loading import to_toml
+from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, ScenarioWarning, SelfLockingWarning, StudyError
 from finger_pin.simulation.simulate import simulate
@@ -22,7 +23,7 @@ _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time"
 
 
 def simulate_many(
-    scenarios: Iterable[Scenario],
+    scenarios: Iterable[Scenario | str | Path],
     *,
     workers: int | None = None,
     variables: Sequence[str] | None = None,
@@ -34,7 +35,8 @@ def simulate_many(
     start, the next ones.
 
     Args:
-        scenarios: Scenarios whose fingers have the same joints and tendons, with the same sample times.
+        scenarios: Scenarios, or what `load_scenario` takes, whose fingers have the same joints and tendons, with the
+            same sample times.
         workers: Number of processes; by default one per core that this process may use.
         variables: Names of the variables to keep; all by default. Fewer need less memory.
         progress: Called with the numbers of finished and of all runs.
@@ -50,7 +52,7 @@ def simulate_many(
     Warns:
         SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
     """
-    runs = list(scenarios)
+    runs = [each if isinstance(each, Scenario) else load_scenario(each) for each in scenarios]
     if not runs:
         raise InputError("scenarios", "at least one is needed")
     _check_alike(runs)

@@ -93,8 +93,19 @@ def pushes(time, position):
     return PULL if time < 0.01 else -PULL
 
 
-@pytest.mark.parametrize("method", ["Rodas5P", "BDF", "LSODA", "sampled"])
-@pytest.mark.parametrize(("answer", "said"), [(divides, "ZeroDivisionError"), (pushes, "that of T1 is not")])
+def loses(time, position):
+    return PULL if time < 0.01 else np.nan * PULL
+
+
+@pytest.mark.parametrize("method", ["Rodas5P", "LSODA", "sampled"])
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (divides, "ZeroDivisionError"),
+        (pushes, "that of T1 is not"),
+        (loses, "nan: tensions must be finite"),
+    ],
+)
 def test_what_goes_wrong_later_ends_the_run_there_says_so_and_keeps_what_was_computed(method, answer, said):
     settings = {"simulation.method": "Rodas5P" if method == "sampled" else method}
     period = 1e-3 if method == "sampled" else None

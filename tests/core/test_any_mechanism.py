@@ -21,11 +21,12 @@ SEEDS = range(10)
 
 @pytest.fixture(scope="module", params=SEEDS)
 def drawn(request):
-    """A mechanism, its generator, inputs and forces at its tips; without forces for every third."""
+    """A mechanism, inputs, forces at its tips, without forces for every third, and states: few, and many."""
     rng = np.random.default_rng(request.param)
     mechanism = random_mechanism(rng)
     force = rng.normal(size=(len(mechanism.body.tips), 3)) * (request.param % 3 != 0)
-    return mechanism, rng, rng.uniform(-0.5, 3.0, mechanism.channels), force
+    command = rng.uniform(-0.5, 3.0, mechanism.channels)
+    return mechanism, command, force, [random_states(mechanism, rng, count) for count in (8, 40)]
 
 
 def assert_same(found, expected, mechanism, tolerance=1e-12):
@@ -52,8 +53,7 @@ def assert_same(found, expected, mechanism, tolerance=1e-12):
 
 
 def test_the_compiled_evaluation_is_the_readable_one(drawn):
-    mechanism, rng, command, force = drawn
-    x = random_states(mechanism, rng, 40)
+    mechanism, command, force, (_, x) = drawn
     compiled = CompiledMechanism(mechanism)
     assert_same(compiled.evaluate(x, command, force), mechanism.evaluate(x, command, force), mechanism)
     assert_same(compiled.evaluate(x, command), mechanism.evaluate(x, command), mechanism)
@@ -82,10 +82,9 @@ def jacobian(mechanism, x, command, force):
 @pytest.fixture(scope="module")
 def linearised(drawn):
     """States with their Jacobians by differences, and what is compiled."""
-    mechanism, rng, command, force = drawn
+    mechanism, command, force, (states, _) = drawn
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
-    states = random_states(mechanism, rng, 8)
     found = [(x, jacobian(mechanism, x, command, force)) for x in states]
     return Bound(mechanism, control, force), [each for each in found if each[1] is not None]
 

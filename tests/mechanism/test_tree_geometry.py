@@ -79,3 +79,16 @@ def test_what_falls_out_of_a_hand_leaves_the_view():
     falling[1, list(description.joints).index("OBJTz")] = -20.0
     seen = [np.array(scene.header("", each, 1.0, live=False)["inView"]) for each in (still, falling)]
     assert np.ptp(seen[1], axis=0) == pytest.approx(np.ptp(seen[0], axis=0), abs=0.02)
+
+
+@pytest.mark.parametrize(("axis", "gravity", "up"), [((0, 1, 0), (0, 0, -9.81), 2), ((0, 0, -1), (0, -9.81, 0), 1)])
+def test_a_hinge_is_looked_at_along_its_axis_with_what_weighs_below_on_a_grid_of_its_size(axis, gravity, up):
+    """The frames of all joints of a model are alike: it is the axis that counts."""
+    numbers = [" ".join(map(str, each)) for each in (axis, gravity)]
+    text = """<mujoco><option gravity="{1}"/><worldbody><site name="a" pos="-0.03 0 0"/><body>
+        <joint axis="{0}"/><geom type="capsule" size="0.008" fromto="0 0 0 0.06 0 0"/><site name="b" pos="0.03 0 0"/>
+        </body></worldbody><tendon><spatial><site site="a"/><site site="b"/></spatial></tendon></mujoco>"""
+    scene = Scene(fp.from_mujoco(mujoco.MjModel.from_xml_string(text.format(*numbers))))
+    np.testing.assert_allclose(scene.view() @ axis, [0.0, -1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(scene.view()[2], np.eye(3)[up], atol=1e-12)
+    assert scene.header("", np.zeros((1, 1)), 1.0, live=False)["grid"] == 0.01

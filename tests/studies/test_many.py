@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,6 +86,13 @@ def test_only_the_chosen_variables_are_kept() -> None:
     stacked = fp.simulate_many(scenarios(1.0, 1.2), workers=1, variables=["tracking_error"])
     assert "tracking_error" in stacked
     assert "joint_position" not in stacked
+
+
+def test_scenarios_are_taken_by_path(tmp_path: Path) -> None:
+    file = tmp_path / "short.toml"
+    file.write_text('extends = "fig6"\n[simulation]\nduration = 0.01\n')
+    alone = fp.simulate(file)
+    assert (fp.simulate_many([file, str(file)], workers=1).joint_position == alone.joint_position).all()
 
 
 def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,9 +1,11 @@
 """The figure of contacts, from made-up ones."""
 
 import numpy as np
+import pytest
 import xarray as xr
 
-from finger_pin.views.plots import plot_contact
+from finger_pin.exceptions import InputError
+from finger_pin.views.plots import plot_contact, plot_servo
 
 
 def made(strengths):
@@ -28,6 +30,12 @@ def test_the_cone_says_what_its_edge_is():
     drawn = {line.get_label(): line.get_data() for line in cone.lines}
     assert [text.get_text() for text in cone.get_legend().get_texts()] == ["pad-0", "most that friction can be"]
     np.testing.assert_allclose(drawn["most that friction can be"], [[0.0, 2.0], [0.0, 1.6]])
+
+
+@pytest.mark.parametrize(("draw", "what"), [(plot_contact, "nothing around it"), (plot_servo, "without servos")])
+def test_what_a_result_cannot_show_is_said_in_one_line(draw, what):
+    with pytest.raises(InputError, match=what):
+        draw(made([1.0]).drop_dims("contact"))
 
 
 def test_a_result_in_which_nothing_touches_says_so():

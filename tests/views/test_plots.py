@@ -141,6 +141,12 @@ def test_draw_all_writes_whole_pictures_of_a_size_for_the_screen(tmp_path):
         )
 
 
+def test_a_figure_that_a_result_does_not_have_is_named_and_nothing_is_drawn(tmp_path):
+    with pytest.raises(InputError, match='names = "fig7": the figures of this result are fig6, losses, energy'):
+        plots.draw_all(synthetic(), tmp_path / "figures", ["fig6", "fig7"])
+    assert not any(tmp_path.iterdir())
+
+
 def test_an_earlier_picture_survives_a_figure_that_cannot_be_drawn(tmp_path):
     path = plots.save_figure(plots.plot_friction_law(), tmp_path / "figure.png")
     before = path.read_bytes()

@@ -72,6 +72,15 @@ def tendon_lanes(description: FingerDescription, model: pin.Model, widths: Seque
     return Lanes(offset, min(spacings), families, widths[0])
 
 
+def joint_axes(model: pin.Model) -> Array:
+    """Return what joints turn about at zero, shape (joints, 3), base frame: unit vectors, zero for those that slide."""
+    data, reference = model.createData(), pin.ReferenceFrame.WORLD
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]
+    columns = [joint.idx_v for joint in model.joints[1:]]
+    return np.array([np.reshape(twist, (6, -1))[3:, at] for twist, at in zip(twists, columns, strict=True)])
+
+
 def _radius(description: FingerDescription, tendon: str, joint: str) -> float | None:
     crossing = description.tendons[tendon].crossings.get(joint)
     return None if crossing is None else crossing.radius

@@ -14,7 +14,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.tree import Solid
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
-from finger_pin.mechanism.geometry.lanes import Lanes
+from finger_pin.mechanism.geometry.lanes import Lanes, joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath
 from finger_pin.mechanism.pieces import Leg, Piece
 from finger_pin.mechanism.routes import rotation
@@ -77,8 +77,8 @@ class TreeGeometry:
         self.size = float(np.linalg.norm(seen, axis=1).max()) or 0.1
         extent = float(np.ptp(seen, axis=0).max()) or self.size
         self.widths: tuple[float, ...] = (_WIDTH * extent,)
-        gravity = np.array(description.gravity)
-        along = np.abs(still.rotation[1:, :, 2] @ gravity)
+        axes = joint_axes(self.model)
+        along = np.where(axes.any(axis=1), np.abs(axes @ np.array(description.gravity)), np.inf)
         self.lanes = Lanes({}, _SPACING * extent, ((1 + int(np.argmin(along)),),), _WIDTH * extent)
         self.pulleys: tuple[Pulley, ...] = ()
 

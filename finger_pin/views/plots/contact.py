@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, SKY, VERMILLION, new_figure, styled
@@ -26,7 +27,12 @@ def plot_contact(result: xr.Dataset) -> Figure:
 
     Args:
         result: Dataset of `simulate`.
+
+    Raises:
+        InputError: If there are no objects.
     """
+    if "contact" not in result.dims:
+        raise InputError("result", "is of a finger with nothing around it to touch")
     shown = touching(result)
     below = ["sliding (mm/s)"] + (["moved (mm)"] if "object_position" in result else [])
     figure = new_figure(12.0, max(6.4, 1.5 * len(shown)))

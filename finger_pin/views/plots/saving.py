@@ -8,6 +8,7 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.plots.contact import plot_contact
 from finger_pin.views.plots.convergence import plot_convergence
@@ -42,9 +43,15 @@ def draw_all(result: xr.Dataset, folder: str | Path, names: Iterable[str] | None
         result: Dataset of `simulate`.
         folder: Where to write; a file of the same name is replaced whole or not at all.
         names: Which of `figures_of`; all by default.
+
+    Raises:
+        InputError: If there is no such figure of this result.
     """
     figures = figures_of(result)
-    wanted = figures if names is None else names
+    wanted = list(figures if names is None else names)
+    for name in wanted:
+        if name not in figures:
+            raise InputError("names", f"the figures of this result are {', '.join(figures)}", name)
     return [save_figure(figures[name](result), Path(folder) / f"{name}.png") for name in wanted]
 
 

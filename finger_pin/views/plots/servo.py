@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, new_figure, styled
@@ -33,7 +34,12 @@ def plot_servo(result: xr.Dataset) -> Figure:
 
     Args:
         result: Dataset of `simulate`.
+
+    Raises:
+        InputError: If there are no servos.
     """
+    if "motor" not in result.dims:
+        raise InputError("result", "is of a finger without servos")
     described = tomllib.loads(result.attrs["scenario"])["finger"]
     actuators = described["actuators"]
     tendons = [name for actuator in actuators.values() for name in actuator["tendons"]]

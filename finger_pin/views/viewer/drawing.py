@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 _SIDES = 8
 _LOOSE = (0.62, 0.64, 0.67)
-#: Of the arrow of a contact's force, at both ends.
-FORCE_COLOUR = np.tile([1.0, 0.82, 0.4], (2, 1))
+#: Of the arrow of a contact's force, at both ends: that of the page, which no tension has.
+FORCE_COLOUR = np.tile(np.array([0xFF, 0x5A, 0x5A]) / 255.0, (2, 1))
 
 
 def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1.0, rate: float = 30.0) -> None:

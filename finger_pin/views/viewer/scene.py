@@ -17,7 +17,7 @@ from finger_pin.analysis import ForcePolytope
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual
+from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, is_mesh, link_names, root_command, solid_commands
 
@@ -109,7 +109,6 @@ class Scene:
             self._tendon(path.name, path.distal.tolist())
             for path in self.geometry.paths(np.zeros(len(description.joints)))
         ]
-        self._grid = 10.0 ** math.floor(math.log10(size / 4.0))
 
     @property
     def size(self) -> float:
@@ -171,7 +170,7 @@ class Scene:
             "tendons": self.tendons,
             "tubeRadius": tube,
             "quantum": self._quantum,
-            "grid": self._grid,
+            "grid": 10.0 ** math.floor(math.log10(float(np.ptp(corners, axis=0).max()) / 4.0)),
             "tips": len(geometry.tips),
             "inView": np.round(_outermost(corners), 5).tolist(),
             "margin": 0.55 * max(self._widths),
@@ -236,12 +235,15 @@ class Scene:
         # joints point, so that flexion is seen from the side and runs counter-clockwise.
         model, data = self.geometry.model, self.geometry.model.createData()
         pin.forwardKinematics(model, data, np.zeros(model.nq))
-        frame = data.oMi[self.geometry.lanes.families[0][0]].rotation
+        joint = self.geometry.lanes.families[0][0]
+        frame = np.array(data.oMi[joint].rotation)
+        turning = joint_axes(model)[joint - 1]
+        axis = turning if turning.any() else frame[:, 2]
         gravity = np.array(self.geometry.description.gravity)
-        up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array(frame[:, 1])
-        if abs(up @ frame[:, 2]) > 0.9:
-            up = np.array(frame[:, 1])
-        back = -(frame[:, 2] - (frame[:, 2] @ up) * up)
+        up = -gravity / np.linalg.norm(gravity) if gravity.any() else axis
+        if abs(up @ axis) > 0.9:
+            up = frame[:, 1 if abs(frame[:, 1] @ axis) < 0.5 else 0]
+        back = -(axis - (axis @ up) * up)
         back /= np.linalg.norm(back)
         return np.array([np.cross(back, up), back, up])
 

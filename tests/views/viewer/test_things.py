@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from importlib import resources
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +13,7 @@ import finger_pin as fp
 from finger_pin.views import draw
 from finger_pin.views.plots.style import new_figure
 from finger_pin.views.viewer.animation import Motion, animation_page
+from finger_pin.views.viewer.drawing import FORCE_COLOUR
 from finger_pin.views.viewer.video import _Film
 
 
@@ -99,3 +101,9 @@ def test_a_film_shows_the_ball_round_and_where_it_is(pinched):
     distances = [np.linalg.norm(outline - centre, axis=1) for outline in outlines]
     assert any(each.max() < 0.01501 and each.min() > 0.0145 for each in distances)
     assert len(film.arrows.get_segments()) == 2
+
+
+def test_forces_have_one_colour_on_the_page_in_a_window_and_in_films():
+    script = resources.files("finger_pin.views.viewer").joinpath("web/scene.js").read_text("utf-8")
+    colour = re.search(r"new ArrowHelper\(.*, 0x(\w{6})\)", script)[1]
+    assert [round(255 * each) for each in FORCE_COLOUR[0]] == list(bytes.fromhex(colour))
