@@ -10,9 +10,9 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.pin_wrench import pin_wrench
@@ -23,6 +23,9 @@ from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import Groove
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 

@@ -20,6 +20,8 @@ from finger_pin.exceptions import FingerPinError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from finger_pin.simulation.recorded import Recording
+
 #: An error number, and what went wrong; (0, "") if nothing did.
 Answer = tuple[int, str]
 
@@ -61,7 +63,7 @@ class Drawing:
                 os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()
 
-    def start(self, result: xr.Dataset, folder: Path) -> None:
+    def start(self, result: Recording | xr.Dataset, folder: Path) -> None:
         """Have the figures of a result drawn into a folder."""
         with suppress(BrokenPipeError):  # `wait` reports why it ended.
             self._pipe.send((result, folder.absolute()))
@@ -96,8 +98,10 @@ def _serve(pipe: Connection, other: Connection) -> None:
     gc.disable()
     try:
         with without("dask", "xarray"), undocumented():
+            from finger_pin.simulation.recorded import Recording
             from finger_pin.views.plots import saving
-        result, folder = pipe.recv()
+        given, folder = pipe.recv()
+        result = given.dataset() if isinstance(given, Recording) else given
     except EOFError:
         return
     except Exception as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from finger_pin.description.scenario import Scenario
+    from finger_pin.simulation.recorded import Recording
     from finger_pin.simulation.results import ResultFolder
 
 
@@ -51,7 +53,7 @@ def simulate(
         interrupts = stack.enter_context(Interrupts())
         stack.enter_context(without("dask", "xarray"))
         # Both this process and the one that draws need it.
-        import xarray  # noqa: F401
+        import numpy  # noqa: F401
 
         drawing = stack.enter_context(Drawing()) if figures else None
         from finger_pin.description.loading import load_scenario
@@ -64,14 +66,20 @@ def simulate(
         if check:
             tightened(loaded)
         with ResultFolder(output) as folder:
-            result, problem = compute(loaded, interrupts, quiet, live, check)
+
+            def begin(result: Recording | xr.Dataset) -> None:
+                # After an interruption the data are kept, and the views are not drawn: that takes too long.
+                if drawing is not None and not interrupts.requested:
+                    drawing.start(result, folder.stage / "figures")
+
+            result, problem = compute(loaded, interrupts, quiet, live, check, begin)
             if result is None:
                 assert problem is not None
                 problem.add_note("nothing was computed")
                 raise problem
             with noted("earlier results are as they were"):
                 with interrupts.patient():
-                    write(result, folder, None if interrupts.requested else drawing)
+                    write(result, folder, drawing)
                 trouble = draw(result, folder, drawing, interrupts)
                 problem = (problem or trouble) if interrupts.requested else (trouble or problem)
                 with interrupts.patient():
@@ -107,9 +115,17 @@ def default_name(scenario: Scenario, settings: list[str], duration: str | None, 
 
 
 def compute(
-    scenario: Scenario, interrupts: Interrupts, quiet: bool, live: bool, check: bool
+    scenario: Scenario,
+    interrupts: Interrupts,
+    quiet: bool,
+    live: bool,
+    check: bool,
+    begin: Callable[[Recording | xr.Dataset], None],
 ) -> tuple[xr.Dataset | None, BaseException | None]:
-    """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did."""
+    """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did.
+
+    Before that what there is to draw is given to ``begin``.
+    """
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.simulate import simulate
 
@@ -124,26 +140,34 @@ def compute(
         warnings.simplefilter("ignore", ScenarioWarning)
         observe = viewer.observe if viewer else None
         try:
-            result = simulate(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested)
+            result = simulate(
+                scenario,
+                progress=progress,
+                observe=observe,
+                stop=lambda: interrupts.requested,
+                plain=None if check else begin,
+            )
         except (IntegrationError, Interrupted) as error:
+            if check and error.result is not None:
+                begin(error.result)
             return error.result, error
+        if not check:
+            return result, None
         try:
-            if check:
-                found = check_convergence(scenario, result, progress=progress, stop=lambda: interrupts.requested)
-                result = found.attach(result)
+            found = check_convergence(scenario, result, progress=progress, stop=lambda: interrupts.requested)
+            result = found.attach(result)
         except IntegrationError as error:
             complain("simulate", f"convergence could not be checked: {error}")
         except Interrupted as error:
             error.add_note("before convergence was checked")
             return result, error
+        begin(result)
     return result, None
 
 
 def write(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> None:
-    """Write the data, while another process begins to draw the figures."""
+    """Write the data, while another process draws the figures; if they cannot be written, it stops."""
     try:
-        if drawing is not None:
-            drawing.start(result, folder.stage / "figures")
         folder.write(result)
     except BaseException:
         if drawing is not None:
@@ -157,7 +181,6 @@ def draw(
     """Draw the animation and wait for the figures, all or none; return what went wrong if anything did."""
     try:
         if interrupts.requested:
-            # The data are kept, and the views are not drawn: that takes too long.
             raise KeyboardInterrupt
         from finger_pin.views.viewer import write_animation
 

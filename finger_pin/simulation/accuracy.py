@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import Stop, Trajectory
@@ -17,6 +16,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.recorded import Recording
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 128
@@ -67,7 +67,7 @@ class Run:
 
     scenario: Scenario
     trajectory: Trajectory
-    result: xr.Dataset
+    result: Recording
     left: float
     coarser: Trajectory | None = None
 
@@ -76,7 +76,7 @@ def close_account(
     scenario: Scenario,
     trajectory: Trajectory,
     repeated: Callable[[Scenario, Stop], Trajectory],
-    recorded: Callable[[Trajectory], xr.Dataset],
+    recorded: Callable[[Trajectory], Recording],
 ) -> Run:
     """Record a run, and repeat it at tighter tolerances as long as its energy account does not close to ten times them.
 
@@ -163,12 +163,12 @@ def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
     return lambda: next(looks) >= most
 
 
-def left_open(result: xr.Dataset) -> float:
+def left_open(result: Recording) -> float:
     """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding."""
     most = {
-        str(name).removeprefix("energy_"): float(np.abs(values.values).max())
-        for name, values in result.variables.items()
-        if str(name).startswith("energy_")
+        name.removeprefix("energy_"): float(np.abs(values).max())
+        for name, (_, values, _) in result.variables.items()
+        if name.startswith("energy_")
     }
     residual = most.pop("residual")
     exchanged = sum(value for name, value in most.items() if name.startswith("exchanged_"))
@@ -177,7 +177,7 @@ def left_open(result: xr.Dataset) -> float:
     return residual / exchanged if exchanged else np.inf
 
 
-def open_account(result: xr.Dataset) -> str:
+def open_account(result: Recording) -> str:
     """Return what to say if a result's energy account does not close to a ten thousandth of all energy exchanged."""
     share = left_open(result)
     if not share > _OPEN:
@@ -188,23 +188,22 @@ def open_account(result: xr.Dataset) -> str:
     )
 
 
-def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return a result up to its first sample that is not finite, and the first variable that is not; else empty."""
-    length, excess = result.sizes["time"], ""
-    for name in result.data_vars:
-        values = result.variables[name]
+def finite_part(result: Recording) -> str:
+    """Cut a result before its first sample that is not finite; return the first variable that is not, else empty."""
+    length, excess = len(result.time), ""
+    for name, (_, values, _) in result.variables.items():
         # The sum alone tells in most cases.
-        if np.isfinite(np.sum(values.values)):
+        if np.isfinite(np.sum(values)):
             continue
-        finite = np.isfinite(values.values)
+        finite = np.isfinite(values)
         if not finite.all():
-            first = int(np.argmin(finite.reshape(values.sizes["time"], -1).all(axis=1)))
+            first = int(np.argmin(finite.reshape(len(values), -1).all(axis=1)))
             if first < length:
-                length, excess = first, str(name)
+                length, excess = first, name
     if excess:
-        result = result.isel(time=slice(max(length, 1)))
-        result.attrs["end_time"] = float(result["time"][-1])
-    return result, excess
+        result.cut(max(length, 1))
+        result.attrs["end_time"] = float(result.time[-1])
+    return excess
 
 
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
@@ -229,7 +228,7 @@ def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
     )
 
 
-def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
+def too_stiff(result: Recording, finger: Finger, tolerance: float) -> str:
     """Return what to say if bodies have touched whose contact is too stiff for the tolerance; else empty.
 
     Args:
@@ -243,7 +242,7 @@ def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
     stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
     depth = stiffness ** (-1.0 / exponent)
     # Bounces may all fall between samples: what is closer than can be told has touched.
-    touched = np.any(result["contact_gap"].values < known, axis=0)
+    touched = np.any(result.variables["contact_gap"][1] < known, axis=0)
     for index in np.flatnonzero(touched & (depth < _SEEN * known)):
         return (
             f"{contacts.names[index]} is too stiff for the tolerances: 1 N presses it in by {depth[index]:.1g} m, and "

@@ -6,9 +6,9 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.own import Samples
@@ -21,6 +21,9 @@ from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenar
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.starting import own_parts
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FACTOR, LIMIT = 100.0, 1e-3
 

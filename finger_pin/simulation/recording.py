@@ -7,11 +7,10 @@ from dataclasses import asdict
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.textbook import Trajectory
@@ -24,7 +23,11 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.following import Following
+from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.touching import contact_coordinates, contact_variables
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR = ("time", "motor")
@@ -83,7 +86,7 @@ def record(
     method: str,
     times: Array | None = None,
     following: Following | None = None,
-) -> xr.Dataset:
+) -> Recording:
     """Return all signals of a trajectory at times, by default the scenario's, as far as the trajectory goes.
 
     The signals are recomputed from the states by the evaluation that the dynamics use; what has followed the motion
@@ -115,7 +118,7 @@ def record(
         coordinates["passive_tendon"] = list(routing.passive_names)
     if loop.finger.actuators.names:
         coordinates["motor"] = ("motor", list(loop.finger.actuators.names), {"long_name": "motor"})
-    return xr.Dataset(variables, coords=coordinates, attrs=_attributes(scenario, trajectory, method))
+    return Recording(variables, coordinates, _attributes(scenario, trajectory, method))
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
@@ -144,6 +147,8 @@ def load_result(path: str | Path) -> xr.Dataset:
         OSError: If there is no such file, or it cannot be read.
     """
     file = Path(path, "trajectory.nc") if Path(path).is_dir() else path
+    import xarray as xr
+
     return xr.load_dataset(file, engine="netcdf4")
 
 

@@ -8,13 +8,14 @@ import time
 import uuid
 from pathlib import Path
 from types import TracebackType
-from typing import Self
-
-import xarray as xr
+from typing import TYPE_CHECKING, Self
 
 from finger_pin.exceptions import InputError
 from finger_pin.publishing import NEW, publish
 from finger_pin.simulation.recording import save
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
 _MARK_OF_OWN = (

@@ -7,9 +7,9 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import warn_of_self_locking
@@ -44,8 +44,12 @@ from finger_pin.simulation.accuracy import (
     too_stiff,
 )
 from finger_pin.simulation.following import Following
+from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import record
 from finger_pin.simulation.starting import own_parts, packed_state
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -69,6 +73,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
+    plain: Callable[[Recording], None] | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario, from rest on its reference unless something else is asked for.
 
@@ -96,6 +101,7 @@ def simulate(
         progress: Called with the simulated time, s, now and then.
         observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
+        plain: Called with the result as plain arrays, before xarray is imported to make a Dataset of it.
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account. Where that does not close to
@@ -175,7 +181,7 @@ def simulate(
         asked = stop or (lambda: False)
         return _integrate(other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or asked())
 
-    def recorded(found: Trajectory) -> xr.Dataset:
+    def recorded(found: Trajectory) -> Recording:
         # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return record(scenario, loop, found, method, following=following if found is first else None)
@@ -186,28 +192,31 @@ def simulate(
     following = Following(loop, scenario.sample_times()) if pure and observe is None else None
     first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
     run = close_account(scenario, first, repeated, recorded)
-    trajectory, result = run.trajectory, run.result
+    trajectory, recording = run.trajectory, run.result
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
     if margin is not None:
-        result.attrs["self_locking_margin"] = margin
+        recording.attrs["self_locking_margin"] = margin
     if driving:
-        result.attrs["micro_damping"] = driving
+        recording.attrs["micro_damping"] = driving
     if own:
-        result.attrs["own"] = own
+        recording.attrs["own"] = own
     if np.isfinite(error):
-        result.attrs["estimated_error"] = error
-    inaccurate = inaccurate or too_stiff(result, loop.finger, scenario.simulation.atol_scale)
+        recording.attrs["estimated_error"] = error
+    inaccurate = inaccurate or too_stiff(recording, loop.finger, scenario.simulation.atol_scale)
     if inaccurate:
-        result.attrs["accuracy"] = inaccurate
+        recording.attrs["accuracy"] = inaccurate
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=2)
-    gap = open_account(result)
+    gap = open_account(recording)
     if gap and not trajectory.failure:
-        result.attrs["account"] = gap
+        recording.attrs["account"] = gap
     if slow:
-        result.attrs["ringing"] = slow
-    result, excess = finite_part(result)
+        recording.attrs["ringing"] = slow
+    excess = finite_part(recording)
+    if plain is not None:
+        plain(recording)
+    result = recording.dataset()
     if trajectory.failure:
         if isinstance(answers, OwnController) and answers.problem_time >= reached:
             raise IntegrationError(reached, answers.problem, "another controller", result)
@@ -218,7 +227,7 @@ def simulate(
         reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
         raise IntegrationError(reached, reason, advice, result)
     if excess:
-        raise IntegrationError(float(result.attrs["end_time"]), f"{excess} is not finite after that", _ADVICE, result)
+        raise IntegrationError(result.attrs["end_time"], f"{excess} is not finite after that", _ADVICE, result)
     if trajectory.interrupted:
         raise Interrupted(reached, result)
     return result

@@ -5,9 +5,9 @@ from __future__ import annotations
 import copy
 import math
 import numbers
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.compiled import core_signal
@@ -24,6 +24,9 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.told import Told
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 

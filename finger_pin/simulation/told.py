@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
@@ -25,6 +24,9 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import check_memory, open_account
 from finger_pin.simulation.recording import record
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # A sample this close to the end of a step, s, is taken there.
 _SAME = 1e-9
@@ -101,11 +103,12 @@ class Told:
         result = record(scenario, loop, trajectory, str(settings["method"]), times)
         result.attrs["own"] = "loop"
         if trajectory.failure:
-            raise IntegrationError(float(trajectory.breakpoints[-1]), trajectory.failure, "fewer steps", result)
+            reached = float(trajectory.breakpoints[-1])
+            raise IntegrationError(reached, trajectory.failure, "fewer steps", result.dataset())
         gap = open_account(result)
         if gap:
             result.attrs["account"] = gap
-        return result
+        return result.dataset()
 
 
 class _Repeated:

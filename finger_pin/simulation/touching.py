@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -14,6 +13,9 @@ from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Variables = dict[str, tuple[Any, Array, dict[str, str]]]
 _OBJECTS = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 import tomllib
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.analysis import (
     locking_advice,
@@ -15,6 +15,9 @@ from finger_pin.analysis import (
 from finger_pin.description.routing import Array
 from finger_pin.views.account import account
 from finger_pin.views.trees import is_tree
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SETTLING = 1.0
 _LONG = 2.0

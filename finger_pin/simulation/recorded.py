@@ -1,0 +1,43 @@
+"""A result as plain arrays, before it is a Dataset: to import xarray takes longer than to simulate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.description.routing import Array
+
+
+@dataclass(eq=False)
+class Recording:
+    """All signals of a run.
+
+    Attributes:
+        variables: Dimensions, of which time is the first, values and attributes, by name.
+        coordinates: Likewise, or the values alone.
+        attrs: Of the whole.
+    """
+
+    variables: dict[str, tuple[Any, Array, dict[str, str]]]
+    coordinates: dict[str, Any]
+    attrs: dict[str, Any]
+
+    @property
+    def time(self) -> Array:
+        """The sample times, s, shape (m,)."""
+        times: Array = self.coordinates["time"][1]
+        return times
+
+    def cut(self, count: int) -> None:
+        """Keep the first samples only."""
+        self.variables = {name: (dims, all_[:count], own) for name, (dims, all_, own) in self.variables.items()}
+        self.coordinates["time"] = ("time", self.time[:count], self.coordinates["time"][2])
+
+    def dataset(self) -> xr.Dataset:
+        """Return the Dataset."""
+        import xarray as xr
+
+        return xr.Dataset(self.variables, coords=self.coordinates, attrs=self.attrs)
