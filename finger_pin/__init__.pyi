@@ -1,5 +1,6 @@
 from . import analysis as analysis
 from . import control as control
+from . import exceptions as exceptions
 from . import studies as studies
 from . import views as views
 from .description.loading import list_scenarios as list_scenarios
@@ -9,12 +10,8 @@ from .description.loading import load_scenario as load_scenario
 from .description.loading import to_toml as to_toml
 from .description.parameters import FingerDescription as FingerDescription
 from .description.scenario import Scenario as Scenario
-from .exceptions import FingerPinError as FingerPinError
 from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError
-from .exceptions import Interrupted as Interrupted
-from .exceptions import ScenarioWarning as ScenarioWarning
-from .exceptions import SelfLockingWarning as SelfLockingWarning
 from .mechanism.finger import Finger as Finger
 from .mechanism.finger import Hand as Hand
 from .mechanism.from_mujoco import from_mujoco as from_mujoco

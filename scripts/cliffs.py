@@ -48,7 +48,7 @@ def run_seed(seed: int, limit: float) -> Run:
             result = fp.simulate(scenario, stop=lambda: time.process_time() - began > limit)
         except fp.IntegrationError as error:
             result, reason = error.result, str(error)
-        except fp.Interrupted as error:
+        except fp.exceptions.Interrupted as error:
             result, reason = error.result, f"not done after {limit:g} s: {error}"
     assert result is not None
     steps, estimate = int(result.attrs["solver_steps"]), float(result.attrs.get("estimated_error", np.nan))

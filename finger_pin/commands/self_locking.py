@@ -36,7 +36,7 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
     if np.isfinite(margin.margin):
         with warnings.catch_warnings():
             # Runs on both sides are the point.
-            warnings.simplefilter("ignore", fp.ScenarioWarning)
+            warnings.simplefilter("ignore", fp.exceptions.ScenarioWarning)
             runs = {
                 f"{share:g} of critical": fp.simulate(scaled(scenario, loaded, share * margin.margin))
                 for share in SHARES

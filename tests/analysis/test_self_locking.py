@@ -192,7 +192,7 @@ def test_simulated_finger_moves_just_below_the_critical_coefficient_and_locks_ju
     third, way = 125, np.deg2rad(35.0)
     growth, moved = {}, {}
     for share in (0.9, 1.1):
-        with pytest.warns(fp.SelfLockingWarning, match="run away" if share > 1.0 else "multiply"):
+        with pytest.warns(fp.exceptions.SelfLockingWarning, match="run away" if share > 1.0 else "multiply"):
             result = fp.simulate(steps(share * 0.7418e-3))
         tension = result["tendon_command"].max("tendon").values
         growth[share] = tension[-1] / tension[third]
@@ -204,7 +204,7 @@ def test_simulated_finger_moves_just_below_the_critical_coefficient_and_locks_ju
 @pytest.mark.parametrize("name", ["fig6", "stick_slip"])
 def test_the_scenarios_that_ship_keep_their_distance_and_say_so(name, recwarn):
     result = fp.simulate(fp.load_scenario(name, {"simulation.duration": 0.02}))
-    assert not [each for each in recwarn if each.category is fp.SelfLockingWarning]
+    assert not [each for each in recwarn if each.category is fp.exceptions.SelfLockingWarning]
     assert result.attrs["self_locking_margin"] > 2.0
     assert warn_of_self_locking(fp.load_scenario(name)) > 2.0
 
@@ -212,7 +212,7 @@ def test_the_scenarios_that_ship_keep_their_distance_and_say_so(name, recwarn):
 @pytest.mark.parametrize(("coefficient", "said"), [(6.5e-4, "0.88 of what locks"), (7.6e-4, "1.02 of what locks")])
 def test_a_simulation_close_to_locking_warns_whoever_calls_it_and_its_summary_says_so(coefficient, said):
     """The critical coefficient of the reference is 0.7418 mm."""
-    with pytest.warns(fp.SelfLockingWarning, match=said) as caught:
+    with pytest.warns(fp.exceptions.SelfLockingWarning, match=said) as caught:
         result = fp.simulate(steps(coefficient, 0.02))
     assert [each.filename for each in caught] == [__file__]
     assert result.attrs["self_locking_margin"] == pytest.approx(0.7418e-3 / coefficient, rel=1e-3)
@@ -228,7 +228,7 @@ def test_a_controller_of_ones_own_is_not_judged_by_the_papers():
 
 
 def test_many_runs_warn_once_and_say_how_many_are_close():
-    with pytest.warns(fp.SelfLockingWarning, match="2 of 3 runs come close") as caught:
+    with pytest.warns(fp.exceptions.SelfLockingWarning, match="2 of 3 runs come close") as caught:
         stacked = fp.simulate_many([steps(coefficient, 0.02) for coefficient in (2e-4, 7.6e-4, 8e-4)], workers=1)
     assert len(caught) == 1
     assert list(stacked["self_locking_margin"] < 1.0) == [False, True, True]
@@ -268,7 +268,7 @@ def test_parameters_at_the_edge_have_a_margin_or_none_but_no_error():
     ):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            warnings.simplefilter("ignore", fp.SelfLockingWarning)
+            warnings.simplefilter("ignore", fp.exceptions.SelfLockingWarning)
             assert warn_of_self_locking(fp.load_scenario("fig6", edge)) > 0.0
 
 

@@ -26,9 +26,9 @@ def told(function, capsys):
     [
         (fp.InputError("a.b", "must be 1", 2), 2, "a.b = 2: must be 1"),
         (fp.IntegrationError(0.5, "stuck", "less"), 3, "the integration stopped at t = 0.5 s: stuck; try less"),
-        (fp.Interrupted(0.5), 130, "interrupted at t = 0.5 s"),
+        (fp.exceptions.Interrupted(0.5), 130, "interrupted at t = 0.5 s"),
         (KeyboardInterrupt(), 130, "interrupted"),
-        (fp.FingerPinError("no"), 1, "no"),
+        (fp.exceptions.FingerPinError("no"), 1, "no"),
         (OSError(28, "No space left on device", "a.nc"), 1, "the results cannot be written: a.nc: No space left on"),
     ],
 )
@@ -48,7 +48,7 @@ def test_what_is_raised_on_purpose_becomes_one_line_with_its_notes_and_an_exit_c
 def test_a_warning_is_one_line_and_no_failure(capsys):
     def warning():
         warnings.simplefilter("always")
-        warnings.warn("the motion\nis sensitive", fp.ScenarioWarning, stacklevel=1)
+        warnings.warn("the motion\nis sensitive", fp.exceptions.ScenarioWarning, stacklevel=1)
 
     assert told(warning, capsys) == (0, ["warning.py: warning: the motion\\nis sensitive"])
 

@@ -43,7 +43,7 @@ def one_joint(limiter, **sections):
 def steps_of(table, tolerance):
     table["simulation"] |= {"rtol": tolerance, "atol_scale": tolerance}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fp.ScenarioWarning)
+        warnings.simplefilter("ignore", fp.exceptions.ScenarioWarning)
         return fp.simulate(fp.Scenario.model_validate(table)).attrs["solver_steps"]
 
 
@@ -167,7 +167,7 @@ def test_an_account_that_does_not_close_is_told():
     for law, tells in ((JOINT_SPRING, False), (replace(JOINT_SPRING, account=forgetful), True)):
         rows = Rows("band", law, ("medial",), np.array([[0.05], [0.0], [2e-3]]), np.eye(5)[2:3])
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", fp.ScenarioWarning)
+            warnings.simplefilter("ignore", fp.exceptions.ScenarioWarning)
             result = fp.simulate("fig6", finger=fp.Finger("ub", rows=[rows]))
         assert (
             (share_left_open(result) > 1e-4)

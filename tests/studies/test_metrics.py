@@ -109,7 +109,7 @@ def test_a_design_beyond_self_locking_is_measured_without_a_warning():
     """The tests make an error of every warning, so `simulate` alone stops there."""
     friction = {"finger.joint_friction.coulomb": 6e-3, "finger.joint_friction.stiction": 8e-3}
     scenario = fp.load_scenario("fig6", {"simulation.duration": 0.02} | friction)
-    with pytest.raises(fp.SelfLockingWarning):
+    with pytest.raises(fp.exceptions.SelfLockingWarning):
         fp.simulate(scenario)
     assert METRICS["self_locking_margin"].measure(Run(scenario)) < 1.0
     assert METRICS["tension_peak"].measure(Run(scenario)) > 0.0

@@ -50,7 +50,7 @@ def test_an_mp4_in_slow_motion_has_frames_for_all_of_its_time(result, tmp_path):
 
 def test_what_cannot_be_filmed_is_said_before_anything_is_written(result, tmp_path, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(fp.FingerPinError, match="ffmpeg"):
+    with pytest.raises(fp.exceptions.FingerPinError, match="ffmpeg"):
         write_video(result, tmp_path / "film.mp4")
     with pytest.raises(fp.InputError, match=r"\.mp4 or \.gif"):
         write_video(result, tmp_path / "film.avi")
