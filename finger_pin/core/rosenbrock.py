@@ -28,8 +28,8 @@ _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 # So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
 WINDOW, LEAST_MEAN_STEP = 20_000, 1e-9
 # Where a joint turns faster, rad/s, or a mass is faster, m/s, nothing physical is left to follow: the tip of a link of
-# 1 cm is then faster than sound.
-FASTEST = 1e5
+# 1 cm is then faster than sound, 343 m/s.
+FASTEST = 343.0 / 0.01
 
 
 class Integration(NamedTuple):

@@ -32,7 +32,7 @@ _TIGHTER = 10.0
 _CLOSE_TO_LOCKING = 1.5
 # The repetition stops after so many times the run's looks at it and a few more, or so many at most: at a tighter
 # tolerance it may be far slower, and a motion that takes so many steps shows early how sensitive it is.
-_PATIENCE, _FEW, _MOST_LOOKS = 2, 8, 1200
+_PATIENCE, _FEW, _MOST_LOOKS = 2, 8, 400
 # The share of the energy exchanged to which an account has to close, and what of the energy stored is rounding.
 _OPEN, _ROUNDING = 1e-4, 1e-13
 # A run is repeated if its account does not close to so many times its tolerance, nor to so small a share: so often at
