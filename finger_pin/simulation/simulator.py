@@ -95,6 +95,8 @@ class Simulator:
         tips = len(mechanism.body.tips)
         self._force = np.zeros(3 if tips == 1 else (tips, 3))
         self._told = Told(self._stepper.copy())
+        # Which of the inputs are tensions.
+        self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
         self._settings = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
 
     @property
@@ -135,15 +137,14 @@ class Simulator:
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
         command = _numbers("tension", tension, self._tension.shape)
-        tensions = np.delete(command[: self.finger.routing.actuated], self.finger.actuators.voltages)
-        if np.any(tensions < 0.0):
+        if (command[self._pulling] < 0.0).any():
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
         shape = self._force.shape
         force = np.zeros(shape) if fingertip_force is None else _numbers("fingertip_force", fingertip_force, shape)
         stepper = self._stepper
-        if np.any(force != self._force):
+        if (force != self._force).any():
             stepper.load(force)
         self._tension, self._force = command, force
         stepper.hold(command)

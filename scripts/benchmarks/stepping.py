@@ -14,6 +14,8 @@ from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.reference import ReferenceSignals, SignalReference
 
 PERIOD = 1e-3
+# Of errors below 1e-4 rad a controller sees less than of its sensors' noise.
+TOLERANCE = 1e-4
 _ROUNDS = 3
 
 
@@ -50,9 +52,9 @@ def _run(scenario: fp.Scenario) -> tuple[float, float, Any]:
         SignalReference.from_scenario(scenario, finger.routing),
     )
     desired = reference.at(scenario.sample_times())
-    simulator = fp.Simulator(finger, desired.position[0])
+    simulator = fp.Simulator(finger, desired.position[0], rtol=TOLERANCE, atol_scale=TOLERANCE)
     simulator.step(np.ones(finger.routing.actuated), 1e-6)  # Compiles.
-    simulator = fp.Simulator(finger, desired.position[0])
+    simulator = fp.Simulator(finger, desired.position[0], rtol=TOLERANCE, atol_scale=TOLERANCE)
     state, actuated, inside = simulator.state, finger.routing.actuated, 0.0
     path = [state.position]
     began = time.perf_counter()
