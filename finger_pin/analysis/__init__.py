@@ -11,8 +11,8 @@ from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import (
     SelfLockingMargin,
     locking_advice,
+    quick_margin,
     self_locking_margin,
-    warn_of_self_locking,
 )
 from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
@@ -43,9 +43,9 @@ __all__ = [
     "locking_over_range",
     "pin_wrench",
     "posed",
+    "quick_margin",
     "self_locking_map",
     "self_locking_margin",
     "tension_for_force",
     "tension_limits",
-    "warn_of_self_locking",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +15,6 @@ from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
-from finger_pin.exceptions import SelfLockingWarning
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 
@@ -139,14 +137,10 @@ def _within_reach(
     return reached
 
 
-def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
-    """Warn if a scenario comes close to self-locking, at a cost that is bounded; return its margin.
+def quick_margin(scenario: Scenario) -> float:
+    """Return how far a scenario stays from self-locking, at a cost that is bounded.
 
     Of many combinations of directions only those that seem closest to locking are looked at.
-
-    Args:
-        scenario: The scenario.
-        stacklevel: Of `warnings.warn`, as seen by the caller of this function.
     """
     margin = np.inf
     # Parameters at the edge of what numbers hold have no margin: warnings of arithmetic would not help.
@@ -154,9 +148,6 @@ def warn_of_self_locking(scenario: Scenario, stacklevel: int = 2) -> float:
         for part in scenario.parts().values():
             most = max(1, _CASES // 2 ** len(part.finger.passive_names))
             margin = min(margin, self_locking_margin(part, most=most).margin)
-    text = locking_advice(margin)
-    if text:
-        warnings.warn(text, SelfLockingWarning, stacklevel=stacklevel + 1)
     return margin
 
 

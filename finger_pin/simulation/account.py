@@ -91,7 +91,8 @@ def account(
             finer = _halved(part, _suspected(part[1], times, residual), 1e-3 * allowed)
             if len(finer):
                 done[:, places] += Works(part[0], times).add(np.union1d(part[1], finer), part[2]).values - own
-    return Account(stored=stored, powers=booked, works=works, residual=gained - works.net)
+        residual = gained - works.net
+    return Account(stored=stored, powers=booked, works=works, residual=residual)
 
 
 def _suspected(ends: Array, times: Array, residual: Array) -> NDArray[np.int64]:

@@ -52,8 +52,7 @@ class Flows:
     @property
     def net(self) -> Array:
         """Supplied less lost, shape (...,)."""
-        net: Array = np.sum(self.values * [1.0 if name in self.supplies else -1.0 for name in self.names], axis=-1)
-        return net
+        return np.asarray(self.values @ [1.0 if name in self.supplies else -1.0 for name in self.names])
 
 
 def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics) -> dict[str, Array]:
@@ -70,6 +69,9 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
 
 def powers(signals: FingerSignals) -> Flows:
     """Return the powers supplied and lost at the given signals."""
-    _, rows = signals.mechanism.account()
-    fingertip = np.sum(signals.external_torque * signals.state.velocity, axis=-1)
-    return Flows.of(signals.mechanism.books, np.stack(list(rows.values()), axis=-1), fingertip)
+    found = signals.mechanism
+    if found.booked is not None:
+        rows = found.booked[..., len(found.books.stored) :]
+    else:
+        rows = np.stack(list(found.account()[1].values()), axis=-1)
+    return Flows.of(found.books, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.analysis.locking_margin import warn_of_self_locking
+from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control, sampled_control
@@ -31,7 +32,14 @@ from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
-from finger_pin.exceptions import AccuracyWarning, InputError, IntegrationError, Interrupted, MicroDampingWarning
+from finger_pin.exceptions import (
+    AccuracyWarning,
+    InputError,
+    IntegrationError,
+    Interrupted,
+    MicroDampingWarning,
+    SelfLockingWarning,
+)
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import (
     CHUNK,
@@ -141,7 +149,6 @@ def simulate(
     planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
     judged = controller is None and reference is None and planned
     judged = judged and loop.finger.routing.force_closure().holds
-    margin = warn_of_self_locking(scenario) if judged else None
     driving = micro_damping_advice(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=2)
@@ -190,7 +197,13 @@ def simulate(
     # Only what is a function of time and state can be evaluated beside the integration.
     pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
     following = Following(loop, scenario.sample_times()) if pure and observe is None else None
-    first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
+    with ThreadPoolExecutor(1) as aside:
+        judging = aside.submit(quick_margin, scenario) if judged else None
+        first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
+        margin = judging.result() if judging else None
+    close = locking_advice(math.inf if margin is None else margin)
+    if close:
+        warnings.warn(close, SelfLockingWarning, stacklevel=2)
     run = close_account(scenario, first, repeated, recorded)
     trajectory, recording = run.trajectory, run.result
     reached = float(trajectory.breakpoints[-1])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.analysis import critical_friction, self_locking_map, self_locking_margin, warn_of_self_locking
+from finger_pin.analysis import critical_friction, quick_margin, self_locking_map, self_locking_margin
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.views.summary import summarize
 
@@ -206,7 +206,7 @@ def test_the_scenarios_that_ship_keep_their_distance_and_say_so(name, recwarn):
     result = fp.simulate(fp.load_scenario(name, {"simulation.duration": 0.02}))
     assert not [each for each in recwarn if each.category is fp.exceptions.SelfLockingWarning]
     assert result.attrs["self_locking_margin"] > 2.0
-    assert warn_of_self_locking(fp.load_scenario(name)) > 2.0
+    assert quick_margin(fp.load_scenario(name)) > 2.0
 
 
 @pytest.mark.parametrize(("coefficient", "said"), [(6.5e-4, "0.88 of what locks"), (7.6e-4, "1.02 of what locks")])
@@ -238,7 +238,7 @@ def test_many_runs_warn_once_and_say_how_many_are_close():
 def test_the_quick_margin_of_seven_joints_is_the_least_of_all_combinations(passive):
     for seed in range(3):
         scenario = chain(7, passive, np.random.default_rng(seed))
-        quick = warn_of_self_locking(scenario)
+        quick = quick_margin(scenario)
         assert quick == pytest.approx(self_locking_margin(scenario).margin, rel=1e-6)
 
 
@@ -254,7 +254,7 @@ def test_the_quick_margin_looks_at_no_more_cases_than_it_may(monkeypatch):
     monkeypatch.setattr(np.linalg, "eig", counting)
     for passive in (1, 2):
         counted.clear()
-        warn_of_self_locking(chain(7, passive, np.random.default_rng(0)))
+        quick_margin(chain(7, passive, np.random.default_rng(0)))
         # A cell for every one of the eight tendons.
         assert 0 < sum(counted) <= 48 * 8
 
@@ -269,7 +269,7 @@ def test_parameters_at_the_edge_have_a_margin_or_none_but_no_error():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", fp.exceptions.SelfLockingWarning)
-            assert warn_of_self_locking(fp.load_scenario("fig6", edge)) > 0.0
+            assert quick_margin(fp.load_scenario("fig6", edge)) > 0.0
 
 
 def test_slow_motion_needs_the_tension_that_the_map_says():
