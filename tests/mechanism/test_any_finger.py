@@ -175,7 +175,7 @@ def says_what_to_try(error: IntegrationError) -> None:
     assert "t = " in str(error) and error.reason and error.advice in str(error)
 
 
-@pytest.mark.filterwarnings("ignore::finger_pin.SelfLockingWarning")
+@pytest.mark.filterwarnings("ignore::finger_pin.exceptions.SelfLockingWarning")
 @FEW
 @given(scenarios())
 def test_a_run_ends_finite_and_accounted_for_or_says_why_it_stopped(table):
