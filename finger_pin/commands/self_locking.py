@@ -27,11 +27,12 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
 
     loaded = fp.load_scenario(scenario)
     finger, margin = loaded.finger, self_locking_margin(loaded)
-    text = summarize_locking(loaded)
+    found = self_locking_map(fp.Finger(finger))
+    text = summarize_locking(loaded, found)
     output.mkdir(parents=True, exist_ok=True)
     figures = {
         "critical_friction": plot_critical_friction(finger),
-        "map": plot_self_locking_map(self_locking_map(fp.Finger(finger))),
+        "map": plot_self_locking_map(found),
     }
     if np.isfinite(margin.margin):
         with warnings.catch_warnings():

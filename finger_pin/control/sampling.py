@@ -10,8 +10,11 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.measurement import MeasuringController, Sensors
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
+from finger_pin.core.stepper import TABLEAUS
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
 
 # A delay this close to a multiple of the period, in periods, is one: a step between the two would be of no length.
 _COINCIDENT = 1e-9
@@ -80,3 +83,23 @@ class SampledController:
             delivered = loop.finger.routing.tendon_tension(strands)
             controller.sense(self._sensors.tension(delivered), self.period if self._samples else 0.0)
         return controller.command(time, loop.reference.at(time), motion.position, motion.velocity)
+
+
+def sampling_settings(scenario: Scenario, period: float | None) -> SamplingSettings | None:
+    """Return how the controller is sampled, or None if it is continuous.
+
+    Args:
+        scenario: With the entries ``controller.sampling``, if any.
+        period: In place of theirs, s.
+
+    Raises:
+        InputError: If the period is not positive, or the method cannot sample.
+    """
+    settings, method = scenario.controller.sampling, scenario.simulation.method
+    if period is not None and not 0.0 < period < math.inf:
+        raise InputError("control_period", "must be above 0", period)
+    if (settings is not None or period is not None) and method not in TABLEAUS:
+        raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
+    if period is None:
+        return settings
+    return (settings or SamplingSettings()).model_copy(update={"period": float(period)})

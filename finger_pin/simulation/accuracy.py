@@ -12,7 +12,7 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
+from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
@@ -39,7 +39,8 @@ _OPEN, _ROUNDING = 1e-4, 1e-13
 # most, and not if it took more steps. What is repeated counts if it leaves less open than a share of that.
 _CLOSED, _WELL_CLOSED, _HELPS = 10.0, 1e-5, 0.5
 _MOST_REPETITIONS, _MOST_STEPS = 3, 200_000
-_TOLERANCES = ("rtol", "atol_scale")
+#: The tolerances, and how tight they can be.
+TOLERANCES = {"rtol": LEAST_RTOL, "atol_scale": LEAST_ATOL_SCALE}
 # More steps than this, of less than this mean length, s, are slow; a mode rings if it decays by less than a tenth a
 # radian, and steps follow it if they are shorter than so many radians.
 _MANY, _SHORT, _DECAY, _FOLLOWED = 50_000, 5e-6, 0.1, 6.0
@@ -96,12 +97,12 @@ def close_account(
     for _ in range(_MOST_REPETITIONS):
         if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < run.left < np.inf:
             break
-        tighter = _tightened(run.scenario)
+        tighter = with_tighter(run.scenario, _TIGHTER)
         other = repeated(tighter, _patient(run.trajectory))
         if other.failure or other.interrupted:
             break
         result = recorded(other)
-        result.attrs |= {name: getattr(tighter.simulation, name) for name in _TOLERANCES}
+        result.attrs |= {name: getattr(tighter.simulation, name) for name in TOLERANCES}
         result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
             f"{first.left:.2g} of the energy exchanged"
@@ -133,7 +134,7 @@ def estimate_error(
         return error, ""
     rtol = run.scenario.simulation.rtol
     if other is None:
-        tighter = _tightened(run.scenario)
+        tighter = with_tighter(run.scenario, _TIGHTER)
         other, rtol = repeated(tighter, _patient(trajectory, _MOST_LOOKS)), tighter.simulation.rtol
     times = scenario.sample_times()
     times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
@@ -151,9 +152,10 @@ def estimate_error(
     )
 
 
-def _tightened(scenario: Scenario) -> Scenario:
+def with_tighter(scenario: Scenario, factor: float) -> Scenario:
+    """Return a scenario with tolerances divided by a factor, as far as tolerances go."""
     settings = scenario.simulation
-    tighter = {name: max(getattr(settings, name) / _TIGHTER, 1e-12) for name in _TOLERANCES}
+    tighter = {name: max(getattr(settings, name) / factor, least) for name, least in TOLERANCES.items()}
     return scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
 
 
@@ -177,9 +179,8 @@ def left_open(result: Recording) -> float:
     return residual / exchanged if exchanged else np.inf
 
 
-def open_account(result: Recording) -> str:
-    """Return what to say if a result's energy account does not close to a ten thousandth of all energy exchanged."""
-    share = left_open(result)
+def open_account(share: float) -> str:
+    """Return what to say if an energy account leaves more than a ten thousandth open; a share from `left_open`."""
     if not share > _OPEN:
         return ""
     return (

@@ -17,8 +17,9 @@ from finger_pin.control.reference import Reference
 from finger_pin.core.textbook import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
+from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.starting import own_parts
 
@@ -105,14 +106,13 @@ def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
     """
     if not 1.0 < factor < math.inf:
         raise InputError("factor", "must be above 1 and finite", factor)
-    settings = scenario.simulation
-    least = {"rtol": LEAST_RTOL, "atol_scale": LEAST_ATOL_SCALE}
-    tolerances = {name: max(getattr(settings, name) / factor, bound) for name, bound in least.items()}
-    for name, value in tolerances.items():
-        if not value < getattr(settings, name):
-            allowed = f"must be above {least[name]:g}, so that the run can be repeated at a tighter tolerance"
-            raise InputError(f"simulation.{name}", allowed, getattr(settings, name))
-    return scenario.model_copy(update={"simulation": settings.model_copy(update=tolerances)})
+    tighter = with_tighter(scenario, factor)
+    for name, least in TOLERANCES.items():
+        given = getattr(scenario.simulation, name)
+        if not getattr(tighter.simulation, name) < given:
+            allowed = f"must be above {least:g}, so that the run can be repeated at a tighter tolerance"
+            raise InputError(f"simulation.{name}", allowed, given)
+    return tighter
 
 
 def check_convergence(
@@ -173,7 +173,7 @@ def check_convergence(
 
     first = run(scenario) if result is None else result
     # A run whose account stayed open was repeated already.
-    taken = {name: first.attrs[name] for name in ("rtol", "atol_scale")}
+    taken = {name: first.attrs[name] for name in TOLERANCES}
     settings = scenario.simulation.model_copy(update=taken)
     tighter = tightened(scenario.model_copy(update={"simulation": settings}), factor)
     with warnings.catch_warnings():

@@ -22,13 +22,12 @@ from finger_pin.control.own import OwnController, Samples
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
-from finger_pin.control.sampling import SampledController
+from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.integrator import Follow, integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
-from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
@@ -152,7 +151,7 @@ def simulate(
     driving = micro_damping_advice(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=2)
-    sampling = _sampling(scenario, control_period)
+    sampling = sampling_settings(scenario, control_period)
     if sampling is None and isinstance(loop.controller, MeasuringController):
         raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
     positioned = bool(np.any(loop.finger.actuators.holds))
@@ -196,7 +195,9 @@ def simulate(
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
     # Only what is a function of time and state can be evaluated beside the integration.
     pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
-    following = Following(loop, scenario.sample_times()) if pure and observe is None else None
+    # The fingers of a hand that move apart are integrated side by side already.
+    beside = pure and observe is None and not loop.parts
+    following = Following(loop, scenario.sample_times()) if beside else None
     with ThreadPoolExecutor(1) as aside:
         judging = aside.submit(quick_margin, scenario) if judged else None
         first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
@@ -209,23 +210,16 @@ def simulate(
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
-    if margin is not None:
-        recording.attrs["self_locking_margin"] = margin
-    if driving:
-        recording.attrs["micro_damping"] = driving
-    if own:
-        recording.attrs["own"] = own
-    if np.isfinite(error):
-        recording.attrs["estimated_error"] = error
     inaccurate = inaccurate or too_stiff(recording, loop.finger, scenario.simulation.atol_scale)
     if inaccurate:
-        recording.attrs["accuracy"] = inaccurate
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=2)
-    gap = open_account(recording)
-    if gap and not trajectory.failure:
-        recording.attrs["account"] = gap
-    if slow:
-        recording.attrs["ringing"] = slow
+    if margin is not None:
+        recording.attrs["self_locking_margin"] = margin
+    if np.isfinite(error):
+        recording.attrs["estimated_error"] = error
+    gap = "" if trajectory.failure else open_account(run.left)
+    told = {"micro_damping": driving, "own": own, "accuracy": inaccurate, "account": gap, "ringing": slow}
+    recording.attrs |= {name: text for name, text in told.items() if text}
     excess = finite_part(recording)
     if plain is not None:
         plain(recording)
@@ -244,18 +238,6 @@ def simulate(
     if trajectory.interrupted:
         raise Interrupted(reached, result)
     return result
-
-
-def _sampling(scenario: Scenario, period: float | None) -> SamplingSettings | None:
-    """Return how the controller is sampled, or None if it is continuous."""
-    settings, method = scenario.controller.sampling, scenario.simulation.method
-    if period is not None and not 0.0 < period < math.inf:
-        raise InputError("control_period", "must be above 0", period)
-    if (settings is not None or period is not None) and method not in TABLEAUS:
-        raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
-    if period is None:
-        return settings
-    return (settings or SamplingSettings()).model_copy(update={"period": float(period)})
 
 
 def _integrate(

@@ -22,7 +22,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import check_memory, open_account
+from finger_pin.simulation.accuracy import check_memory, left_open, open_account
 from finger_pin.simulation.recording import record
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Told:
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])
             raise IntegrationError(reached, trajectory.failure, "fewer steps", result.dataset())
-        gap = open_account(result)
+        gap = open_account(left_open(result))
         if gap:
             result.attrs["account"] = gap
         return result.dataset()

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.analysis import SelfLockingMargin, critical_friction, self_locking_map, self_locking_margin
+from finger_pin.analysis import SelfLockingMap, SelfLockingMargin, critical_friction, self_locking_margin
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
-from finger_pin.mechanism.finger import Finger
 from finger_pin.views.summary import table
 
 # A margin below this is none.
 _LEAST = 1e-9
 
 
-def summarize_locking(scenario: Scenario) -> str:
+def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
     """Return when a scenario's finger locks itself, as plain text: with or without tendon friction, at which posture.
 
     Args:
         scenario: Of a finger with force closure.
+        found: The map of its finger.
 
     Raises:
         InputError: If there is no force closure.
@@ -36,7 +36,6 @@ def summarize_locking(scenario: Scenario) -> str:
             *table(("moving", "locks at", "has"), rows),
         ]
     ]
-    found = self_locking_map(Finger(finger))
     least = np.unravel_index(int(np.argmin(found.coefficient)), found.coefficient.shape)
     angles = zip(found.joints, (axis[index] for axis, index in zip(found.angles, least, strict=True)), strict=True)
     where = ", ".join(f"{name} {np.rad2deg(angle):.3g} deg" for name, angle in angles)

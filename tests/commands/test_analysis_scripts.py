@@ -99,7 +99,9 @@ def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_fi
     scenario.write_text('extends = "fig6"\n[simulation]\nduration = 0.1\n')
     code, out, lines = run("self_locking", scenario, "--output", "out")
     assert (code, lines) == (0, [])
-    assert out == f"{summarize_locking(fp.load_scenario(scenario))}\n\nFigures are in out\n"
+    loaded = fp.load_scenario(scenario)
+    found = fp.analysis.self_locking_map(fp.Finger(loaded.finger))
+    assert out == f"{summarize_locking(loaded, found)}\n\nFigures are in out\n"
     assert {each.stem for each in (tmp_path / "out").iterdir()} == {"critical_friction", "map", "runs"}
 
 

@@ -15,7 +15,8 @@ WORDS = {False: "it does not lock", True: "it locks"}
 def test_every_number_says_its_tendon_friction_and_posture_and_a_finger_that_locks_is_said_to(friction):
     overrides = {f"finger.joint_friction.{name}": friction for name in ("coulomb", "stiction")}
     scenario = fp.load_scenario("fig6", overrides)
-    without, somewhere, moving = summarize_locking(scenario).split("\n\n")
+    found = fp.analysis.self_locking_map(fp.Finger(scenario.finger))
+    without, somewhere, moving = summarize_locking(scenario, found).split("\n\n")
     assert "without tendon friction" in without
     for name in scenario.finger.joints:
         locks, has = map(float, re.search(rf"{name} +([0-9.]+) +([0-9.]+)", without).groups())
@@ -33,5 +34,5 @@ def test_the_posture_at_which_it_locks_first_is_named_where_postures_differ():
     bent = fp.load_scenario("fig6", {"finger.tendons.T5.crossings.distal.bends": True})
     found = fp.analysis.self_locking_map(fp.Finger(bent.finger))
     medial = found.angles[1][np.argmin(found.coefficient.min(axis=0))]
-    assert f"locks at {1e3 * found.coefficient.min():.3f}, at proximal " in summarize_locking(bent)
-    assert f"medial {np.rad2deg(medial):.3g} deg" in summarize_locking(bent)
+    assert f"locks at {1e3 * found.coefficient.min():.3f}, at proximal " in summarize_locking(bent, found)
+    assert f"medial {np.rad2deg(medial):.3g} deg" in summarize_locking(bent, found)
