@@ -27,12 +27,16 @@ VELOCITY_LIMIT = 20.0
 _RESERVED = (TIP_FRAME, f"{TIP_FRAME}_fixed", "universe")
 
 
-def to_urdf(description: FingerDescription) -> str:
+def to_urdf(description: FingerDescription, drawn: bool = True) -> str:
     """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
 
     Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
     and the link runs along x, its ``offset`` along the axis away. Numbers are written so that reading them gives the
     same floats.
+
+    Args:
+        description: The finger, not a hand.
+        drawn: With shapes. Its motion does not need them.
 
     Raises:
         InputError: If a joint has no link, or a name that the URDF needs itself.
@@ -40,16 +44,15 @@ def to_urdf(description: FingerDescription) -> str:
     if description.hand is not None:
         raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     links = _links(description)
-    shapes = link_shapes(description, links)
-    first, last = next(iter(links)), next(reversed(links.values()))
+    shapes = _shapes(description, links) if drawn else {}
     robot = ET.Element("robot", name=description.name)
-    for material, colour in MATERIALS.items():
+    for material, colour in (MATERIALS if drawn else {}).items():
         ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=_numbers(*colour))
-    _add_link(robot, BASE_FRAME, palm_shapes(description, first, links[first]))
+    _add_link(robot, BASE_FRAME, shapes.get(BASE_FRAME, ()))
     parent, place, twist = BASE_FRAME, (0.0, 0.0, 0.0), 0.0
     for name, link in links.items():
         child = f"{name}_link"
-        _add_link(robot, child, shapes[name], inertia_of=link)
+        _add_link(robot, child, shapes.get(name, ()), inertia_of=link)
         joint = _add_joint(robot, name, "revolute", parent, child, place, twist)
         ET.SubElement(joint, "axis", xyz=_numbers(0, 0, 1))
         lower, upper = description.joints[name].range
@@ -57,7 +60,7 @@ def to_urdf(description: FingerDescription) -> str:
         limits["velocity"] = VELOCITY_LIMIT
         ET.SubElement(joint, "limit", {key: _numbers(value) for key, value in limits.items()})
         parent, place, twist = child, (link.length, 0.0, link.offset), link.twist
-    _add_link(robot, TIP_FRAME, pad_shapes(last))
+    _add_link(robot, TIP_FRAME, shapes.get(TIP_FRAME, ()))
     _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, place, twist)
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
@@ -74,7 +77,7 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
     """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
     if description.hand is not None:
         return build_hand(description.hand)
-    model = _read(to_urdf(description)).copy()
+    model = _read(to_urdf(description, drawn=False)).copy()
     model.gravity.linear[:] = description.gravity
     return RigidBody(model, TIP_FRAME)
 
@@ -103,6 +106,13 @@ def _links(description: FingerDescription) -> dict[str, Link]:
             raise InputError(f"finger.joints.{name}.link", "is needed to generate a URDF")
         links[name] = joint.link
     return links
+
+
+def _shapes(description: FingerDescription, links: dict[str, Link]) -> dict[str, list[Shape]]:
+    """Return what is drawn of the links, by joint, of the palm and of the fingertip, by frame."""
+    first, last = next(iter(links)), next(reversed(links.values()))
+    palm, pad = palm_shapes(description, first, links[first]), pad_shapes(last)
+    return {BASE_FRAME: palm, **link_shapes(description, links), TIP_FRAME: pad}
 
 
 def _add_link(robot: ET.Element, name: str, shapes: Iterable[Shape], inertia_of: Link | None = None) -> None:

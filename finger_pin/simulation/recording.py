@@ -86,11 +86,12 @@ def record(
     method: str,
     times: Array | None = None,
     following: Following | None = None,
+    text: str = "",
 ) -> Recording:
     """Return all signals of a trajectory at times, by default the scenario's, as far as the trajectory goes.
 
     The signals are recomputed from the states by the evaluation that the dynamics use; what has followed the motion
-    knows them already, at the scenario's times.
+    knows them already, at the scenario's times. The scenario's text is written anew unless it is given.
     """
     times = scenario.sample_times() if times is None else times
     times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
@@ -118,7 +119,7 @@ def record(
         coordinates["passive_tendon"] = list(routing.passive_names)
     if loop.finger.actuators.names:
         coordinates["motor"] = ("motor", list(loop.finger.actuators.names), {"long_name": "motor"})
-    return Recording(variables, coordinates, _attributes(scenario, trajectory, method))
+    return Recording(variables, coordinates, _attributes(scenario, text or to_toml(scenario), trajectory, method))
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
@@ -264,12 +265,12 @@ def _entry(
     return dims, np.asarray(values), attributes
 
 
-def _attributes(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
+def _attributes(scenario: Scenario, text: str, trajectory: Trajectory, method: str) -> dict[str, Any]:
     settings = scenario.simulation
     statistics: Mapping[str, Any] = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,
-        "scenario": to_toml(scenario),
+        "scenario": text,
         "method": method,
         "rtol": settings.rtol,
         "atol_scale": settings.atol_scale,

@@ -28,7 +28,7 @@ from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.integrator import Follow, integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import (
@@ -190,7 +190,8 @@ def simulate(
     def recorded(found: Trajectory) -> Recording:
         # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return record(scenario, loop, found, method, following=following if found is first else None)
+            followed = following if found is first else None
+            return record(scenario, loop, found, method, following=followed, text=text.result())
 
     chunk = CHUNK if observe is None else _CHUNK_OBSERVED
     # Only what is a function of time and state can be evaluated beside the integration.
@@ -200,6 +201,7 @@ def simulate(
     following = Following(loop, scenario.sample_times()) if beside else None
     with ThreadPoolExecutor(1) as aside:
         judging = aside.submit(quick_margin, scenario) if judged else None
+        text = aside.submit(to_toml, scenario)
         first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
         margin = judging.result() if judging else None
     close = locking_advice(math.inf if margin is None else margin)
