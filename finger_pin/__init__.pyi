@@ -17,8 +17,8 @@ from .mechanism.finger import Hand as Hand
 from .mechanism.from_mujoco import from_mujoco as from_mujoco
 from .mechanism.mjcf import to_mjcf as to_mjcf
 from .simulation.convergence import check_convergence as check_convergence
-from .simulation.recording import load_result as load_result
-from .simulation.recording import save as save
+from .simulation.netcdf import load_result as load_result
+from .simulation.netcdf import save as save
 from .simulation.simulate import simulate as simulate
 from .simulation.simulator import Simulator as Simulator
 from .studies import optimise as optimise

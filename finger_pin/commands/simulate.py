@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
-from finger_pin.commands.drawing import Drawing, NotDrawn
 from finger_pin.commands.imports import without
 from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
+from finger_pin.commands.writing import NotDrawn, Writing
 from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
 
 if TYPE_CHECKING:
@@ -52,47 +51,42 @@ def simulate(
     with ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         stack.enter_context(without("dask", "xarray"))
-        # Both this process and the one that draws need it.
+        # Both this process and the one that writes need it.
         import numpy  # noqa: F401
 
-        drawing = stack.enter_context(Drawing()) if figures else None
+        writing = stack.enter_context(Writing(figures))
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
-        from finger_pin.views.summary import summarize
 
         loaded = load_scenario(scenario, changed) if mujoco is None else _hand(mujoco, changed, quiet)
         output = output or Path("results", default_name(loaded, settings, duration, method))
         if check:
             tightened(loaded)
         with ResultFolder(output) as folder:
-
-            def begin(result: Recording | xr.Dataset) -> None:
-                # After an interruption the data are kept, and the views are not drawn: that takes too long.
-                if drawing is not None and not interrupts.requested:
-                    drawing.start(result, folder.stage / "figures")
-
-            result, problem = compute(loaded, interrupts, quiet, live, check, begin)
+            result, problem = compute(loaded, interrupts, quiet, live, check)
             if result is None:
                 assert problem is not None
                 problem.add_note("nothing was computed")
                 raise problem
             with noted("earlier results are as they were"):
                 with interrupts.patient():
-                    write(result, folder, drawing)
-                trouble = draw(result, folder, drawing, interrupts)
+                    # After an interruption the data are kept, and the views are not drawn: that takes too long.
+                    summary = write(result, folder, writing, drawn=not interrupts.requested)
+                trouble = draw(result, folder, writing, interrupts)
                 problem = (problem or trouble) if interrupts.requested else (trouble or problem)
                 with interrupts.patient():
                     folder.publish()
         if not quiet:
-            print_text(f"{summarize(result)}\n\nResults are in {output}")
+            print_text(f"{summary}\n\nResults are in {output}")
         if problem is not None:
             problem.add_note(f"what was computed is in {output}")
             raise problem
         if view:
+            from finger_pin.simulation.recorded import as_dataset
             from finger_pin.views.viewer import view as show
 
-            show(result)
+            show(as_dataset(result))
 
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
@@ -115,19 +109,11 @@ def default_name(scenario: Scenario, settings: list[str], duration: str | None, 
 
 
 def compute(
-    scenario: Scenario,
-    interrupts: Interrupts,
-    quiet: bool,
-    live: bool,
-    check: bool,
-    begin: Callable[[Recording | xr.Dataset], None],
-) -> tuple[xr.Dataset | None, BaseException | None]:
-    """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did.
-
-    Before that what there is to draw is given to ``begin``.
-    """
+    scenario: Scenario, interrupts: Interrupts, quiet: bool, live: bool, check: bool
+) -> tuple[Recording | xr.Dataset | None, BaseException | None]:
+    """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did."""
     from finger_pin.simulation.convergence import check_convergence
-    from finger_pin.simulation.simulate import simulate
+    from finger_pin.simulation.running import run
 
     if live:
         from finger_pin.views.viewer import LiveView
@@ -140,43 +126,43 @@ def compute(
         warnings.simplefilter("ignore", ScenarioWarning)
         observe = viewer.observe if viewer else None
         try:
-            result = simulate(
-                scenario,
-                progress=progress,
-                observe=observe,
-                stop=lambda: interrupts.requested,
-                plain=None if check else begin,
-            )
+            result = run(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested)
         except (IntegrationError, Interrupted) as error:
-            if check and error.result is not None:
-                begin(error.result)
             return error.result, error
         if not check:
             return result, None
+        whole = result.dataset()
         try:
-            found = check_convergence(scenario, result, progress=progress, stop=lambda: interrupts.requested)
-            result = found.attach(result)
+            found = check_convergence(scenario, whole, progress=progress, stop=lambda: interrupts.requested)
+            return found.attach(whole), None
         except IntegrationError as error:
             complain("simulate", f"convergence could not be checked: {error}")
         except Interrupted as error:
             error.add_note("before convergence was checked")
-            return result, error
-        begin(result)
-    return result, None
+            return whole, error
+    return whole, None
 
 
-def write(result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None) -> None:
-    """Write the data, while another process draws the figures; if they cannot be written, it stops."""
+def write(result: Recording | xr.Dataset, folder: ResultFolder, writing: Writing, drawn: bool) -> str:
+    """Have the data written, and figures drawn beside if asked; return the summary."""
     try:
-        folder.write(result)
+        writing.start(result, folder, drawn)
+        summary = writing.written()
+        if summary is None:
+            from finger_pin.simulation.recorded import as_dataset
+            from finger_pin.views.summary import summarize
+
+            whole = as_dataset(result)
+            folder.write(whole)
+            summary = summarize(whole)
+        return summary
     except BaseException:
-        if drawing is not None:
-            drawing.stop()
+        writing.stop()
         raise
 
 
 def draw(
-    result: xr.Dataset, folder: ResultFolder, drawing: Drawing | None, interrupts: Interrupts
+    result: Recording | xr.Dataset, folder: ResultFolder, writing: Writing, interrupts: Interrupts
 ) -> BaseException | None:
     """Draw the animation and wait for the figures, all or none; return what went wrong if anything did."""
     try:
@@ -185,14 +171,13 @@ def draw(
         from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")
-        if drawing is not None:
-            drawing.wait()
+        writing.wait()
     except OSError:
+        writing.stop()
         raise
     except (KeyboardInterrupt, Exception) as error:
         # A result is worth more than its pictures.
-        if drawing is not None:
-            drawing.stop()
+        writing.stop()
         folder.discard_views()
         if isinstance(error, KeyboardInterrupt):
             return error

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -31,6 +33,15 @@ class Recording:
         times: Array = self.coordinates["time"][1]
         return times
 
+    def __contains__(self, name: str) -> bool:
+        """Return whether there is a variable or coordinate of a name."""
+        return name in self.variables or name in self.coordinates
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the values of a variable or coordinate."""
+        entry = self.variables.get(name) or self.coordinates[name]
+        return np.asarray(entry[1] if isinstance(entry, tuple) else entry)
+
     def cut(self, count: int) -> None:
         """Keep the first samples only."""
         self.variables = {name: (dims, all_[:count], own) for name, (dims, all_, own) in self.variables.items()}
@@ -41,3 +52,8 @@ class Recording:
         import xarray as xr
 
         return xr.Dataset(self.variables, coords=self.coordinates, attrs=self.attrs)
+
+
+def as_dataset(result: Recording | xr.Dataset) -> xr.Dataset:
+    """Return a result as a Dataset."""
+    return result.dataset() if isinstance(result, Recording) else result

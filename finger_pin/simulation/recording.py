@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from importlib import metadata
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from finger_pin.core.textbook import Trajectory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.files import replacing
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.rows import Rows
@@ -27,7 +25,7 @@ from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.touching import contact_coordinates, contact_variables
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR = ("time", "motor")
@@ -120,37 +118,6 @@ def record(
     if loop.finger.actuators.names:
         coordinates["motor"] = ("motor", list(loop.finger.actuators.names), {"long_name": "motor"})
     return Recording(variables, coordinates, _attributes(scenario, text or to_toml(scenario), trajectory, method))
-
-
-def save(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a result to a netCDF4 file, whole or not at all.
-
-    Raises:
-        OSError: If it cannot be written, such as on a full disk.
-    """
-    with replacing(path) as temporary:
-        try:
-            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
-        except RuntimeError as error:
-            # The netCDF library does not say why; as many plain bytes do where the disk is full.
-            with open(temporary, "ab") as file:
-                file.write(bytes(dataset.nbytes + 2**20))
-            raise OSError(f"{Path(path).name}: {error}") from error
-
-
-def load_result(path: str | Path) -> xr.Dataset:
-    """Read a result that `save` wrote into memory.
-
-    Args:
-        path: A netCDF file, or a folder of results, whose ``trajectory.nc`` is read.
-
-    Raises:
-        OSError: If there is no such file, or it cannot be read.
-    """
-    file = Path(path, "trajectory.nc") if Path(path).is_dir() else path
-    import xarray as xr
-
-    return xr.load_dataset(file, engine="netcdf4")
 
 
 def _signals(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 from finger_pin.exceptions import InputError
 from finger_pin.publishing import NEW, publish
-from finger_pin.simulation.recording import save
+from finger_pin.simulation.netcdf import save
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,70 +2,23 @@
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.analysis.locking_margin import locking_advice, quick_margin
-from finger_pin.analysis.passivity import micro_damping_advice
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.control.compiled import compiled_control, sampled_control
-from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.own import OwnController, Samples
-from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.closed_loop import LoopSignals
+from finger_pin.control.own import Samples
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
-from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.cvode import integrate_cvode
-from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import Follow, integrate_compiled
-from finger_pin.core.stepper import TABLEAUS, Stepper
-from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
-from finger_pin.description.loading import load_scenario, to_toml
-from finger_pin.description.routing import Array
-from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
-from finger_pin.exceptions import (
-    AccuracyWarning,
-    InputError,
-    IntegrationError,
-    Interrupted,
-    MicroDampingWarning,
-    SelfLockingWarning,
-)
+from finger_pin.core.textbook import Stop
+from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.accuracy import (
-    CHUNK,
-    check_memory,
-    close_account,
-    estimate_error,
-    finite_part,
-    open_account,
-    ringing,
-    too_stiff,
-)
-from finger_pin.simulation.following import Following
-from finger_pin.simulation.recorded import Recording
-from finger_pin.simulation.recording import record
-from finger_pin.simulation.starting import own_parts, packed_state
+from finger_pin.simulation.running import run
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
-# Where tolerances are tight already, it is rounding that an integrator cannot get below.
-_TIGHT = 1e-8
-_ADVICE_TIGHT = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
-_ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within the joints' ranges"
-_CONTINUOUS = "Radau"
-# Steps between two looks at a compiled simulation that is observed.
-_CHUNK_OBSERVED = 4
 
 
 def simulate(
@@ -80,7 +33,6 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
-    plain: Callable[[Recording], None] | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario, from rest on its reference unless something else is asked for.
 
@@ -108,7 +60,6 @@ def simulate(
         progress: Called with the simulated time, s, now and then.
         observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
-        plain: Called with the result as plain arrays, before xarray is imported to make a Dataset of it.
 
     Returns:
         Every signal of the model at the scenario's sample rate, and the energy account. Where that does not close to
@@ -129,166 +80,15 @@ def simulate(
             by how much, rad rms over joints and time. It has none where the core does not integrate in one piece.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
-    if isinstance(scenario, str | Path):
-        scenario = load_scenario(scenario)
-    check_memory(scenario)
-    method = scenario.simulation.method
-    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
-    if initial is not None:
-        loop = replace(loop, start=packed_state(initial, loop.finger))
-    elif loop.finger.actuators.names:
-        # Before the controller is sampled: then it must not be asked for a start.
-        loop = replace(loop, start=loop.initial_state())
-    if loop.finger.surroundings is not None:
-        start = loop.finger.layout.unpack(loop.initial_state())
-        assert start.object_pose is not None
-        loop.finger.surroundings.check(start.position, start.object_pose)
-    own = own_parts(controller, reference, fingertip_force, initial, finger)
-    # The margin is that of the paper's controller on the scenario's reference.
-    planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
-    judged = controller is None and reference is None and planned
-    judged = judged and loop.finger.routing.force_closure().holds
-    driving = micro_damping_advice(scenario.finger)
-    if driving:
-        warnings.warn(driving, MicroDampingWarning, stacklevel=2)
-    sampling = sampling_settings(scenario, control_period)
-    if sampling is None and isinstance(loop.controller, MeasuringController):
-        raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
-    positioned = bool(np.any(loop.finger.actuators.holds))
-    if positioned and method not in TABLEAUS:
-        raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
-    if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
-        if positioned:
-            raise InputError(
-                "controller.sampling.period", "is missing: beside position drives this controller is sampled"
-            )
-        method = _CONTINUOUS
-    if scenario.simulation.method not in METHODS_IN_NUMPY:
-        loop = loop.compiled()
-    answers = loop.controller
-    sampled = None if sampling is None else SampledController(loop, sampling)
-    if positioned:
-        duration = scenario.simulation.duration
-        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
-        loop = replace(loop, drives=drives, parts=())
-    if sampled is not None:
-        loop = replace(loop, controller=sampled, parts=())
-    elif own:
-        # A wrong answer of a user's own controller is refused before anything is computed.
-        loop.evaluate(0.0, loop.initial_state())
-
-    def watch(time: float, x: Array) -> None:
-        if progress is not None:
-            progress(time)
-        if observe is not None:
-            observe(time, loop.evaluate(time, x))
-
-    def repeated(other: Scenario, enough: Stop) -> Trajectory:
-        asked = stop or (lambda: False)
-        return _integrate(other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or asked())
-
-    def recorded(found: Trajectory) -> Recording:
-        # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            followed = following if found is first else None
-            return record(scenario, loop, found, method, following=followed, text=text.result())
-
-    chunk = CHUNK if observe is None else _CHUNK_OBSERVED
-    # Only what is a function of time and state can be evaluated beside the integration.
-    pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
-    # The fingers of a hand that move apart are integrated side by side already.
-    beside = pure and observe is None and not loop.parts
-    following = Following(loop, scenario.sample_times()) if beside else None
-    with ThreadPoolExecutor(1) as aside:
-        judging = aside.submit(quick_margin, scenario) if judged else None
-        text = aside.submit(to_toml, scenario)
-        first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
-        margin = judging.result() if judging else None
-    close = locking_advice(math.inf if margin is None else margin)
-    if close:
-        warnings.warn(close, SelfLockingWarning, stacklevel=2)
-    run = close_account(scenario, first, repeated, recorded)
-    trajectory, recording = run.trajectory, run.result
-    reached = float(trajectory.breakpoints[-1])
-    error, inaccurate = estimate_error(scenario, run, repeated, margin=math.inf if margin is None else margin)
-    slow = ringing(loop, trajectory)
-    inaccurate = inaccurate or too_stiff(recording, loop.finger, scenario.simulation.atol_scale)
-    if inaccurate:
-        warnings.warn(inaccurate, AccuracyWarning, stacklevel=2)
-    if margin is not None:
-        recording.attrs["self_locking_margin"] = margin
-    if np.isfinite(error):
-        recording.attrs["estimated_error"] = error
-    gap = "" if trajectory.failure else open_account(run.left)
-    told = {"micro_damping": driving, "own": own, "accuracy": inaccurate, "account": gap, "ringing": slow}
-    recording.attrs |= {name: text for name, text in told.items() if text}
-    excess = finite_part(recording)
-    if plain is not None:
-        plain(recording)
-    result = recording.dataset()
-    if trajectory.failure:
-        if isinstance(answers, OwnController) and answers.problem_time >= reached:
-            raise IntegrationError(reached, answers.problem, "another controller", result)
-        tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT
-        advice = _ADVICE_TIGHT if tight else _ADVICE
-        if "physical range" in trajectory.failure:
-            advice = _ADVICE_RUNAWAY
-        reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
-        raise IntegrationError(reached, reason, advice, result)
-    if excess:
-        raise IntegrationError(result.attrs["end_time"], f"{excess} is not finite after that", _ADVICE, result)
-    if trajectory.interrupted:
-        raise Interrupted(reached, result)
-    return result
-
-
-def _integrate(
-    scenario: Scenario,
-    loop: ClosedLoop,
-    method: str,
-    watch: Watch,
-    chunk: int,
-    stop: Stop | None,
-    follow: Follow | None = None,
-) -> Trajectory:
-    settings, controller = scenario.simulation, loop.controller
-    start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
-    if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
-        control, tableau = compiled_control(loop) or sampled_control(loop), TABLEAUS[method]()
-        stepper = Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force)
-        if loop.drives is not None:
-            stepper.drive(loop.drives.compiled)
-        return integrate_compiled(
-            stepper,
-            settings.duration,
-            loop.finger.layout.names,
-            held=controller if isinstance(controller, SampledController) else None,
-            knots=loop.knots(),
-            watch=watch,
-            chunk=chunk,
-            together=chunk == _CHUNK_OBSERVED,
-            stop=stop,
-            follow=follow,
-        )
-    if method == "CVODE":
-        return integrate_cvode(
-            loop.rhs,
-            start,
-            settings.duration,
-            rtol=settings.rtol,
-            atol=atol,
-            longest=loop.longest_step(),
-            watch=watch,
-            stop=stop,
-        )
-    return integrate(
-        loop.rhs,
-        start,
-        settings.duration,
-        method=method,
-        rtol=settings.rtol,
-        atol=atol,
-        longest=loop.longest_step(),
-        watch=watch,
+    return run(
+        scenario,
+        controller=controller,
+        reference=reference,
+        fingertip_force=fingertip_force,
+        finger=finger,
+        initial=initial,
+        control_period=control_period,
+        progress=progress,
+        observe=observe,
         stop=stop,
-    )
+    ).dataset()

@@ -22,7 +22,7 @@ import xarray as xr
 
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.simulation.recording import save
+from finger_pin.simulation.netcdf import save
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, versions
 from finger_pin.studies.keys import Starting
 from finger_pin.studies.metrics import Metric

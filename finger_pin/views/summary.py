@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger_pin.analysis import (
-    locking_advice,
-)
-from finger_pin.description.routing import Array
 from finger_pin.views.account import account
 from finger_pin.views.trees import is_tree
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from finger_pin.description.routing import Array
+
 _SETTLING = 1.0
 _LONG = 2.0
+_WARNINGS = ("self_locking", "micro_damping", "accuracy", "account", "ringing")
 # What counts as sliding, m/s.
 _CREEP = 1e-6
 
@@ -62,9 +61,8 @@ def _own(result: xr.Dataset) -> list[str]:
 
 
 def _warnings(result: xr.Dataset) -> list[str]:
-    advice = locking_advice(float(result.attrs.get("self_locking_margin", np.inf)))
-    told = (advice, *(str(result.attrs.get(name, "")) for name in ("micro_damping", "accuracy", "account", "ringing")))
-    return [line for each in told if each for line in textwrap.wrap(f"Warning: {each}", 80)]
+    told = [result.attrs[name] for name in _WARNINGS if name in result.attrs]
+    return [line for each in told for line in textwrap.wrap(f"Warning: {each}", 80)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:

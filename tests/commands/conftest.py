@@ -1,6 +1,5 @@
 """The command simulate in an empty folder, with and without views."""
 
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -38,4 +37,4 @@ def quick(monkeypatch):
         Path(path).write_text("animation")
 
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", write_animation)
-    monkeypatch.setattr("finger_pin.commands.simulate.Drawing", lambda: nullcontext(Quick()))
+    monkeypatch.setattr("finger_pin.commands.simulate.Writing", Quick)

@@ -11,7 +11,6 @@ import shlex
 import shutil
 import tomllib
 import webbrowser
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -112,7 +111,7 @@ def run_scenario(text, name):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)
-    monkeypatch.setattr("finger_pin.commands.simulate.Drawing", lambda: nullcontext(Quick()))
+    monkeypatch.setattr("finger_pin.commands.simulate.Writing", Quick)
     text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
     for found in SHOWN.finditer(text):
         kind, block, code = found.groups(default="")

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import signal
 import sys
 import time
@@ -13,9 +14,11 @@ from harness import ALL, Quick, subprocess_of
 from test_files import contents
 
 import finger_pin as fp
-from finger_pin.commands.drawing import Drawing, NotDrawn
+from finger_pin.commands.writing import NotDrawn, Writing
 from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import IntegrationError
+from finger_pin.simulation.results import ResultFolder
+from finger_pin.views.summary import summarize
 
 
 def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, monkeypatch):
@@ -24,7 +27,7 @@ def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, mo
     def fail(scenario, **options):
         raise IntegrationError(0.002, "the step size became too small", "a smaller simulation.rtol", partial)
 
-    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", fail)
+    monkeypatch.setattr("finger_pin.simulation.running.run", fail)
     code, out, lines = run("s.toml", "--output", "out")
     assert code == 3
     assert len(lines) == 1
@@ -77,7 +80,7 @@ def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monke
     def fail(scenario, **options):
         raise IntegrationError(0.0, "not finite", "another method", None)
 
-    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", fail)
+    monkeypatch.setattr("finger_pin.simulation.running.run", fail)
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, out, len(lines)) == (3, "", 1)
     assert "nothing was computed" in lines[0]
@@ -101,7 +104,7 @@ def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monk
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, monkeypatch, number):
-    simulate = fp.simulate
+    from finger_pin.simulation.running import run as simulate
 
     def interrupted(scenario, *, stop, **options):
         asked = []
@@ -114,7 +117,7 @@ def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, mon
 
         return simulate(scenario, stop=counted, **options)
 
-    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", interrupted)
+    monkeypatch.setattr("finger_pin.simulation.running.run", interrupted)
     handler = signal.getsignal(number)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "5")
     assert signal.getsignal(number) is handler
@@ -137,46 +140,87 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
         time.sleep(1.0)
         pytest.fail("went on")
 
-    monkeypatch.setattr("finger_pin.simulation.simulate.simulate", stubborn)
+    monkeypatch.setattr("finger_pin.simulation.running.run", stubborn)
     code, out, lines = run("s.toml", "--output", "out")
     assert (code, out, lines) == (130, "", ["simulate.py: interrupted"])
     assert contents(here) == before
 
 
-def test_the_process_that_draws_says_what_went_wrong_and_leaves_with_the_one_that_started_it(
+def test_the_process_that_writes_says_what_went_wrong_and_leaves_with_the_one_that_started_it(
     tmp_path, monkeypatch, capfd
 ):
     result = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
-    (tmp_path / "file").touch()
-    with monkeypatch.context() as broken:
-        broken.setitem(sys.modules, "finger_pin.views.plots", None)
-        with Drawing() as drawing:
-            drawing.process.join()
-            drawing.start(result, tmp_path)
-            with pytest.raises(NotDrawn, match="plots"):
-                drawing.wait()
-    with Drawing() as drawing:
-        drawing.start(result, tmp_path / "file")
-        with pytest.raises(FileExistsError):
-            drawing.wait()
-    with Drawing() as drawing:
-        drawing.start(result.drop_vars("tendon_tension"), tmp_path / "no\nwhere é")
-        with pytest.raises(NotDrawn, match="tendon_tension"):
-            drawing.wait()
-    with Drawing() as drawing:
-        os.kill(drawing.process.pid, signal.SIGKILL)
-        drawing.process.join()
-        drawing.start(result, tmp_path)
-        with pytest.raises(NotDrawn, match="killed"):
-            drawing.wait()
-    with Drawing() as drawing:
-        drawing.start(result, tmp_path / "figures")
-        drawing.wait()
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"fig6.png", "losses.png", "energy.png"}
-    with Drawing() as drawing:
+    with ResultFolder(tmp_path / "out") as folder:
+        with monkeypatch.context() as broken:
+            broken.setitem(sys.modules, "finger_pin.views.plots", None)
+            with Writing(figures=True) as writing:
+                writing.process.join()
+                writing.start(result, folder)
+                assert writing.written() is None
+                with pytest.raises(NotDrawn, match="plots"):
+                    writing.wait()
+        with Writing(figures=True) as writing:
+            # No figure without it.
+            writing.start(result.drop_vars("joint_reference"), folder)
+            assert writing.written() is not None
+            with pytest.raises(NotDrawn, match="joint_reference"):
+                writing.wait()
+        with Writing(figures=True) as writing:
+            os.kill(writing.process.pid, signal.SIGKILL)
+            writing.process.join()
+            writing.start(result, folder)
+            assert writing.written() is None
+            with pytest.raises(NotDrawn, match="killed"):
+                writing.wait()
+        shutil.rmtree(folder.stage / "figures")
+        for figures, drawn in ((False, True), (True, False), (True, True)):
+            assert not (folder.stage / "figures").exists()
+            with Writing(figures) as writing:
+                writing.start(result, folder, drawn)
+                assert writing.written() == summarize(result)
+                assert fp.load_result(folder.stage).equals(result)
+                writing.wait()
+        found = {path.name for path in (folder.stage / "figures").iterdir()}
+        assert found == {"fig6.png", "losses.png", "energy.png"}
+        shutil.rmtree(folder.stage / "figures")
+        (folder.stage / "figures").touch()
+        with Writing(figures=True) as writing:
+            writing.start(result, folder)
+            assert writing.written() == summarize(result)
+            with pytest.raises(FileExistsError):
+                writing.wait()
+        shutil.rmtree(folder.stage)
+        folder.stage.touch()
+        with Writing(figures=True) as writing:
+            writing.start(result, folder)
+            with pytest.raises(FileExistsError, match=re.escape(str(folder.stage))):
+                writing.written()
+    with Writing(figures=True) as writing:
         pass
-    assert drawing.process.exitcode == -signal.SIGKILL
+    assert writing.process.exitcode == -signal.SIGKILL
     assert capfd.readouterr().err == ""
+
+
+def test_data_are_written_though_the_process_that_writes_is_killed(run, here, monkeypatch):
+    started = Writing.start
+
+    def killed(writing, *given):
+        os.kill(writing.process.pid, signal.SIGKILL)
+        writing.process.join()
+        started(writing, *given)
+
+    monkeypatch.setattr(Writing, "start", killed)
+    code, out, lines = run("s.toml", "--output", "out")
+    assert (code, lines) == (
+        1,
+        [
+            "simulate.py: animation and figures cannot be drawn: the process that draws was killed; "
+            "what was computed is in out"
+        ],
+    )
+    assert set(contents(here / "out")) == {"scenario.toml", "trajectory.nc"}
+    assert fp.load_result("out").sizes["time"] > 1
+    assert "Tracking error" in out
 
 
 def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(run, here, quick, monkeypatch):

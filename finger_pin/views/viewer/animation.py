@@ -6,11 +6,10 @@ import os
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
@@ -25,6 +24,11 @@ from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 from finger_pin.views.viewer.things import Things
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.simulation.recorded import Recording
+
 Indices = NDArray[np.intp]
 
 #: Frames per second of motion, and most frames of one page: a longer motion gets fewer per second.
@@ -34,7 +38,7 @@ _POSITIONS_IN_VIEW = 40
 
 
 def write_animation(
-    result: xr.Dataset,
+    result: xr.Dataset | Recording,
     path: str | os.PathLike[str],
     *,
     forces: ForcePolytope | None = None,
@@ -65,7 +69,7 @@ def write_animation(
 
 
 def animation_page(
-    result: xr.Dataset,
+    result: xr.Dataset | Recording,
     forces: ForcePolytope | None = None,
     ghost: xr.Dataset | None = None,
     finger: Finger | None = None,
@@ -138,7 +142,7 @@ class Motion:
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
-    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE, finger: Finger | None = None) -> Motion:
+    def of(cls, result: xr.Dataset | Recording, rate: float = FRAME_RATE, finger: Finger | None = None) -> Motion:
         """Choose the frames of a result.
 
         Args:
@@ -169,7 +173,7 @@ class Motion:
         return cls(scene, title, time[frames], position, tension, palm, things)
 
 
-def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
+def _strand_tensions(scene: Scene, result: xr.Dataset | Recording, frames: Indices) -> Array:
     # The proximal half of a passive tendon has the result's `passive_tension_proximal`.
     description = scene.geometry.description
     tension = _variable(result, "tendon_tension")[frames]
@@ -182,7 +186,7 @@ def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array
     return np.concatenate([tension[:, :actuated], halves], axis=1)
 
 
-def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:
+def _palm(result: xr.Dataset | Recording, frames: Indices) -> LinkPoses | None:
     if "palm_position" not in result:
         return None
     quaternions = _variable(result, "palm_orientation")[frames]
@@ -196,13 +200,13 @@ def _frame_indices(time: Array, rate: float) -> Indices:
     return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
 
 
-def _variable(result: xr.Dataset, name: str) -> Array:
-    if name not in result.variables:
+def _variable(result: xr.Dataset | Recording, name: str) -> Array:
+    if name not in result:
         raise InputError(f"result.{name}", "is missing; the viewer shows what simulate returned")
-    return np.asarray(result[name].values, dtype=float)
+    return np.asarray(result[name], dtype=float)
 
 
-def _scenario(result: xr.Dataset) -> dict[str, Any]:
+def _scenario(result: xr.Dataset | Recording) -> dict[str, Any]:
     try:
         scenario = tomllib.loads(result.attrs["scenario"])
     except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -18,6 +17,7 @@ from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, so
 
 if TYPE_CHECKING:
     import meshcat
+    import xarray as xr
 
 _SIDES = 8
 _LOOSE = (0.62, 0.64, 0.67)

@@ -8,10 +8,9 @@ import sys
 import time
 import webbrowser
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
@@ -24,6 +23,9 @@ from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Scene
 from finger_pin.views.viewer.server import PageServer
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Upper end of the legend before a live tension exceeds it, N.
 LIVE_TENSION = 10.0

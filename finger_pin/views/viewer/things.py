@@ -7,16 +7,20 @@ import math
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-import xarray as xr
 
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command, cylinder, mesh, placed
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from finger_pin.simulation.recorded import Recording
 
 _FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
@@ -49,7 +53,7 @@ class Things:
 
     @classmethod
     def of(
-        cls, result: xr.Dataset, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
+        cls, result: xr.Dataset | Recording, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
     ) -> Things | None:
         """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
 
@@ -64,15 +68,15 @@ class Things:
             return None
         described = tomllib.loads(result.attrs["scenario"]).get("environment", {}).get("objects", {})
         objects = {name: Object.model_validate(each) for name, each in described.items()}
-        level, normal = result["contact_level"].values, result["contact_normal_force"].values
+        level, normal = np.asarray(result["contact_level"]), np.asarray(result["contact_normal_force"])
         steepness = np.max(np.divide(level, normal, out=np.zeros_like(level), where=normal > 1e-6), axis=0)
-        at = result.isel(time=np.searchsorted(result["time"].values, time))
-        closed = at.isel(contact=np.flatnonzero(steepness > 0.0))
-        parts = [closed[f"contact_{name}"].values for name in ("point", "force", "normal")]
+        frames, closed = np.searchsorted(np.asarray(result["time"]), time), np.flatnonzero(steepness > 0.0)
+        parts = [np.asarray(result[f"contact_{name}"])[np.ix_(frames, closed)] for name in ("point", "force", "normal")]
         found = {name: np.broadcast_to(each.pose, (len(time), 7)) for name, each in objects.items() if palm is not None}
-        for name in result["object"].values if "object_position" in result else ():
-            own = at.sel(object=name)
-            found[str(name)] = np.concatenate([own["object_position"], own["object_orientation"]], axis=-1)
+        if "object_position" in result:
+            moved = [np.asarray(result[f"object_{name}"])[frames] for name in ("position", "orientation")]
+            names = np.asarray(result["object"]).tolist()
+            found |= dict(zip(names, np.moveaxis(np.concatenate(moved, axis=-1), 1, 0), strict=True))
         poses = np.stack(list(found.values()), axis=1) if found else np.zeros((len(time), 0, 7))
         if palm is not None:
             turned = [np.einsum("mij,mcj->mci", palm.rotation, each) for each in (*parts, poses[..., :3])]
