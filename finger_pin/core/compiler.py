@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FunctionType
 from typing import Any
 
@@ -17,6 +19,8 @@ from numba.extending import typeof_impl
 
 from finger_pin.core.compilation import Later
 
+# After so many new objects garbage is looked for.
+_OFTEN = 100_000
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     # IEEE arithmetic is kept, so that NaN stays NaN; only a product and a sum may be fused.
@@ -91,13 +95,24 @@ def inlined(function: Callable[..., Any], **options: Any) -> Any:
     return numba.njit(**{**_OPTIONS, **options}, pipeline_class=_TextCompiler)(function)
 
 
+@contextmanager
+def _tidy() -> Iterator[None]:
+    """Look for garbage meanwhile: a compiler leaves much of it, and commands look for it rarely."""
+    rarely, *rest = gc.get_threshold()
+    gc.set_threshold(min(rarely, _OFTEN), *rest)
+    try:
+        yield
+    finally:
+        gc.set_threshold(rarely, *rest)
+
+
 def machine_code(signature: str, function: FunctionType, name: str) -> tuple[bytes, bool]:
     """Compile a function for C under a name; return an object file, and whether it needs nothing of numba's.
 
     Nothing tells the caller of an exception: the functions are those that raise none.
     """
     arguments, result = normalize_signature(signature)
-    with global_compiler_lock:
+    with global_compiler_lock, _tidy():
         dispatcher = inlined(function)
         dispatcher.compile(result(*arguments))
         (compiled,) = dispatcher.overloads.values()
