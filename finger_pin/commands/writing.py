@@ -26,6 +26,8 @@ Trouble = OSError | str
 
 # Where a process can safely be copied, the one that draws has what this one has imported.
 _COPIED = sys.platform == "linux"
+# More bytes than this are not sent.
+_LARGE = 1e8
 _CONTEXT: Any = multiprocessing.get_context("fork" if _COPIED else "spawn")
 
 
@@ -49,14 +51,20 @@ class Writing:
 
     def __enter__(self) -> Self:
         """Start the process."""
+        self._begin()
+        return self
+
+    def _begin(self, *given: Any) -> None:
         self._pipe, theirs = _CONTEXT.Pipe()
-        self.process = _CONTEXT.Process(target=_serve, args=(theirs, self._pipe, self._figures))
+        self.process = _CONTEXT.Process(target=_serve, args=(theirs, self._pipe, self._figures, *given))
         self.process.start()
         theirs.close()
-        return self
 
     def __exit__(self, *error: object) -> None:
         """End the process."""
+        self._end()
+
+    def _end(self) -> None:
         self.stop()
         self.process.join()
         self._pipe.close()
@@ -71,8 +79,14 @@ class Writing:
 
     def start(self, result: Recording | xr.Dataset, folder: ResultFolder, drawn: bool = True) -> None:
         """Have a result written into the stage of a folder, and its figures beside it."""
+        given = (result, folder, drawn)
+        if _COPIED and result.nbytes > _LARGE:
+            # A new copy of this process has it without a copy of it.
+            self._end()
+            self._begin(given)
+            return
         with suppress(BrokenPipeError):  # `wait` reports why it ended.
-            self._pipe.send((result, folder, drawn))
+            self._pipe.send(given)
 
     def written(self) -> str | None:
         """Wait until the data are written; return a summary, or None if the process could do neither.
@@ -106,8 +120,8 @@ class Writing:
             return "the process that draws was killed", ""
 
 
-def _serve(pipe: Connection, other: Connection, figures: bool) -> None:
-    """Write and draw the result that comes through a pipe, and answer twice: what went wrong, and the summary."""
+def _serve(pipe: Connection, other: Connection, figures: bool, given: Any = None) -> None:
+    """Write and draw the result that is given or comes through a pipe; answer twice, what went wrong and a summary."""
     # Its copy of the other end would keep the pipe open when the process that started it is no more.
     other.close()
     if hasattr(os, "setsid"):
@@ -128,8 +142,8 @@ def _serve(pipe: Connection, other: Connection, figures: bool) -> None:
 
             if figures:
                 from finger_pin.views.plots import saving
-        given, folder, drawn = pipe.recv()
-        result, names, draw = as_dataset(given), [], None
+        recorded, folder, drawn = given or pipe.recv()
+        result, names, draw = as_dataset(recorded), [], None
         if figures and drawn:
             names, draw = list(saving.figures_of(result)), partial(saving.draw_all, result, folder.stage / "figures")
         begun = [_Copy(draw, name) for name in names] if _COPIED else []

@@ -12,7 +12,7 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
+from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario, SimulationSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
@@ -261,16 +261,16 @@ def _jacobian(loop: ClosedLoop, time: float, x: Array, scales: Array) -> Array:
     return np.array(columns).T / scales[:, None] * scales
 
 
-def check_memory(scenario: Scenario) -> None:
+def check_memory(settings: SimulationSettings, finger: Finger) -> None:
     """Refuse a result that cannot fit into the machine's memory.
 
     Raises:
         InputError: Naming the sample rate.
     """
-    settings, finger = scenario.simulation, scenario.finger
     samples = settings.duration * settings.sample_rate
-    # Every signal of a result, and what it is computed from: measured, 2 kB a sample for 4 joints and 5 tendons.
-    needed = samples * 8.0 * (30 * len(finger.joints) + 15 * len(finger.tendons) + 60)
+    # Every signal of a result, and what it is computed from: measured, 3.5 kB a sample of fig6 and 19 kB of pinch.
+    rows = sum(table.count for table in finger.mechanism.rows)
+    needed = samples * 8.0 * (25 * rows + 3 * finger.layout.size)
     present = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else np.inf
     if needed > present:
         allowed = (

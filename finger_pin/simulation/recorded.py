@@ -33,6 +33,11 @@ class Recording:
         times: Array = self.coordinates["time"][1]
         return times
 
+    @property
+    def nbytes(self) -> int:
+        """Size of all variables."""
+        return sum(values.nbytes for _, values, _ in self.variables.values())
+
     def __contains__(self, name: str) -> bool:
         """Return whether there is a variable or coordinate of a name."""
         return name in self.variables or name in self.coordinates

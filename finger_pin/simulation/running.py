@@ -84,9 +84,9 @@ def run(
     """Simulate as `simulate` does, and return plain arrays: to import xarray takes longer than to simulate."""
     if isinstance(scenario, str | Path):
         scenario = load_scenario(scenario)
-    check_memory(scenario)
     method = scenario.simulation.method
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
+    check_memory(scenario.simulation, loop.finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
     elif loop.finger.actuators.names:

@@ -81,7 +81,7 @@ class Told:
             "simulation": {"duration": float(knots[-1] - knots[0]), **settings},
         }
         scenario = validate(Scenario, table, ())
-        check_memory(scenario)
+        check_memory(scenario.simulation, finger)
         if reference is None:
             posture = finger.layout.unpack(self.start.x).position
             resting = Signal.held(knots[[0, -1]], posture[None])

@@ -173,8 +173,9 @@ def test_the_process_that_writes_says_what_went_wrong_and_leaves_with_the_one_th
             with pytest.raises(NotDrawn, match="killed"):
                 writing.wait()
         shutil.rmtree(folder.stage / "figures")
-        for figures, drawn in ((False, True), (True, False), (True, True)):
+        for figures, drawn, large in ((False, True, 1e8), (True, False, 1e8), (True, False, 0.0), (True, True, 0.0)):
             assert not (folder.stage / "figures").exists()
+            monkeypatch.setattr("finger_pin.commands.writing._LARGE", large)
             with Writing(figures) as writing:
                 writing.start(result, folder, drawn)
                 assert writing.written() == summarize(result)

@@ -141,7 +141,8 @@ def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monk
     ) as found:
         fp.simulate(scenario)
     fitting = float(str(found.value).rsplit(" ", 1)[-1])
-    accuracy.check_memory(fp.load_scenario("fig6", {"simulation.sample_rate": 0.99 * fitting}))
+    settings = scenario.simulation.model_copy(update={"sample_rate": 0.99 * fitting})
+    accuracy.check_memory(settings, fp.Finger("ub"))
 
 
 def test_a_simulator_refuses_what_is_no_time_and_tensions_that_push(finger):
