@@ -6,12 +6,14 @@ two, and the core stays as it is.
 
 from __future__ import annotations
 
+import opcode
 from collections.abc import Callable, Sequence
 from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
 from finger_pin.core.compilation import address_of, compiled, intrinsic
+from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law, Row, Touch
 
 # Columns of the table of rows; the signals of the law follow. Numba reads them as constants.
@@ -26,6 +28,7 @@ call_value = intrinsic("call_value")
 call_filling = intrinsic("call_filling")
 _numbers, _put = intrinsic("numbers"), intrinsic("put")
 
+_RAISE = opcode.opmap["RAISE_VARARGS"]
 # Filled in for every law.
 _law: Any = None
 _PARAMETERS = _COUNT = 0
@@ -58,9 +61,17 @@ def widest(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
 
 @cache
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a plain function compiled, with all plain functions that it calls."""
+    """Return a plain function compiled, with all plain functions that it calls.
+
+    Raises:
+        InputError: If it may raise an exception.
+    """
     assert isinstance(function, FunctionType)
     code, known = function.__code__, function.__globals__
+    if _RAISE in code.co_code[::2]:
+        raise InputError(
+            f"law.{function.__qualname__}", "must raise no exception, as compiled code tells it nobody; return nan"
+        )
     called = {name: known[name] for name in code.co_names if isinstance(known.get(name), FunctionType)}
     world = {**known, **{name: inlined(each) for name, each in called.items()}}
     return compiled(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))

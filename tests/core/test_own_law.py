@@ -1,5 +1,7 @@
 """The mechanism is open: a law that stands in this file alone, in both evaluators, with its Jacobian and account."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import test_every_law
@@ -53,9 +55,9 @@ RUBBER = Law(
 NUMBERS = np.array([[0.02, 0.01], [0.05, 0.02], [1.0, 2.0], [2e-3, 1e-3]])
 
 
-def with_rubber(description):
+def with_rubber(description, law=RUBBER):
     """A finger with two rows of the law above."""
-    rows = Rows(group="rubber", law=RUBBER, names=("proximal", "medial"), parameters=NUMBERS, arm=np.eye(5)[1:3])
+    rows = Rows(group="rubber", law=law, names=("proximal", "medial"), parameters=NUMBERS, arm=np.eye(5)[1:3])
     return fp.Finger(description, rows=[rows])
 
 
@@ -149,3 +151,18 @@ def test_both_integrators_give_the_motion_with_the_law_and_it_is_another_one(sim
         assert float(abs(simulated["Rodas5P"][name] - simulated["Radau"][name]).max()) < little
     bare = fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.03, "simulation.sample_rate": 2000.0}))
     assert float(abs(simulated["Rodas5P"]["joint_position"] - bare["joint_position"]).max()) > 1e-3
+
+
+def soft(length):
+    assert length < 1.0
+    return length
+
+
+def strict(row, p):
+    return (-soft(row.length), *value(row, p)[1:])
+
+
+def test_a_law_that_may_raise_is_refused_as_compiled_code_would_tell_nobody(ub):
+    finger = with_rubber(ub, replace(RUBBER, value=strict))
+    with pytest.raises(fp.InputError, match=r"^law.soft: must raise no exception, .*return nan"):
+        CompiledFinger(finger)
