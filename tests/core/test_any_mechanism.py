@@ -112,18 +112,18 @@ def test_the_condensed_solution_is_that_of_the_dense_system(linearised, g):
 
 
 def ends(mechanism, x, command, force):
-    """Where a mechanism is after 0.05 s, by scipy's Radau on the readable rates and by both compiled methods."""
+    """Where a mechanism is after 0.02 s, by scipy's Radau on the readable rates and by both compiled methods."""
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
     atol = np.full(len(x), 1e-9)
     found = [
         integrate(
-            lambda _, y: mechanism.evaluate(y, command, force).rate, x, 0.05, method="Radau", rtol=1e-8, atol=1e-9
-        ).interpolate(np.array([0.05]))[0]
+            lambda _, y: mechanism.evaluate(y, command, force).rate, x, 0.02, method="Radau", rtol=1e-8, atol=1e-9
+        ).interpolate(np.array([0.02]))[0]
     ]
     for method in TABLEAUS.values():
         stepper = Stepper(mechanism, control, x, method(), 1e-9, atol, force)
-        stepper.advance(0.05)
+        stepper.advance(0.02)
         found.append(stepper.x)
     return found
 
