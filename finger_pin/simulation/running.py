@@ -151,16 +151,16 @@ def run(
     pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
     # The fingers of a hand that move apart are integrated side by side already.
     beside = pure and observe is None and not loop.parts
-    following = Following(loop, scenario.sample_times()) if beside else None
-    with ThreadPoolExecutor(1) as aside:
-        judging = aside.submit(quick_margin, scenario) if judged else None
-        text = aside.submit(to_toml, scenario)
+    with ThreadPoolExecutor(1) as thread:
+        judging = thread.submit(quick_margin, scenario) if judged else None
+        text = thread.submit(to_toml, scenario)
+        following = Following(loop, scenario.sample_times(), thread) if beside else None
         first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
         margin = judging.result() if judging else None
-    close = locking_advice(math.inf if margin is None else margin)
-    if close:
-        warnings.warn(close, SelfLockingWarning, stacklevel=3)
-    closed = close_account(scenario, first, repeated, recorded)
+        close = locking_advice(math.inf if margin is None else margin)
+        if close:
+            warnings.warn(close, SelfLockingWarning, stacklevel=3)
+        closed = close_account(scenario, first, repeated, recorded)
     trajectory, recording = closed.trajectory, closed.result
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(scenario, closed, repeated, margin=math.inf if margin is None else margin)
