@@ -89,7 +89,7 @@ class ProportionalController:
         minimal = torque @ self.inverse.T
         levels = internal_level(self.minimum, minimal, self.internal)
         if self.loop is None:
-            level = np.max(levels, axis=-1, keepdims=True)
+            level = levels.max(axis=-1, keepdims=True)
         else:
             fingers = [np.max(levels[..., self.loop == each], axis=-1) for each in range(int(self.loop.max()) + 1)]
             level = np.stack(fingers, axis=-1)[..., self.loop]

@@ -161,11 +161,11 @@ class Stepper:
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
         for part in self.parts:
-            running = part.drives
-            driven = np.zeros(0, dtype=np.int64) if running is None else running.channels[running.motors]
-            voltages = part.control.tension[driven]
-            part.control.tension[:] = inputs[part.island.channels]
-            part.control.tension[driven] = voltages
+            held, running = inputs[part.island.channels], part.drives
+            if running is not None:
+                driven = running.channels[running.motors]
+                held[driven] = part.control.tension[driven]
+            part.control.tension[:] = held
 
     def load(self, force: Array) -> None:
         """Set the forces at the tips, shape (3,) or (t, 3), N, base frame."""

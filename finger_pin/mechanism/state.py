@@ -9,7 +9,7 @@ m motors, c contacts with bristles bent by z: 19 numbers for the paper's finger,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -121,6 +121,10 @@ class Layout:
         parts = (slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True))
         return dict(zip(self._blocks, parts, strict=True))
 
+    @cached_property
+    def _in_order(self) -> list[slice]:
+        return [self._parts[each.name] for each in fields(State)]
+
     @property
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
@@ -146,7 +150,8 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        return State(**{kind: x[..., part] for kind, part in self._parts.items()})
+        parts = self._in_order if x.ndim == 1 else [(..., part) for part in self._in_order]
+        return State(*[x[part] for part in parts])
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).

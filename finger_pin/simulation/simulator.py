@@ -93,7 +93,7 @@ class Simulator:
             atol_scale * finger.layout.scales(),
         )
         tips = len(mechanism.body.tips)
-        self._force = np.zeros(3 if tips == 1 else (tips, 3))
+        self._force = self._unloaded = np.zeros(3 if tips == 1 else (tips, 3))
         self._told = Told(self._stepper.copy())
         # Which of the inputs are tensions.
         self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
@@ -137,14 +137,15 @@ class Simulator:
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
         command = _numbers("tension", tension, self._tension.shape)
-        if (command[self._pulling] < 0.0).any():
+        # The least of a list is found sooner than that of an array.
+        if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
-        shape = self._force.shape
-        force = np.zeros(shape) if fingertip_force is None else _numbers("fingertip_force", fingertip_force, shape)
-        stepper = self._stepper
-        if (force != self._force).any():
+        force, stepper = self._unloaded, self._stepper
+        if fingertip_force is not None:
+            force = _numbers("fingertip_force", fingertip_force, force.shape)
+        if force is not self._force:
             stepper.load(force)
         self._tension, self._force = command, force
         stepper.hold(command)
@@ -192,6 +193,6 @@ def _numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(name, wanted, value) from None
     if numbers.shape != shape:
         raise InputError(name, f"{wanted}, not an array of shape {numbers.shape}")
-    if not np.isfinite(numbers).all():
+    if not math.isfinite(sum(numbers.ravel().tolist())) and not np.isfinite(numbers).all():
         raise InputError(name, "must be finite", numbers.tolist())
     return numbers

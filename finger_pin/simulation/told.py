@@ -46,7 +46,8 @@ class Told:
 
     def add(self, end: float, tension: Array, force: Array) -> None:
         """Keep a step: when it ended, s, and what was held during it, N: shapes (a,), and (3,) or (f, 3)."""
-        self._numbers.extend((end, *tension, *force.ravel()))
+        self._numbers.append(end)
+        self._numbers.frombytes(tension.tobytes() + force.tobytes())
 
     def copy(self) -> Told:
         """Return the same steps, to go on from independently."""

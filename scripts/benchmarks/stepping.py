@@ -15,7 +15,7 @@ from finger_pin.control.reference import ReferenceSignals, SignalReference
 
 PERIOD = 1e-3
 # Of errors below 1e-4 rad a controller sees less than of its sensors' noise.
-TOLERANCE = 1e-4
+TOLERANCE = 5e-4
 _ROUNDS = 3
 
 
