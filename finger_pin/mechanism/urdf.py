@@ -36,7 +36,7 @@ def to_urdf(description: FingerDescription, drawn: bool = True) -> str:
 
     Args:
         description: The finger, not a hand.
-        drawn: With shapes. Its motion does not need them.
+        drawn: With shapes, and indented. Its motion needs neither.
 
     Raises:
         InputError: If a joint has no link, or a name that the URDF needs itself.
@@ -62,7 +62,8 @@ def to_urdf(description: FingerDescription, drawn: bool = True) -> str:
         parent, place, twist = child, (link.length, 0.0, link.offset), link.twist
     _add_link(robot, TIP_FRAME, shapes.get(TIP_FRAME, ()))
     _add_joint(robot, f"{TIP_FRAME}_fixed", "fixed", parent, TIP_FRAME, place, twist)
-    ET.indent(robot)
+    if drawn:
+        ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
 
 

@@ -52,12 +52,12 @@ def _study(name: str, quick: bool) -> dict[str, Any]:
     fast: dict[tuple[str, float], Point] = {}
     slow: list[Point] = []
     for method in wanted:
-        # The compiled methods take their turn before each of the slow ones, and twice more at the end.
+        # The compiled methods take their turn before each of the slow ones, and five times more at the end.
         _sweep(scenario, jobs, exact, fast)
         for rtol in wanted[method]:
             slow.append(point(method, rtol, textbook(scenario, method, rtol), exact))
             say(f"  {name}: {method} at rtol {rtol:g}: {slow[-1].integration:.1f} s")
-    for _ in range(2):
+    for _ in range(5):
         _sweep(scenario, jobs, exact, fast)
     points = [*fast.values(), *slow]
     return {
