@@ -143,9 +143,9 @@ def _serve(pipe: Connection, other: Connection, figures: bool, given: Any = None
             if figures:
                 from finger_pin.views.plots import saving
         recorded, folder, drawn = given or pipe.recv()
-        result, names, draw = as_dataset(recorded), [], None
-        if figures and drawn:
-            names, draw = list(saving.figures_of(result)), partial(saving.draw_all, result, folder.stage / "figures")
+        result = as_dataset(recorded)
+        names = list(saving.figures_of(result)) if figures and drawn else []
+        draw = partial(saving.draw_all, result, folder.stage / "figures") if names else None
         begun = [_Copy(draw, name) for name in names] if _COPIED else []
         folder.write(result)
         pipe.send(("", summarize(result)))

@@ -100,10 +100,7 @@ def _coordinates(model: pin.Model, index: int) -> list[_Body]:
 
 def _frame_along(axis: Array) -> Array:
     """Return a rotation whose third column is a unit axis."""
-    x, y, z = axis.tolist()
-    # Across the axis and the unit vector that is least along it; for three numbers Python is faster than NumPy.
-    least = min(range(3), key=lambda i: abs((x, y, z)[i]))
-    first = np.array([(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)][least])
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
-    a, b, c = first.tolist()
-    return np.array([(a, y * c - z * b, x), (b, z * a - x * c, y), (c, x * b - y * a, z)])
+    return np.column_stack([first, np.cross(axis, first), axis])

@@ -150,8 +150,7 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        parts = self._in_order if x.ndim == 1 else [(..., part) for part in self._in_order]
-        return State(*[x[part] for part in parts])
+        return State(*[x[..., part] for part in self._in_order])
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).

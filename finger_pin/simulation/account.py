@@ -79,12 +79,9 @@ def account(
         [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)] for part, _, _ in parts
     ]
     found = [Works(part, times).add(ends, states).values for part, ends, states in parts] if known is None else [known]
-    if len(parts) == 1:
-        done = found[0]
-    else:
-        done = np.zeros((len(times), len(booked.names)))
-        for own, places in zip(found, columns, strict=True):
-            done[:, places] += own
+    done = np.zeros((len(times), len(booked.names)))
+    for own, places in zip(found, columns, strict=True):
+        done[:, places] += own
     works = Flows(done, booked.names, booked.supplies)
     gained = total - total[0]
     residual = gained - works.net

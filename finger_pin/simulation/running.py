@@ -7,28 +7,24 @@ import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.own import OwnController, Samples
+from finger_pin.control.own import OwnController
 from finger_pin.control.position_drive import PositionDrives
-from finger_pin.control.proportional import Controller
-from finger_pin.control.reference import Reference
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.integrator import Follow, integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
-from finger_pin.description.loading import load_scenario, to_toml
+from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
 from finger_pin.exceptions import (
@@ -39,7 +35,6 @@ from finger_pin.exceptions import (
     MicroDampingWarning,
     SelfLockingWarning,
 )
-from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import (
     CHUNK,
     check_memory,
@@ -53,10 +48,9 @@ from finger_pin.simulation.accuracy import (
 from finger_pin.simulation.following import Following
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import record
-from finger_pin.simulation.starting import own_parts, packed_state
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -69,37 +63,38 @@ _CHUNK_OBSERVED = 4
 
 
 def run(
-    scenario: Scenario | str | Path,
-    *,
-    controller: Controller | Samples | None = None,
-    reference: Reference | Samples | None = None,
-    fingertip_force: Samples | None = None,
-    finger: Finger | None = None,
-    initial: ArrayLike | xr.Dataset | None = None,
+    scenario: Scenario,
+    loop: ClosedLoop | None = None,
+    own: str = "",
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
 ) -> Recording:
-    """Simulate as `simulate` does, and return plain arrays: to import xarray takes longer than to simulate."""
-    if isinstance(scenario, str | Path):
-        scenario = load_scenario(scenario)
+    """Simulate as `simulate` does, and return plain arrays: to import xarray takes longer than to simulate.
+
+    Args:
+        scenario: What to simulate.
+        loop: Its loop, where something in it is a user's own.
+        own: What that is, as `own_parts` says.
+        control_period: As for `simulate`, like what follows.
+        progress: Called with the simulated time, s.
+        observe: Called with the simulated time, s, and all signals.
+        stop: Asked now and then.
+    """
     method = scenario.simulation.method
-    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
+    loop = loop or ClosedLoop.from_scenario(scenario)
     check_memory(scenario.simulation, loop.finger)
-    if initial is not None:
-        loop = replace(loop, start=packed_state(initial, loop.finger))
-    elif loop.finger.actuators.names:
+    if loop.start is None and loop.finger.actuators.names:
         # Before the controller is sampled: then it must not be asked for a start.
         loop = replace(loop, start=loop.initial_state())
     if loop.finger.surroundings is not None:
         start = loop.finger.layout.unpack(loop.initial_state())
         assert start.object_pose is not None
         loop.finger.surroundings.check(start.position, start.object_pose)
-    own = own_parts(controller, reference, fingertip_force, initial, finger)
     # The margin is that of the paper's controller on the scenario's reference.
     planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
-    judged = controller is None and reference is None and planned
+    judged = planned and not {"controller", "reference"} & set(own.split(", "))
     judged = judged and loop.finger.routing.force_closure().holds
     driving = micro_damping_advice(scenario.finger)
     if driving:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from finger_pin.control.closed_loop import LoopSignals
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.own import Samples
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.core.textbook import Stop
+from finger_pin.description.loading import load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.running import run
+from finger_pin.simulation.starting import own_parts, packed_state
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,15 +83,10 @@ def simulate(
             by how much, rad rms over joints and time. It has none where the core does not integrate in one piece.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
-    return run(
-        scenario,
-        controller=controller,
-        reference=reference,
-        fingertip_force=fingertip_force,
-        finger=finger,
-        initial=initial,
-        control_period=control_period,
-        progress=progress,
-        observe=observe,
-        stop=stop,
-    ).dataset()
+    if isinstance(scenario, str | Path):
+        scenario = load_scenario(scenario)
+    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
+    if initial is not None:
+        loop = replace(loop, start=packed_state(initial, loop.finger))
+    own = own_parts(controller, reference, fingertip_force, initial, finger)
+    return run(scenario, loop, own, control_period, progress, observe, stop).dataset()

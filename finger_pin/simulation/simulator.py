@@ -137,7 +137,6 @@ class Simulator:
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
         command = _numbers("tension", tension, self._tension.shape)
-        # The least of a list is found sooner than that of an array.
         if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
@@ -193,6 +192,7 @@ def _numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(name, wanted, value) from None
     if numbers.shape != shape:
         raise InputError(name, f"{wanted}, not an array of shape {numbers.shape}")
-    if not math.isfinite(sum(numbers.ravel().tolist())) and not np.isfinite(numbers).all():
+    # Of a few numbers Python asks sooner than NumPy.
+    if not all(map(math.isfinite, numbers.ravel().tolist())):
         raise InputError(name, "must be finite", numbers.tolist())
     return numbers
