@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
 import finger_pin as fp
-from benchmarks.runs import settled
+from benchmarks.runs import compiled, settled
 from benchmarks.store import Store
 from benchmarks.timing import interleaved
 from finger_pin.description.scenario import Scenario
@@ -50,21 +50,16 @@ def _on(cores: set[int], scenario: Scenario, parts: dict[str, Scenario], rounds:
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, cores)
     try:
-        least: dict[str, float] = {}
-
-        def run(name: str, each: Scenario) -> None:
-            wall = float(fp.simulate(each).attrs["solver_wall_time"])
-            least[name] = min(wall, least.get(name, wall))
-
-        jobs: dict[str, Callable[[], None]] = {
-            name: partial(run, name, each) for name, each in {"": scenario, **parts}.items()
-        }
-        interleaved(jobs, 1)
-        least.clear()
-        whole = interleaved(jobs, rounds)
+        described = {"": scenario, **parts}
+        bare = {name: compiled(each, each.simulation.method, each.simulation.rtol) for name, each in described.items()}
+        whole = interleaved({name: partial(fp.simulate, each) for name, each in described.items()}, rounds + 1)
+        integration = dict.fromkeys(bare, math.inf)
+        for _ in range(rounds):
+            for name, job in bare.items():
+                integration[name] = min(integration[name], float(job()[1].wall_time))
     finally:
         os.sched_setaffinity(0, before)
     return {
         kind: asdict(Times(times[""], sum(times[name] for name in parts)))
-        for kind, times in (("integration", least), ("whole", whole))
+        for kind, times in (("integration", integration), ("whole", whole))
     }
