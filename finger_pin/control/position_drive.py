@@ -9,16 +9,39 @@ gravity or friction if it does. What the finger really needs beyond them has to 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.reference import Reference, ReferenceSignals
+from finger_pin.control.signal import Signal
 from finger_pin.core.drives import Drives
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+
+
+@dataclass(frozen=True, eq=False)
+class GivenVoltages:
+    """Voltages that a caller sets, as `Simulator.step` does: nothing is planned for their tendons.
+
+    Attributes:
+        channels: The inputs that are voltages, shape (m,).
+        signal: Over time, m functions, V.
+    """
+
+    channels: NDArray[np.int64]
+    signal: Signal
+
+    def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
+        """Return what is asked for."""
+        return control
+
+    def voltages(self, time: Array | float) -> Array:
+        """Return the voltages at one time, shape (m,), or at times (k,), shape (k, m), V."""
+        return self.signal.at(time)[0]
 
 
 class PositionDrives:

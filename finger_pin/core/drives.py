@@ -87,9 +87,9 @@ def _sample(drives: Any, x: Any, tension: Any) -> None:
 
 @Unit
 def advance_driven(address: int, end: float) -> int:
-    """Advance as `rosenbrock.advance` does, and sample at every multiple of the period on the way, its start included.
+    """Advance as `rosenbrock.advance` does, and sample at every multiple of the period on the way, both ends included.
 
-    A sample at the end itself is taken by the next call.
+    The end and a sample there may differ by rounding.
     """
     driven = bound_at(address, DRIVEN)
     drives, stretch = driven.drives, bound_at(driven.stretch, STRETCH)
@@ -97,11 +97,12 @@ def advance_driven(address: int, end: float) -> int:
     model = bound_at(integration.model, MODEL)
     memory, times = integration.memory, stretch.times
     while True:
-        if memory[TIME] >= drives.taken[0] * drives.period and (memory[TIME] < end or drives.taken[0] == 0):
+        if memory[TIME] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
             _sample(drives, integration.x, model.control.tension)
-        goal = min(end, drives.taken[0] * drives.period)
-        status: int = call_at(driven.advance, driven.stretch, goal)
-        if status != DONE or memory[TIME] >= end:
-            return status
+        if memory[TIME] >= end:
+            return DONE
         if stretch.taken[0] == times.size and times.size > 0:
             return FULL
+        status: int = call_at(driven.advance, driven.stretch, min(end, drives.taken[0] * drives.period))
+        if status != DONE:
+            return status

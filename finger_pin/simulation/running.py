@@ -203,7 +203,7 @@ def _integrate(
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
         control, tableau = compiled_control(loop) or sampled_control(loop), TABLEAUS[method]()
         stepper = Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force)
-        if loop.drives is not None:
+        if isinstance(loop.drives, PositionDrives):
             stepper.drive(loop.drives.compiled)
         return integrate_compiled(
             stepper,

@@ -11,6 +11,7 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import Samples
+from finger_pin.control.position_drive import GivenVoltages
 from finger_pin.control.reference import Reference, SignalReference
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
@@ -44,10 +45,10 @@ class Told:
         self.start = start
         self._numbers = array("d")
 
-    def add(self, end: float, tension: Array, force: Array) -> None:
-        """Keep a step: when it ended, s, and what was held during it, N: shapes (a,), and (3,) or (f, 3)."""
+    def add(self, end: float, inputs: Array, force: Array) -> None:
+        """Keep a step: when it ended, s, and what was held during it: inputs (u,), and forces (3,) or (f, 3), N."""
         self._numbers.append(end)
-        self._numbers.frombytes(tension.tobytes() + force.tobytes())
+        self._numbers.frombytes(inputs.tobytes() + force.tobytes())
 
     def copy(self) -> Told:
         """Return the same steps, to go on from independently."""
@@ -72,7 +73,9 @@ class Told:
         tips = finger.mechanism.body.tips
         steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
         knots, joints = np.append(self.start.time, steps[:, 0]), len(finger.routing.joints)
-        tension, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
+        inputs, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
+        tension, channels = inputs.copy(), finger.actuators.voltages
+        tension[:, channels] = 0.0
         description = finger.description
         table = {
             "name": description.name,
@@ -93,9 +96,10 @@ class Told:
             fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
             varying_force=Signal.held(knots, force),
             dynamics=CompiledFinger(finger),
+            drives=GivenVoltages(channels, Signal.held(knots, inputs[:, channels])) if len(channels) else None,
         )
         stepper = self.start.copy()
-        again = _Repeated(stepper, knots, tension, force)
+        again = _Repeated(stepper, knots, inputs, force)
         trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, held=again)
         # Rounding must not take a sample to the other side of a step's end, where other tensions act.
         times = knots[0] + scenario.sample_times()
@@ -119,8 +123,8 @@ class _Repeated:
         instant: When the next step begins, s.
     """
 
-    def __init__(self, stepper: Stepper, knots: Array, tension: Array, force: Array) -> None:
-        self._stepper, self._knots, self._tension, self._force = stepper, knots, tension, force
+    def __init__(self, stepper: Stepper, knots: Array, inputs: Array, force: Array) -> None:
+        self._stepper, self._knots, self._inputs, self._force = stepper, knots, inputs, force
         self._step = 0
 
     @property
@@ -128,8 +132,8 @@ class _Repeated:
         return float(self._knots[self._step])
 
     def act(self, x: Array) -> Array:
-        """Begin a step: load it with its force, and return its tensions, shape (a,)."""
+        """Begin a step: load it with its force, and return its inputs, shape (u,)."""
         step, self._step = self._step, self._step + 1
         self._stepper.load(self._force[step].reshape(-1, 3))
-        tension: Array = self._tension[step]
-        return tension
+        inputs: Array = self._inputs[step]
+        return inputs

@@ -133,10 +133,22 @@ def test_what_a_position_drive_holds_is_in_the_result():
     goal = finger.actuators.angle(wanted, result.tendon_command.values[:, :4])
     measured = np.round(result.motor_position.values / step) * step
     held = 5.0 * np.clip(gain * (goal - measured), -1.0, 1.0)
-    # Two samples of the result to one of the drive.
-    np.testing.assert_allclose(result.motor_voltage.values[:-1:2], held[:-1:2], atol=1e-9)
+    # Two samples of the result to one of the drive, the last of which is taken at the very end.
+    np.testing.assert_allclose(result.motor_voltage.values[::2], held[::2], atol=1e-9)
     np.testing.assert_allclose(result.motor_voltage.values[1::2], held[:-1:2], atol=1e-9)
     assert np.ptp(held) > 0.0
+
+
+def test_a_simulator_records_the_voltages_that_it_was_told_of_either_sign():
+    sim = fp.Simulator(finger(SMOOTH, drive="position"), [0.1])
+    told = np.array([2.0, -3.0, -1.0, 4.0])
+    for voltage in told:
+        sim.step([voltage], 5e-3)
+    result = sim.result(sample_rate=200.0)
+    np.testing.assert_array_equal(result.motor_voltage.values[:-1, 0], told)
+    assert not result.tendon_command.values.any() and not result.joint_torque_command.values.any()
+    supplied = float(np.abs(result["energy_exchanged_electrical"]).max())
+    assert float(np.abs(result["energy_residual"]).max()) < 1e-5 * supplied
 
 
 def test_a_result_of_servos_is_continued_where_it_ended():
