@@ -2,7 +2,9 @@
 
 A tendon that slides at speed v settles where f = f^a - f^f, f^f = (f + f^a) M s + b v, with s the sign of v, so that
 
-    f / f^a = (1 - M s - b v / f^a) / (1 + M s).
+    f / f^a = (1 - M s - (d s + b v) / f^a) / (1 + M s)
+
+with a drag d that no load makes.
 
 Fast enough for M = mu^d = tanh(mu_e phi / 2), and without viscous friction, this is exp(-mu_e phi) when pulling and
 exp(mu_e phi) when releasing. At rest anything between the ratios for M = mu^c, beyond which it breaks away, may occur.
@@ -23,7 +25,7 @@ from finger_pin.analysis.finding import Finding
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
-from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 
@@ -177,12 +179,11 @@ def transmission_in_motion(finger: Finger, result: xr.Dataset) -> TransmissionIn
     coefficient = friction.friction_coefficient(
         speed, kinetic, tendons.stiction_ratio * kinetic, tendons.stribeck_velocity, tendons.stribeck_exponent
     )
-    signed = coefficient * np.sign(speed)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(command > 0.0, delivered / command, np.nan)
-        settled = np.maximum(0.0, (1.0 - signed - tendons.viscous * speed / command) / (1.0 + signed))
+        settled = sliding_tension(command, coefficient, speed, tendons.viscous, tendons.drag) / command
     slid = _since_reversal(result["time"].values, speed)
-    bristle = np.maximum(normal * coefficient, tendons.floor) / tendons.stiffness
+    bristle = np.maximum(normal * coefficient + tendons.drag, tendons.floor) / tendons.stiffness
     sliding = (slid > _SETTLED * bristle) & np.isfinite(ratio)
     return TransmissionInMotion(curvature, ratio, settled, sliding, np.sign(speed))
 

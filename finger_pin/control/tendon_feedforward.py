@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.direction import signed_coefficient
+from finger_pin.control.direction import direction, signed_coefficient
 from finger_pin.description.routing import Array, Routing
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.tendons import Tendons
@@ -24,13 +24,13 @@ def undivided(routing: Routing) -> Array:
 class TendonFeedforward:
     """The steady sliding of (9), with (16), solved for the command.
 
-    With x = M(v) times the direction, f = f^a - x (f + f^a) - b v gives
+    With x = M(v) times the direction s and a drag d, f = f^a - x (f + f^a) - s d - b v gives
 
-        f^a = (f (1 + x) + b v) / (1 - x),
+        f^a = (f (1 + x) + s d + b v) / (1 - x),
 
-    which is f exp(mu_e phi) where M = mu^d and b = 0: the inverse of the capstan law. The passive tendons have no
-    command; the halves of one carry m (1 + x) and m (1 - x) with mean m, and the difference is a torque that the others
-    have to make up for.
+    which is f exp(mu_e phi) where M = mu^d, d = 0 and b = 0: the inverse of the capstan law. The passive tendons have
+    no command; the halves of one carry m (1 + x) and m (1 - x) with mean m, and the difference is a torque that the
+    others have to make up for.
 
     Attributes:
         tendons: The tendons as they are believed to be.
@@ -58,9 +58,11 @@ class TendonFeedforward:
         """Return f^a, shape (..., t), N, that deliver planned tensions of that shape; passive ones stay as they are."""
         actuated = self.tendons.routing.actuated
         x = self.coefficient(position, desired_velocity)[..., :actuated]
-        viscous = self.tendons.viscous[:actuated] * self._velocity(desired_velocity)[..., :actuated]
+        velocity = self._velocity(desired_velocity)[..., :actuated]
+        lost = self.tendons.viscous[:actuated] * velocity
+        lost = lost + self.tendons.drag[:actuated] * direction(velocity, self.reversal_speed)
         delivered = planned[..., :actuated]
-        needed = (delivered * (1.0 + x) + viscous) / (1.0 - x)
+        needed = (delivered * (1.0 + x) + lost) / (1.0 - x)
         command = np.maximum(0.0, delivered + self.share * (needed - delivered))
         return np.concatenate([command, planned[..., actuated:]], axis=-1)
 

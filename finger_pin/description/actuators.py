@@ -60,6 +60,12 @@ class GearFriction(Description):
     stiffness: Annotated[float, real(0.0, 1e9, above=True)] = quantity(
         50.0, unit="N m/rad", source="estimate", doc="sigma_0, bristle stiffness: how far gears give before they slip."
     )
+    driving: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="1", source="fit", doc="m_d, level over the tendons' torque while the motor winds in against it."
+    )
+    driven: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="1", source="fit", doc="m_b, the same while the tendons turn the motor back; from 1 on they cannot."
+    )
     external_weight: Annotated[float, real(0.0, 1e3)] = quantity(
         1.0,
         unit="1",
@@ -176,6 +182,12 @@ class Actuator(Description):
     tendon_damping: Annotated[Numbers, reals(0.0, 1e6)] = quantity(
         10.0, unit="N s/m", source="estimate: a tenth of K at 200 rad/s", doc="D, of the tendon as a whole."
     )
+    tendon_hysteresis: Annotated[Numbers, reals(0.0, 0.9)] = quantity(
+        0.0,
+        unit="1",
+        source="the paper has none",
+        doc="h, part of its tension that a tendon holds against its stretch.",
+    )
     pretension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
         0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of two tendons all there is."
     )
@@ -189,7 +201,8 @@ class Actuator(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        for name in ("spool_radius", "tendon_rigidity", "tendon_length", "tendon_damping", "pretension"):
+        by_tendon = ("spool_radius", "tendon_rigidity", "tendon_length", "tendon_damping", "tendon_hysteresis")
+        for name in (*by_tendon, "pretension"):
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != len(self.tendons):
                 raise problem(name, f"must be one number or one per tendon: {', '.join(self.tendons)}", list(value))

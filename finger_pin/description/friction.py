@@ -16,6 +16,9 @@ class TendonFriction(Description):
     coulomb: Annotated[Numbers, reals(0.0, 10.0)] = quantity(
         0.11, unit="1", source="Sec. IV-B", doc="mu_e, Coulomb coefficient between tendon and canal."
     )
+    drag: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
+        0.0, unit="N", source="the paper has none", doc="Drag without load, of seals and sheaths; adds to F^n M."
+    )
     stiction_ratio: Annotated[Numbers, reals(1.0, 100.0)] = quantity(
         1.5, unit="1", source="estimate", doc="rho = mu^c / mu^d."
     )

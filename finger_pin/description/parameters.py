@@ -101,6 +101,9 @@ class Spring(Description):
         0.0, unit="rad", source="design", doc="theta_0, where it is relaxed; it may lie outside the range."
     )
     damping: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="N m s/rad", source="design", doc="c.")
+    hysteresis: Annotated[float, real(0.0, 0.9)] = quantity(
+        0.0, unit="1", source="the paper has none", doc="h, part of its torque that it holds against its motion."
+    )
 
 
 class Joint(Description):

@@ -3,6 +3,9 @@
 A driven tendon is pulled by its input f^a and delivers what friction leaves of it; the canal presses on it with both
 (14b). A passive one slides as a whole; its two halves press it (14c).
 
+A drag that no load makes, of seals, sheaths and a tendon that is bent, adds to the level: F^n M + drag. Steady sliding
+of a driven tendon then delivers f = f^a exp(-mu_e phi) - drag / (1 + mu^d) when pulling.
+
 Micro-damping depends on the normal force, which by (14) depends on the delivered tension, which depends on
 micro-damping. Near slack that loop has two solutions where bristles spring back, so it is not closed: the tension in
 (14) is max(0, f^a - F^s - b v), as it is without micro-damping.
@@ -63,9 +66,28 @@ def _haste(p: Any) -> Any:
     return np.sqrt(_INSTANT * p[2] * p[3]) + _INSTANT * p[2]
 
 
+def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, drag: Any) -> Any:
+    """Return the f, N, that a driven tendon delivers in steady sliding, shape of what is given.
+
+    From f = f^a - s (M (f + f^a) + drag) - b v, with s the sign of v: where M = mu^d and b = 0, the capstan law less
+    drag / (1 + mu^d) when pulling.
+
+    Args:
+        command: f^a, N.
+        coefficient: M(v) of (9b).
+        speed: v, m/s; positive where the tendon is drawn in.
+        viscous: b, N s/m.
+        drag: N.
+    """
+    way = np.sign(speed)
+    return delivered_tension((1.0 - way * coefficient) * command, way * drag + viscous * speed) / (
+        1.0 + way * coefficient
+    )
+
+
 def _level(normal: Any, sliding: Any, speed: Any, p: Any) -> Any:
-    """Return F^n M, or what it is at least."""
-    return friction_level(normal, sliding, np.maximum(p[5], _haste(p) * np.abs(speed)))
+    """Return F^n M + drag, or what it is at least."""
+    return friction_level(1.0, normal * sliding + p[8], np.maximum(p[5], _haste(p) * np.abs(speed)))
 
 
 def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
@@ -84,7 +106,7 @@ def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, slidi
 
 
 def _driven(row: Row, p: Any) -> Any:
-    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, acting = p
+    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _, acting = p
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
     normal = np.abs(pressing) + np.abs(row.command)
@@ -103,7 +125,7 @@ def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
     taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
     pressed = by_normal * (pressing > 0.0)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
-    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, taut - p[8], 0.0)
+    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, taut - p[9], 0.0)
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
@@ -117,11 +139,11 @@ def _driven_account(
     stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
     slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
-    return stored, (1.0 - p[8]) * row.command * row.speed, coulomb, viscous, micro, slack
+    return stored, (1.0 - p[9]) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
 def _passive(row: Row, p: Any) -> Any:
-    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag = p
+    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _ = p
     coefficient = capstan_coefficient(surface, row.curvature)
     sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
     level = _level(row.load, sliding, row.speed, p)
@@ -146,7 +168,17 @@ def _passive_account(
     return bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
 
 
-_PARAMETERS = ("surface", "ratio", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent", "lag")
+_PARAMETERS = (
+    "surface",
+    "ratio",
+    "stiffness",
+    "viscous",
+    "stribeck_velocity",
+    "floor",
+    "stribeck_exponent",
+    "lag",
+    "drag",
+)
 
 #: A tendon that its input pulls through a canal. Where the input acts on the finger by itself, as an elastic tendon
 #: does, ``acting`` is 1 and the row exerts what friction changes of it; else 0.

@@ -3,7 +3,16 @@
     level = [c0 + m0 N] + [c1 + m1 N] exp(-(|v| / w)^p)
 
 The load-dependent Stribeck model of servo identification (Duclusaud and Passault, "Extended friction models for the
-physics simulation of servo actuators", 2024, models M1 to M4). Below p = 1 the exponential has an infinite slope at
+physics simulation of servo actuators", 2024, models M1 to M4).
+
+Gears lose more where the motor drives its load than where the load drives the motor, or less. So the level may have a
+part m_d |T| while driving, T v > 0, and m_b |T| while driven, T the torque with which tendons pull against winding in.
+Gears that slide then take T (1 + m_d) from the motor to wind in and leave it T (1 - m_b) to pay out: from m_b = 1 on no
+tendon turns them. Those two numbers are, in steady sliding, a level |c_e T + c_m tau| with a coefficient for each
+side's torque (the authors' model M5), m_d = (c_e + c_m) / (1 - c_m) and m_b = (c_e + c_m) / (1 + c_m); and a loss
+mu_avg |T| z + mu_dif T z^2 with bristles z (github.com/google-deepmind/mujoco, discussion 3528), m_d = mu_avg + mu_dif
+and m_b = mu_avg - mu_dif. The level jumps at v = 0, where the rate of (9a) does not depend on it.
+ Below p = 1 the exponential has an infinite slope at
 rest. Here (|v| / w)^p is ((v / w)^2 + eps^2)^(p / 2) - eps^p with eps = 1e-4: smooth, zero at rest, and the level is
 off by at most eps^p of its Stribeck part, 1e-3 of it for p = 0.76.
 """
@@ -40,22 +49,31 @@ def stribeck_share_slope(speed: Any, stribeck: Any, exponent: Any, share: Any) -
     return -share * exponent * square ** (0.5 * exponent - 1.0) * speed / (stribeck * stribeck)
 
 
+def _lost(pull: Any, speed: Any, driving: Any, driven: Any) -> Any:
+    """Return what is lost over the torque T of the tendons, by the direction in which power goes through the gears."""
+    way = np.sign(pull * speed)
+    return 0.5 * ((1.0 + way) * driving + (1.0 - way) * driven)
+
+
 def _value(row: Row, p: Any) -> Any:
-    base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness = p
+    base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     share = stribeck_share(row.speed, velocity, exponent)
-    level = friction_level(1.0, base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share, _FLOOR)
+    dry = base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share
+    lost = _lost(row.command, row.speed, driving, driven) * np.abs(row.command)
+    level = friction_level(1.0, dry + lost, _FLOOR)
     loss = friction_force(row.state, row.speed, viscous)
     return -loss, stiction_rate(row.state, row.speed, level, stiffness), loss, share, level
 
 
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
-    _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness = p
+    _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     _, share, level = signals
     own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness)
     by_level = by_level * (level > _FLOOR)
     steep = (stribeck + stribeck_by_load * row.load) * stribeck_share_slope(row.speed, velocity, exponent, share)
     pressed = by_level * (by_load + stribeck_by_load * share)
-    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, 0.0, 0.0)
+    pulled = by_level * _lost(row.command, row.speed, driving, driven) * np.sign(row.command)
+    return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, pulled, 0.0)
 
 
 def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
@@ -75,6 +93,8 @@ GEARBOX = Law(
         "exponent",
         "viscous",
         "stiffness",
+        "driving",
+        "driven",
     ),
     value=_value,
     slopes=_slopes,

@@ -20,8 +20,12 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.elastic_tendon import ELASTIC_TENDON
 from finger_pin.laws.gearbox import GEARBOX
+from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
 from finger_pin.laws.motor import MOTOR
 from finger_pin.mechanism.rows import Rows
+
+# Least level of what a tendon holds, N, as that of tendon friction.
+_FLOOR = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +39,7 @@ class Actuators:
         spools: Shape (k, m), m: radius of the spool that pulls each; negative where it pulls as it turns back.
         stiffness: K = E A / L_0, shape (k,), N/m.
         damping: D, shape (k,), N s/m.
+        hysteresis: h, shape (k,).
         slack: e0, shape (k,), m.
         inertia: J, shape (m,), kg m2.
         holds: Whether each motor is in position drive, shape (m,).
@@ -49,6 +54,7 @@ class Actuators:
     spools: Array
     stiffness: Array
     damping: Array
+    hysteresis: Array
     slack: Array
     inertia: Array
     holds: NDArray[np.bool_]
@@ -84,7 +90,7 @@ class Actuators:
             motors.append((*electrical, by_current, radius, *overcome))
             level = (dry, gears.by_load, gears.stribeck, gears.stribeck_by_load)
             shape = (gears.stribeck_velocity, gears.stribeck_exponent, gears.viscous, gears.stiffness)
-            gearboxes.append((*level, *shape))
+            gearboxes.append((*level, *shape, gears.driving, gears.driven))
         return cls(
             routing=routing,
             names=tuple(names),
@@ -92,6 +98,7 @@ class Actuators:
             spools=spools,
             stiffness=stiffness,
             damping=of_tendons("tendon_damping"),
+            hysteresis=of_tendons("tendon_hysteresis"),
             slack=of_tendons("pretension") / stiffness,
             inertia=np.array([each.motor.inertia for each in actuators]),
             holds=np.array([each.drive == "position" for each in actuators], dtype=bool),
@@ -136,12 +143,22 @@ class Actuators:
         angle: Array = wanted @ weights / np.sum(weights * self.spools, axis=0)
         return angle
 
-    def tendon_rows(self, width: int) -> Rows:
-        """Return the table of elastic tendons, for coordinates (theta, p, theta_m)."""
+    @property
+    def held(self) -> NDArray[np.intp]:
+        """Which of the tendons hold a part of their tension, shape (h,)."""
+        return np.flatnonzero(self.hysteresis)
+
+    def wired(self, weights: Array) -> dict[str, Array]:
+        """Return how later rows see the elastic tendons' tensions, by table, from weights of shape (..., k)."""
+        held = {"tendon_hysteresis": weights[..., self.held]} if self.held.size else {}
+        return {"elastic_tendons": weights, **held}
+
+    def tendon_rows(self, width: int) -> list[Rows]:
+        """Return the tables of elastic tendons, for coordinates (theta, p, theta_m), and of what they hold."""
         arm = np.zeros((len(self.tendons), width))
         arm[:, : len(self.routing.joints)] = self.routing.coupling[self.tendons]
         arm[:, width - len(self.names) :] = -self.spools
-        return Rows(
+        elastic = Rows(
             group="elastic_tendons",
             law=ELASTIC_TENDON,
             names=tuple(self.routing.tendons[index] for index in self.tendons),
@@ -150,11 +167,27 @@ class Actuators:
             offset=-self.slack,
             powers=("elastic_damping",),
         )
+        held = self.held
+        if not held.size:
+            return [elastic]
+        numbers = (self.hysteresis[held], STIFFER * self.stiffness[held], np.full(len(held), _FLOOR))
+        hysteresis = Rows(
+            group="tendon_hysteresis",
+            law=HYSTERESIS,
+            names=tuple(elastic.names[k] for k in held),
+            parameters=np.array(numbers),
+            arm=arm[held],
+            loads={"elastic_tendons": np.eye(len(arm))[held]},
+            stored="elastic_tendons",
+            powers=("elastic_damping",),
+        )
+        return [elastic, hysteresis]
 
     def rotor_rows(self, width: int) -> list[Rows]:
         """Return the tables of motors and gearboxes."""
         count = len(self.names)
         turns = np.eye(count, width, width - count)
+        one_way = bool(np.any(self.gearbox[-2:]))
         return [
             Rows(
                 "motors",
@@ -171,7 +204,8 @@ class Actuators:
                 self.names,
                 self.gearbox,
                 turns,
-                loads={"motors": np.eye(count), "elastic_tendons": -self.external_weight[:, None] * self.spools.T},
+                inputs=self.wired(self.spools.T) if one_way else {},
+                loads={"motors": np.eye(count), **self.wired(-self.external_weight[:, None] * self.spools.T)},
                 stored="gearboxes",
                 powers=("gearbox_coulomb", "gearbox_viscous"),
             ),

@@ -98,11 +98,13 @@ class Finger:
         self.springs = JointSprings.from_description(description)
         joints, motors = self.routing.joints, self.actuators.names
         width = len(joints) + self.routing.passive + len(motors)
-        self.further = (*(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
+        of_springs = self.springs.hysteresis_rows(joints, width)
+        self.further = (*of_springs, *(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
         self.visuals: pin.GeometryModel | None = None
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         states = further_states(self.further)
-        self.layout = Layout(joints, self.routing.tendons, self.routing.passive, states, ringing, motors)
+        held = tuple(self.routing.tendons[self.actuators.tendons[k]] for k in self.actuators.held)
+        self.layout = Layout(joints, self.routing.tendons, self.routing.passive, states, ringing, motors, held=held)
         pulling = self.tendons.rows(self.actuators)
         if self.paths:
             pulling = [along_paths(description, self.paths, table) for table in pulling]
@@ -110,7 +112,7 @@ class Finger:
             self.rigid_body,
             [
                 *pulling,
-                self.joint_friction.rows(joints, self.actuators.pulled, width),
+                self.joint_friction.rows(joints, self.actuators, width),
                 self.stroke_limiter.rows(joints, width),
                 self.springs.rows(joints, width),
                 *(self.actuators.rotor_rows(width) if motors else []),
@@ -228,11 +230,11 @@ class Finger:
         """Return an evaluation of the mechanism by the names of the paper."""
         halves = found.rows["passive_halves"]
         torque = (halves.force @ halves.rows.arm)[..., : len(self.routing.joints)]
-        for pulling in ("driven_tendons", "elastic_tendons"):
+        for pulling in ("driven_tendons", "elastic_tendons", "tendon_hysteresis"):
             if pulling in found.rows:
                 torque = torque + self._pulled_torque(x, found.rows[pulling])
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        bodies, pulled = int(self.mechanism.body.model.nv), self.actuators.pulled
+        bodies, pulled = int(self.mechanism.body.model.nv), self.actuators.wired(self.actuators.pulled)
         return FingerSignals.of(found, self.layout.unpack(x), command, force, torque, bodies, pulled)
 
     def coupling_at(self, position: Array) -> Array:

@@ -118,7 +118,14 @@ class FingerSignals:
 
     @classmethod
     def of(
-        cls, found: Evaluation, state: State, command: Array, force: Array, torque: Array, bodies: int, pulled: Array
+        cls,
+        found: Evaluation,
+        state: State,
+        command: Array,
+        force: Array,
+        torque: Array,
+        bodies: int,
+        pulled: dict[str, Array],
     ) -> FingerSignals:
         """Take the rows' signals apart by the paper's names.
 
@@ -129,14 +136,15 @@ class FingerSignals:
             force: F, N.
             torque: H_c2^T f, shape (..., n), N m.
             bodies: Number of velocities of the rigid body, before those of passive tendons.
-            pulled: Which tendons the motors' spools pull, as `Actuators.pulled`.
+            pulled: Which tendons the motors' spools pull, by table, as `Actuators.wired` of `Actuators.pulled`.
         """
         joints, passive_tendons = torque.shape[-1], state.passive_position.shape[-1]
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
         delivered, motors = driven.force, None
         if "motors" in found.rows:
-            elastic, motor, gears = (found.rows[name] for name in ("elastic_tendons", "motors", "gearboxes"))
-            delivered = delivered + elastic.force @ pulled.T
+            motor, gears = (found.rows[name] for name in ("motors", "gearboxes"))
+            for table, weights in pulled.items():
+                delivered = delivered + found.rows[table].force @ weights.T
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:

@@ -12,6 +12,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.laws.bristle import PIN_FRICTION
+from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.rows import Rows
 
 
@@ -52,19 +53,19 @@ class JointFriction:
             **bristles(law, size),
         )
 
-    def rows(self, names: tuple[str, ...], pulled: Array, width: int) -> Rows:
+    def rows(self, names: tuple[str, ...], actuators: Actuators, width: int) -> Rows:
         """Return the table of the joints' friction.
 
         Args:
             names: Of the joints.
-            pulled: One where an actuated tendon is pulled by an elastic one, shape (a, k); what the two exert adds up.
-                Strands beyond the actuated ones are halves of passive tendons.
+            actuators: Whose elastic tendons pull; what they and driven tendons exert adds up.
             width: Number of coordinates.
         """
-        size, actuated = len(names), len(pulled)
+        size, actuated = len(names), actuators.routing.actuated
+        # Strands beyond the actuated ones are halves of passive tendons.
         loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
-        if pulled.size:
-            loads["elastic_tendons"] = self.loads[:, :actuated] @ pulled
+        if actuators.names:
+            loads |= actuators.wired(self.loads[:, :actuated] @ actuators.pulled)
         return Rows(
             group="joint_friction",
             law=PIN_FRICTION,

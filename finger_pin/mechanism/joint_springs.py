@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.parameters import FingerDescription, Spring
 from finger_pin.description.routing import Array
+from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
 from finger_pin.laws.spring import JOINT_SPRING, spring_torque
 from finger_pin.mechanism.rows import Rows
+
+# Least level of what a spring holds, N m, as that of joint friction.
+_FLOOR = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +25,13 @@ class JointSprings:
         stiffness: k, shape (n,), N m/rad.
         rest: theta_0, shape (n,), rad.
         damping: c, shape (n,), N m s/rad.
+        hysteresis: h, shape (n,).
     """
 
     stiffness: Array
     rest: Array
     damping: Array
+    hysteresis: Array
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> JointSprings:
@@ -42,9 +49,13 @@ class JointSprings:
         torque: Array = spring_torque(position, velocity, self.stiffness, self.rest, self.damping)
         return torque
 
+    @property
+    def _sprung(self) -> NDArray[np.intp]:
+        return np.flatnonzero((self.stiffness != 0.0) | (self.damping != 0.0))
+
     def rows(self, names: tuple[str, ...], width: int) -> Rows:
         """Return the table of the springs, of those joints that have one."""
-        sprung = np.flatnonzero((self.stiffness != 0.0) | (self.damping != 0.0))
+        sprung = self._sprung
         return Rows(
             group="joint_springs",
             law=JOINT_SPRING,
@@ -53,3 +64,24 @@ class JointSprings:
             arm=np.eye(len(names), width)[sprung],
             powers=("joint_springs",),
         )
+
+    def hysteresis_rows(self, names: tuple[str, ...], width: int) -> list[Rows]:
+        """Return the table of what springs hold against their motion, of those that do; no table without any."""
+        sprung = self._sprung
+        held = np.flatnonzero(self.hysteresis[sprung] * self.stiffness[sprung])
+        if not held.size:
+            return []
+        joints = sprung[held]
+        shares, stiffness = self.hysteresis[joints], STIFFER * self.stiffness[joints]
+        return [
+            Rows(
+                group="spring_hysteresis",
+                law=HYSTERESIS,
+                names=tuple(names[joint] for joint in joints),
+                parameters=np.array([shares, stiffness, np.full(len(joints), _FLOOR)]),
+                arm=np.eye(len(names), width)[joints],
+                loads={"joint_springs": np.eye(len(sprung))[held]},
+                stored="joint_springs",
+                powers=("joint_springs",),
+            )
+        ]

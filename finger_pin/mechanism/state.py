@@ -1,10 +1,11 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s of tendons | of joints | of gearboxes |
-    |   n   | 7 f | p |    m    |   n    | 6 f | p  |    m     | 2 c |       t        |     n     |      m       |
+    | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s of spools | tendons | joints | gears |
+    |   n   | 7 f | p |    m    |   n    | 6 f | p  |    m     | 2 c |       h       |    t    |   n    |   m   |
 
 n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
-m motors, c contacts with bristles bent by z: 19 numbers for the paper's finger, which has neither motors nor contacts.
+m motors, h tendons on spools with hysteresis, c contacts with bristles bent by z: 19 numbers for the paper's finger,
+which has neither motors nor contacts.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class State:
         object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
         object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
+        elastic_stiction: F^s that tendons on spools hold, shape (..., h), N.
     """
 
     position: Array
@@ -51,6 +53,7 @@ class State:
     object_pose: Array | None = None
     object_velocity: Array | None = None
     contact_bend: Array | None = None
+    elastic_stiction: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class Layout:
         motors: Names of the motors.
         objects: Names of the free objects.
         contacts: Names of the contacts.
+        held: Names of the tendons on spools with hysteresis.
     """
 
     joints: tuple[str, ...]
@@ -76,6 +80,7 @@ class Layout:
     motors: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
     contacts: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
     @cached_property
     def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
@@ -99,6 +104,7 @@ class Layout:
             "passive_velocity": (passive, 0.1),
             "motor_velocity": (self.motors, 10.0),
             "contact_bend": (bends, 1e-5),
+            "elastic_stiction": (self.held, 1.0),
             "tendon_stiction": (self.tendons, 1.0),
             "joint_stiction": (self.joints, 1e-2),
             "gearbox_stiction": (self.motors, 1e-2),

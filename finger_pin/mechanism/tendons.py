@@ -30,6 +30,7 @@ class Tendons:
         floor: g_min, shape (t,), N.
         stribeck_exponent: 1 or 2, shape (t,).
         lag: sigma_1 / sigma_0, shape (t,), s.
+        drag: Shape (t,), N.
         half_stiffness: K_h = 2 K_t, shape (p,), N/m.
         mass: m_5, shape (p,), kg.
     """
@@ -43,6 +44,7 @@ class Tendons:
     floor: Array
     stribeck_exponent: Array
     lag: Array
+    drag: Array
     half_stiffness: Array
     mass: Array
 
@@ -57,6 +59,7 @@ class Tendons:
             surface=expand(law.coulomb, size),
             stiction_ratio=expand(law.stiction_ratio, size),
             **bristles(law, size),
+            drag=expand(law.drag, size),
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
             mass=expand(passive.mass, routing.passive),
         )
@@ -94,8 +97,8 @@ class Tendons:
         friction = np.array([self.surface, self.stiction_ratio, *shared])
         losses = ("tendon_coulomb", "tendon_viscous", "tendon_micro_damping")
         names = routing.passive_names
-        pulled = np.zeros((actuated, 0)) if actuators is None else actuators.pulled
-        elastic = pulled.any(axis=1)
+        wired = {} if actuators is None or not motors else actuators.wired(actuators.pulled)
+        elastic = wired["elastic_tendons"].any(axis=1) if wired else np.zeros(actuated, dtype=bool)
         return [
             Rows(
                 group="passive_halves",
@@ -105,7 +108,7 @@ class Tendons:
                 arm=halves,
                 stored="passive_tendon",
             ),
-            *([actuators.tendon_rows(width)] if actuators is not None and motors else []),
+            *(actuators.tendon_rows(width) if actuators is not None and motors else []),
             Rows(
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
@@ -113,7 +116,7 @@ class Tendons:
                 parameters=np.vstack([friction[:, :actuated], elastic]),
                 arm=driven[:actuated],
                 channels=np.where(elastic, -1, np.arange(actuated)),
-                inputs={"elastic_tendons": pulled} if motors else {},
+                inputs=wired,
                 bends=bends[:actuated],
                 curvature_offset=routing.curvature_offset[:actuated],
                 stored="tendon_bristles",

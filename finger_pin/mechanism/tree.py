@@ -72,7 +72,7 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
 def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
     """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
     assert description.tree is not None
-    if table.group not in ("driven_tendons", "elastic_tendons"):
+    if table.group not in ("driven_tendons", "elastic_tendons", "tendon_hysteresis"):
         return table
     arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
     rest = np.array([joint.reference for joint in description.tree.joints.values()])

@@ -34,7 +34,8 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     np.testing.assert_array_equal(layout.pack(state), x)
     n, t, p, m = len(layout.joints), len(layout.tendons), layout.passive, len(layout.motors)
     f, c = len(layout.objects), len(layout.contacts)
-    for name, size in zip(State.__annotations__, (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, 2 * c), strict=True):
+    sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, 2 * c, len(layout.held))
+    for name, size in zip(State.__annotations__, sizes, strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 
 

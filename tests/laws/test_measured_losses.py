@@ -1,0 +1,70 @@
+"""Losses that recordings of real hands ask for: a drag, gears that lose more one way, springs with hysteresis."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import finger_pin as fp
+from finger_pin.laws.capstan import DRIVEN_TENDON, capstan_coefficient, sliding_tension
+from finger_pin.laws.gearbox import GEARBOX
+from finger_pin.laws.hysteresis import HYSTERESIS
+from finger_pin.laws.law import Row
+
+
+def settled(law, p, speed, load=lambda t: 0.0, command=0.0, curvature=0.0, end=1.0, state=0.0):
+    """The force of a row that slides evenly until the end, from some state."""
+
+    def rate(t, z):
+        return [law.value(Row(speed * t, speed, z[0], load(t), command, curvature), p)[1]]
+
+    found = solve_ivp(rate, (0.0, end), [state], method="Radau", rtol=1e-10, atol=1e-12)
+    return law.value(Row(speed * end, speed, found.y[0, -1], load(end), command, curvature), p)[0]
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_tendon_that_slides_evenly_delivers_the_capstan_law_less_its_drag(way):
+    surface, turn, drag, pull = 0.0917, np.pi, 0.639, 12.0
+    # No Stribeck excess, no viscous friction.
+    p = np.array([surface, 1.0, 5e4, 0.0, 0.01, 1e-4, 1.0, 0.0, drag, 0.0])
+    coefficient = np.tanh(surface * turn / 2.0)
+    expected = pull * np.exp(-way * surface * turn) - way * drag / (1.0 + way * coefficient)
+    assert settled(DRIVEN_TENDON, p, 0.05 * way, command=pull, curvature=turn) == pytest.approx(expected, rel=1e-7)
+    closed = sliding_tension(pull, capstan_coefficient(surface, turn), 0.05 * way, 0.0, drag)
+    assert closed == pytest.approx(expected, rel=1e-12)
+
+
+def test_gears_lose_what_either_torque_costs_in_two_numbers():
+    """A level |c_e T + c_m tau|, steady: tau = T + s level; the same level in closed form from the two numbers."""
+    external, own, pull = 0.12, 0.2, 0.3
+    numbers = {"driving": (external + own) / (1.0 - own), "driven": (external + own) / (1.0 + own)}
+    p = np.array([0.0] * 4 + [1.0, 1.0, 0.0, 50.0, *numbers.values()])
+    assert GEARBOX.parameters[-2:] == ("driving", "driven")
+    for way in (1.0, -1.0):
+        level = -way * settled(GEARBOX, p, way, command=pull)
+        torque = pull + way * level
+        assert level == pytest.approx(external * pull + own * torque, rel=1e-7)
+
+
+def test_a_spring_with_hysteresis_gives_back_a_share_less_than_it_took():
+    share, stiffness, ratio = 0.2, 3.0, 10.0
+    p = np.array([share, ratio * stiffness, 1e-9])
+    held = settled(HYSTERESIS, p, 1.0, load=lambda t: stiffness * t)
+    assert -held == pytest.approx(share / (1.0 + share / ratio) * stiffness, rel=1e-6)
+    # Back from twice the stretch, where it holds the same share the other way.
+    back = settled(HYSTERESIS, p, -1.0, load=lambda t: stiffness * (2.0 - t), state=-held * 2.0)
+    assert back == pytest.approx(share / (1.0 - share / ratio) * stiffness, rel=1e-2)
+
+
+def test_the_account_of_a_servo_finger_with_all_of_these_losses_closes():
+    losses = {
+        "finger.tendon_friction.drag": 0.3,
+        "finger.actuators.*.tendon_hysteresis": 0.1,
+        "finger.actuators.*.motor.friction.driving": 0.2,
+        "finger.actuators.*.motor.friction.driven": 0.1,
+        "finger.joints.medial.spring": {"stiffness": 0.02, "hysteresis": 0.3},
+    }
+    plain = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.6}))
+    result = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.6, **losses}))
+    exchanged = sum(abs(result[name]).max() for name in result if str(name).startswith("energy_exchanged_"))
+    assert abs(result.energy_residual).max() < 1e-4 * exchanged
+    assert abs(result.joint_position - plain.joint_position).max() > 1e-3
