@@ -188,20 +188,19 @@ class ClosedLoop:
         varying = self.varying_force.at(time)[0]
         return np.asarray(self.fingertip_force + varying.reshape(*np.shape(time), *self.fingertip_force.shape))
 
-    def knots(self) -> Array:
-        """Return the times at which a signal may have a kink or a jump, s, in order."""
+    def knots(self, tolerance: float) -> Array:
+        """Return the times at which a signal bends or jumps by more than a relative tolerance, s, in order."""
         owners = (self.reference, self.controller)
         signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
         if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
             signals.append(self.controller.fingertip.wanted)
         guided = [each and each.signal for each in (self.palm, self.guides)]
         signals += [each for each in (self.varying_force, *guided) if each]
-        found = [each.knots for each in signals if not each.is_harmonic]
-        return np.unique(np.concatenate([np.zeros(0), *found]))
+        return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
-    def longest_step(self) -> float:
+    def longest_step(self, tolerance: float) -> float:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
-        return max(float(np.diff(self.knots()).min(initial=np.inf)), _SHORTEST)
+        return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)
 
     def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
         """Return all signals at one time and state, or at times (m,) and states (m, size)."""

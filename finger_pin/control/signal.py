@@ -19,12 +19,14 @@ from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.harmonic import harmonic, harmonic_rate
-from finger_pin.laws.quintic import quintic, quintic_rate
+from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 _ORDER = 6
+# A signal that varies by less, of its size, is constant but for rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,11 @@ class Signal:
         # Importing it takes a while, which nobody without samples shall wait for.
         from scipy.interpolate import PchipInterpolator
 
-        return cls(np.zeros((len(columns), 4)), *_joined([PchipInterpolator(times, each) for each in values.T]))
+        # Of slopes next to nothing it takes the inverse.
+        with np.errstate(over="ignore"):
+            found = PchipInterpolator(times, values).c
+        coefficients = np.concatenate([np.zeros((_ORDER - len(found), *found.shape[1:])), found])
+        return cls(np.zeros((len(columns), 4)), times.copy(), coefficients)
 
     @classmethod
     def held(cls, knots: Array, values: Array) -> Signal:
@@ -127,6 +133,40 @@ class Signal:
         terms = [math.perm(int(n), order) * c * since ** (n - order) for n, c in zip(powers, factors, strict=False)]
         moving = (instant >= self.knots[0]) & (instant < self.knots[-1])
         return np.asarray(value + sum(terms) * (moving | (order == 0)))
+
+    def bends(self, tolerance: float) -> Array:
+        """Return the knots at which an integrator's steps should end, shape (b,), s, in order.
+
+        These are knots where a signal jumps, or its rate jumps by more than a tolerance over the shorter of the pieces
+        beside it; and where it has bent so much since the last of them that a longer step might not see it: the
+        integral of the root of |u''| is what keeps u within a distance of its chords (de Boor, A Practical Guide to
+        Splines, chapter XII), here the root of the tolerance. So their number is that of the motion's bends, however
+        many samples there are.
+
+        Args:
+            tolerance: Relative to the range of each signal.
+        """
+        if self.is_harmonic:
+            return np.zeros(0)
+        length = np.diff(self.knots)[:, None]
+        begin, end = self.coefficients[-1], quintic(length, *self.coefficients)
+        size = np.maximum(np.ptp(begin, axis=0), np.ptp(end, axis=0))
+        size = np.maximum(np.maximum(size, _ROUNDING * np.max(np.abs(begin), axis=0)), np.finfo(float).tiny)
+        still = np.zeros((1, len(size)))
+        rates = np.concatenate([still, quintic_rate(length, *self.coefficients[:-1])])
+        rates -= np.concatenate([self.coefficients[-2], still])
+        beside = np.concatenate([length, length[-1:]])
+        kinks = np.abs(rates) * np.minimum(beside, np.concatenate([length[:1], length]))
+        jumps = np.zeros_like(kinks)
+        jumps[1:-1] = np.abs(begin[1:] - end[:-1])
+        bent = sum(
+            weight * length * np.sqrt(np.abs(quintic_curvature(node * length, *self.coefficients[:-2])))
+            for node, weight in ((0.11270166537925831, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
+        )
+        turns = np.floor(np.cumsum(bent, axis=0) / np.sqrt(2.0 * size * math.sqrt(tolerance)))
+        found = np.maximum(jumps, kinks) > tolerance * size
+        found[1:] |= np.diff(turns, axis=0, prepend=0.0) > 0.0
+        return np.asarray(self.knots[np.any(found, axis=1)])
 
     def later(self, start: float) -> Signal:
         """Return the signals with their time counted from a start, s."""

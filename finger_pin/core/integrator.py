@@ -140,7 +140,7 @@ def integrate_compiled(
         duration: Time of the end, s.
         names: Names of the numbers of the state, for messages.
         held: A controller that holds its tensions in between.
-        knots: Times at which an input may jump, in order, s: steps end there.
+        knots: Times at which an input bends or jumps, in order, s: steps end there.
         watch: Called with the simulated time that all have reached and the state after every chunk of steps.
         chunk: Most steps between two calls.
         together: Whether islands stop at the same times to be watched, which cuts some of their steps; otherwise a
@@ -148,35 +148,29 @@ def integrate_compiled(
         stop: Asked now and then; true ends the integration there.
         follow: Called with the steps of every chunk of a single island.
     """
+    if knots is not None:
+        stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
     # Advancing by nothing compiles, which is no part of an integration's cost.
     stepper.advance(stepper.time)
     began = time.perf_counter()
     recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
     alone = len(recorders) == 1
     reason, interrupted = "", False
-    knotted = set(() if knots is None else knots[(knots > 0.0) & (knots < duration)].tolist())
-    pending = sorted(knotted)
     while stepper.time < duration and not reason and not interrupted:
-        end = min((knot for knot in pending if knot > stepper.time), default=duration)
+        end = duration
         if held is not None:
             if stepper.time >= held.instant:
                 stepper.hold(held.act(stepper.x))
             end = min(end, held.instant)
         elif not alone and together:
             end = min(end, stepper.time + duration / _SLICES)
-        # At a knot itself the value after the jump counts: a step that ends there must not see it.
-        jump = end in knotted
-        goal = float(np.nextafter(end, 0.0)) if jump else end
         chunks = -1 if together and not alone else 1
-        statuses = in_threads(partial(_Recorder.advance, end=goal, chunks=chunks), recorders)
+        statuses = in_threads(partial(_Recorder.advance, end=end, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
             places = stepper.places(recorder.part.island)
             reason = reason or failure(recorder.part, status, [names[at] for at in places])
             if not reason and recorder.full and recorder.part.time < duration:
                 reason = f"after {recorder.taken} steps the trajectory has reached the most that is kept in memory"
-        if jump and stepper.time == goal:
-            for part in stepper.parts:
-                part.memory[core.TIME] = end
         if alone and follow is not None:
             latest = recorders[0].latest()
             follow(latest.times, _states(stepper, [latest]))

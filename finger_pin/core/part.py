@@ -14,6 +14,7 @@ from finger_pin.core.charts import place_all
 from finger_pin.core.control import Control
 from finger_pin.core.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.islands import Island
+from finger_pin.core.knots import KNOTTED, Knotted, advance_knotted
 from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau
 from finger_pin.core.tables import Tables
@@ -63,9 +64,11 @@ class Part:
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters.
         drives: Loops of motors in position drive, which sample on the way; None for none.
+        knots: Times at which steps end, s, positive, in order.
     """
 
     drives: Drives | None = None
+    knots: Array = np.zeros(0)
 
     def __init__(
         self,
@@ -104,8 +107,11 @@ class Part:
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
         self._nothing, self._taken = self.room(0), np.zeros(1, dtype=np.int64)
-        # A record and loops, the blocks that hold them for compiled code, and the address of what it is given.
-        self._placed: tuple[Record | None, Drives | None, list[NDArray[np.uint8]], int] = (None, None, [], 0)
+        # What compiled code was given last: a record, loops and knots; and the blocks that hold them, what they are
+        # for last.
+        self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
+        self._blocks: list[NDArray[np.uint8]] = []
+        self._advance = core.advance
 
     def room(self, count: int) -> Record:
         """Return room for so many steps."""
@@ -120,20 +126,27 @@ class Part:
         """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
         into = self._nothing if record is None else record
         self._taken[0] = 0
-        status = (core.advance if self.drives is None else advance_driven)(self._place(into), end)
+        self._place(into)
+        status = self._advance(self._blocks[-1].ctypes.data, end)
         return status, int(self._taken[0])
 
-    def _place(self, record: Record) -> int:
-        """Return where compiled code finds a record, with the loops of motors if any run."""
-        if self._placed[0] is not record or self._placed[1] is not self.drives:
-            room = (record.times, record.states, record.attitudes, record.dense)
-            block = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
-            blocks = [block]
-            if self.drives is not None:
-                driven = Driven(self.drives, block.ctypes.data, core.advance.address)
-                blocks.append(bound(driven, DRIVEN))
-            self._placed = record, self.drives, blocks, int(blocks[-1].ctypes.data)
-        return self._placed[-1]
+    def _place(self, record: Record) -> None:
+        """Put a record where compiled code finds it, with the loops of motors if any run, and the knots if any."""
+        placed = record, self.drives, self.knots
+        if all(one is other for one, other in zip(self._placed, placed, strict=True)):
+            return
+        room = (record.times, record.states, record.attitudes, record.dense)
+        stretch = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
+        self._placed, self._blocks, self._advance = placed, [stretch], core.advance
+        if self.drives is not None:
+            driven = Driven(self.drives, stretch.ctypes.data, self._advance.address)
+            self._blocks.append(bound(driven, DRIVEN))
+            self._advance = advance_driven
+        if len(self.knots):
+            passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].ctypes.data
+            knotted = Knotted(self.knots, passed, stretch.ctypes.data, self._advance.address, given)
+            self._blocks += [passed.view(np.uint8), bound(knotted, KNOTTED)]
+            self._advance = advance_knotted
 
     def restart(self, x: Array, attitude: Array) -> None:
         """Go on from another state at the same time, with no memory of earlier steps."""

@@ -36,17 +36,29 @@ def no_signal() -> Signal:
 
 @compiled
 def _piece(signal: Any, time: float) -> Any:
-    """Return the piece that a time is in, and the time since its knot, both clipped to the knots."""
+    """Return the piece that a time is in, and the time since its knot, both clipped to the knots.
+
+    The search begins where even knots would have it, and doubles its stride until the time is between: samples at even
+    times are found at once, however many, and others by bisection.
+    """
     knots = signal.knots
     last = knots.size - 2
-    low, high = 0, last
+    inside = min(max(time, knots[0]), knots[last + 1])
+    low = int((inside - knots[0]) / (knots[last + 1] - knots[0]) * last)
+    high, stride = low, 1
+    while low > 0 and knots[low] > inside:
+        high, low = low - 1, max(low - stride, 0)
+        stride *= 2
+    while high < last and knots[high + 1] <= inside:
+        low, high = high + 1, min(high + stride, last)
+        stride *= 2
     while low < high:
         middle = (low + high + 1) // 2
-        if knots[middle] <= time:
+        if knots[middle] <= inside:
             low = middle
         else:
             high = middle - 1
-    return low, min(max(time, knots[0]), knots[last + 1]) - knots[low]
+    return low, inside - knots[low]
 
 
 @compiled

@@ -158,6 +158,11 @@ class Stepper:
                     taken=np.zeros(1, dtype=np.int64),
                 )
 
+    def end_steps_at(self, knots: Array) -> None:
+        """Let steps end at times from now on, s, positive, in order: inputs bend or jump there."""
+        for part in self.parts:
+            part.knots = np.array(knots, dtype=float)
+
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
         for part in self.parts:

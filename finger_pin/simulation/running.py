@@ -210,7 +210,7 @@ def _integrate(
             settings.duration,
             loop.finger.layout.names,
             held=controller if isinstance(controller, SampledController) else None,
-            knots=loop.knots(),
+            knots=loop.knots(settings.rtol),
             watch=watch,
             chunk=chunk,
             together=chunk == _CHUNK_OBSERVED,
@@ -224,7 +224,7 @@ def _integrate(
             settings.duration,
             rtol=settings.rtol,
             atol=atol,
-            longest=loop.longest_step(),
+            longest=loop.longest_step(settings.rtol),
             watch=watch,
             stop=stop,
         )
@@ -235,7 +235,7 @@ def _integrate(
         method=method,
         rtol=settings.rtol,
         atol=atol,
-        longest=loop.longest_step(),
+        longest=loop.longest_step(settings.rtol),
         watch=watch,
         stop=stop,
     )

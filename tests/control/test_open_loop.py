@@ -46,6 +46,20 @@ def test_a_short_pulse_is_not_stepped_over():
     assert moved[1] - moved[0] > 0.05
 
 
+def test_a_motion_takes_the_steps_that_it_needs_however_many_samples_it_is_given_by():
+    """And none so long that it misses 1 N for half a millisecond: the finger is moved as by a thousand times fewer."""
+    found = []
+    for count in (201, 200_001):
+        times = np.linspace(0.0, 0.1, count)
+        pulse = np.interp(times, [0.05, 0.0505, 0.051], [0.0, 1.0, 0.0])
+        tension = np.column_stack([1.0 + pulse, 2.0 + np.sin(20.0 * times), 5.0 + 0 * times, 1.0 + 0 * times])
+        found.append(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1}), controller=(times, tension)))
+    few, many = found
+    assert many.attrs["solver_steps"] < 1.5 * few.attrs["solver_steps"]
+    np.testing.assert_allclose(many.joint_position, few.joint_position, atol=2e-5)
+    assert float(abs(many.joint_velocity).max()) > 0.05
+
+
 def test_a_negative_sample_of_tension_is_refused():
     with pytest.raises(InputError, match="a tendon only pulls"):
         fp.simulate(fp.load_scenario("fig6"), controller=([0.0, 1.0], [[1.0, 1.0, 1.0, -1e-3]] * 2))

@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from finger_pin.control.signal import Signal
+from finger_pin.core import signal as core
 from finger_pin.description.signals import ForceSignal, JointReference
 from finger_pin.exceptions import InputError
 
@@ -115,6 +116,30 @@ def test_the_lowest_value_is_what_the_signal_comes_down_to(settings):
 
 def test_a_sinusoid_is_never_below_offset_less_amplitude():
     assert ForceSignal(offset=3.0, amplitude=-2.0).lowest == 1.0
+
+
+def test_a_step_ends_where_a_signal_jumps_or_bends_and_so_many_times_however_many_samples_it_has():
+    assert Signal.from_settings([STEP]).bends(1e-6).tolist() == [0.5]
+    assert Signal.from_settings([RAMP]).bends(1e-6).tolist() == [1.0, 1.5]
+    ends = []
+    for count in (11, 2_001, 200_001):
+        times = np.linspace(0.0, 4.0, count)
+        # Half a millisecond of pulse in four seconds of rest.
+        pulse = np.exp(-(((times - 2.0) / 1e-4) ** 2))
+        ends.append(Signal.from_samples("x", (times, np.transpose([np.sin(times), 0.1 * pulse])), "ab").bends(1e-6))
+    assert len(ends[0]) <= 11 < len(ends[1]) < len(ends[2]) < 500
+    assert np.count_nonzero(np.abs(ends[2] - 2.0) < 3e-4) > 20
+
+
+def test_the_compiled_search_finds_the_piece_of_any_time_on_uneven_knots():
+    random = np.random.default_rng(1)
+    for power in (1, 3, 9):
+        knots = np.unique(random.uniform(-1.0, 1.0, 30) ** power)
+        signal = core.Signal(np.zeros((0, 4)), knots, np.zeros((6, len(knots) - 1, 0)))
+        for time in (*random.uniform(-1.2, 1.2, 50), *knots):
+            piece, since = core._piece.function(signal, time)
+            expected = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+            assert piece == expected and since == np.clip(time, knots[0], knots[-1]) - knots[expected]
 
 
 WRONG = [
