@@ -23,7 +23,7 @@ _SIGNAL_FILES = (
 )
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
-_LARGEST = 10_000_000
+_LARGEST = 100_000_000
 
 
 def shipped(kind: str) -> dict[str, str]:

@@ -21,7 +21,7 @@ from finger_pin.description.validation import (
 )
 
 #: The most points or samples of a signal in a file. Arrays in Python may be longer.
-MOST_POINTS = 20_000
+MOST_POINTS = 1_000_000
 _LATEST, _MOST_FORCE = 1e6, 1e6
 AXES = ("x", "y", "z")
 _NEEDED: dict[str, tuple[str, ...]] = {
