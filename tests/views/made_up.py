@@ -81,10 +81,9 @@ def lines(axes):
 
 
 def columns(figure):
-    """Panels of the left and the right column of a figure, each from the top."""
-    panels = sorted(figure.axes, key=lambda axes: (round(axes.get_position().x0, 3), -axes.get_position().y0))
-    first = round(panels[0].get_position().x0, 3)
-    left = [axes for axes in panels if round(axes.get_position().x0, 3) == first]
+    """Panels of the first part of a figure, and those of the others, each from the top."""
+    panels = figure.axes
+    left = [axes for axes in panels if axes.get_figure(root=False) is panels[0].get_figure(root=False)]
     return left, panels[len(left) :]
 
 

@@ -28,7 +28,8 @@ def test_the_contacts_that_push_hardest_are_shown_and_the_others_are_counted():
 def test_the_cone_says_what_its_edge_is():
     cone = next(axes for axes in plot_contact(made([2.0])).axes if "cone" in axes.get_title(loc="left"))
     drawn = {line.get_label(): line.get_data() for line in cone.lines}
-    assert [text.get_text() for text in cone.get_legend().get_texts()] == ["pad-0", "most that friction can be"]
+    (legend,) = cone.get_figure(root=False).legends
+    assert [text.get_text() for text in legend.get_texts()] == ["pad-0", "most that friction can be"]
     np.testing.assert_allclose(drawn["most that friction can be"], [[0.0, 2.0], [0.0, 1.6]])
 
 

@@ -47,9 +47,9 @@ def test_figures_have_a_row_for_each_finger_or_show_one_as_a_finger(hand, draw_f
 def test_lines_of_fingers_that_differ_look_as_their_names_in_the_legend(hand):
     tips = hand.sel(joint=["thumb.distal", "index.medial", "index.distal"])
     figure = plots.plot_fig6(tips.drop_dims("tendon").assign(tendon_tension=hand.tendon_tension))
+    (legend,) = figure.axes[0].get_figure(root=False).legends
     looks = {
-        text.get_text(): handle.get_color()
-        for text, handle in zip(figure.legends[0].get_texts(), figure.legends[0].get_lines(), strict=True)
+        text.get_text(): handle.get_color() for text, handle in zip(legend.get_texts(), legend.get_lines(), strict=True)
     }
     assert set(looks) == {"distal", "medial"} and looks["distal"] != looks["medial"]
     rows = [axes for axes in figure.axes if any(name in axes.get_ylabel() for name in ("thumb (°)", "index (°)"))]

@@ -114,7 +114,7 @@ def test_every_panel_of_a_result_names_its_unit(draw, result):
 
 
 def test_labels_never_break_a_unit():
-    assert labelled("abduction", "mN m") == "abduction (mN\N{NO-BREAK SPACE}m)"
+    assert labelled("medial", "mN m") == "medial (mN\N{NO-BREAK SPACE}m)"
     assert labelled("flexor_profundus", "mN m") == "flexor_profundus\n(mN\N{NO-BREAK SPACE}m)"
 
 

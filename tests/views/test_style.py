@@ -4,10 +4,15 @@ import itertools
 import subprocess
 import sys
 
+import matplotlib
 import numpy as np
 import pytest
+from made_up import synthetic
 from matplotlib.colors import to_rgb
+from matplotlib.figure import SubFigure
+from matplotlib.transforms import Bbox
 
+from finger_pin.exceptions import InputError
 from finger_pin.views import plots
 from finger_pin.views.plots.style import BLUE, COLOURS, GREEN, PURPLE, VERMILLION
 
@@ -55,12 +60,62 @@ def settings():
     return {key: matplotlib.rcParams[key] for key in matplotlib.rcParams if key != "backend"}
 
 before = settings()
+from finger_pin.exceptions import InputError
 from finger_pin.views import plots
 plots.plot_friction_law()
 print("matplotlib.pyplot" in sys.modules, "tkinter" in sys.modules, settings() == before)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False", "False", "True"]
+
+
+def test_what_a_user_has_set_for_figures_is_above_the_style_and_sizes_follow_it():
+    own = {"font.size": 7.0, "lines.linewidth": 3.0, "axes.prop_cycle": matplotlib.cycler(color=["#123456", "#abcdef"])}
+    with matplotlib.rc_context(own | {"figure.figsize": (4.0, 3.0), "axes.grid": False, "text.color": "#ff0000"}):
+        figure = plots.plot_fig6(synthetic())
+    assert figure.get_figwidth() == 4.0
+    angles = figure.axes[0]
+    assert angles.yaxis.label.get_size() == 7.0
+    assert [line.get_color() for line in angles.lines] == ["#123456", "#abcdef", "#123456", "#abcdef"]
+    assert angles.lines[0].get_linewidth() == 3.0
+    (delivered, planned) = figure.axes[2].lines
+    assert (delivered.get_color(), planned.get_color()) == ("#123456", "#ff0000")
+    # What is not the user's is the style's.
+    assert not angles.spines["top"].get_visible()
+
+
+@pytest.mark.parametrize("width", ["column", "page"])
+@pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
+def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_resizing(draw, width):
+    figure = draw(synthetic(), width=width, titles=False)
+    assert figure.get_figwidth() == {"column": 3.5, "page": 7.16}[width]
+    assert not any(axes.get_title(loc=side) for axes in figure.axes for side in ("left", "center", "right"))
+    for factor in (1.0, 1.4):
+        figure.set_size_inches(factor * figure.get_size_inches())
+        figure.draw_without_rendering()
+        boxes = [axes.get_tightbbox() for axes in figure.axes]
+        boxes += [legend.get_window_extent() for part in figure.findobj(SubFigure) for legend in part.legends]
+        for box in boxes:
+            assert figure.bbox.padded(1.0).count_contains([box.min, box.max]) == 2
+        for first, second in itertools.combinations(boxes, 2):
+            shared = Bbox.intersection(first, second)
+            assert shared is None or min(shared.width, shared.height) < 1.0
+
+
+def test_a_width_that_is_none_is_refused():
+    with pytest.raises(InputError, match="'column' or 'page'"):
+        plots.plot_fig6(synthetic(), width="narrow")
+
+
+def test_figures_are_written_in_the_format_that_was_asked_for(tmp_path):
+    beginnings = {"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}
+    for name, begins in beginnings.items():
+        (path,) = plots.draw_all(synthetic(samples=5), tmp_path, ["energy"], format=name)
+        assert path.name == f"energy.{name}" and path.read_bytes().startswith(begins)
+    with matplotlib.rc_context({"savefig.format": "svg"}):
+        assert plots.draw_all(synthetic(samples=5), tmp_path, ["energy"]) == [tmp_path / "energy.svg"]
+    with pytest.raises(InputError, match="must be png, pdf, svg"):
+        plots.draw_all(synthetic(samples=5), tmp_path, format="gif")
 
 
 def test_a_notebook_shows_a_figure_though_it_belongs_to_no_window():

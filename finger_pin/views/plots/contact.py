@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
-from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.style import BLACK, BLUE, SKY, VERMILLION, new_figure, styled
+from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
+from finger_pin.views.plots.style import BLACK, BLUE, SKY, VERMILLION, Width, colour, styled, thin
 
 #: Most contacts that get a panel: those that push hardest.
 _MOST = 6
@@ -18,7 +18,7 @@ _MILLI = 1e3
 
 
 @styled
-def plot_contact(result: xr.Dataset) -> Figure:
+def plot_contact(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw what contacts do, from a result of a finger with objects around it.
 
     (a) One panel per contact that ever closed, N: normal force, friction, and the most that friction can be; sticking
@@ -27,6 +27,8 @@ def plot_contact(result: xr.Dataset) -> Figure:
 
     Args:
         result: Dataset of `simulate`.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
 
     Raises:
         InputError: If there are no objects.
@@ -35,26 +37,27 @@ def plot_contact(result: xr.Dataset) -> Figure:
         raise InputError("result", "is of a finger with nothing around it to touch")
     shown = touching(result)
     below = ["sliding (mm/s)"] + (["moved (mm)"] if "object_position" in result else [])
-    figure = new_figure(12.0, max(6.4, 1.5 * len(shown)))
-    panels = stack(figure, 0.0, 6.4, [labelled(name, "N") for name in shown] or ["force (N)"])
+    height = max(6.4, 1.5 * len(shown))
+    figure, (left, right) = sheet([(6.5, height), (5.5, height)], width, titles)
+    panels = stack(left, [labelled(name, "N") for name in shown] or ["force (N)"])
     closed = int((result["contact_normal_force"].max("time") > 0.0).sum())
     note = f": the {len(shown)} of {closed} that push hardest" if len(shown) < closed else ""
     title(panels[0], f"(a) contact forces{note}" if shown else "(a) contact forces: nothing ever touched")
-    cone, *others = _right(figure, below)
+    cone, others = _right(right, below)
     for index, (axes, name) in enumerate(zip(panels, shown, strict=False)):
         contact = result.sel(contact=name)
         time = result["time"].values
         level = contact["contact_level"].values
         shade(axes, time, np.zeros(len(time)), level, color=SKY, alpha=0.35, label="most that friction can be")
-        trace(axes, time, contact["contact_normal_force"].values, label="normal force", color=BLUE, linewidth=1.1)
-        trace(axes, time, contact["contact_friction"].values, label="friction", color=VERMILLION, linewidth=1.1)
+        trace(axes, time, contact["contact_normal_force"].values, label="normal force", color=BLUE, linewidth=thin())
+        trace(axes, time, contact["contact_friction"].values, label="friction", color=VERMILLION, linewidth=thin())
         style = series(index)
         _cone(cone, contact, name, style["color"])
-        trace(others[0], time, _MILLI * contact["contact_slip"].values, label=name, linewidth=0.8, **style)
+        trace(others[0], time, _MILLI * contact["contact_slip"].values, label=name, linewidth=thin(0.6), **style)
     if shown:
-        legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=3)
+        legend(left, panels[0].get_legend_handles_labels()[0])
         cone.lines[-1].set_label("most that friction can be")
-        cone.legend(loc="upper left")
+        legend(right, cone.get_legend_handles_labels()[0])
     title(others[0], "(c) speed of sliding")
     if len(others) > 1:
         _moved(others[1], result)
@@ -69,24 +72,28 @@ def touching(result: xr.Dataset) -> list[str]:
     return [name for name in closed if name in hardest]
 
 
-def _right(figure: Figure, below: list[str]) -> list[Axes]:
+def _right(part: SubFigure, below: list[str]) -> tuple[Axes, list[Axes]]:
     """Return the panel of the cone, and panels over time below it."""
-    panels = stack(figure, 6.6, 11.8, ["", *below], heights=[1.8, *(1.0 for _ in below)], gap=0.75)
-    cone = panels[0]
-    place = cone.get_position().bounds
-    cone.remove()
-    return [figure.add_axes(place), *panels[1:]]
+    rows = part.add_gridspec(1 + len(below), 1, height_ratios=[1.8, *(1.0 for _ in below)])
+    cone, first = part.add_subplot(rows[0]), part.add_subplot(rows[1])
+    others = [first, *(part.add_subplot(rows[2 + index], sharex=first) for index in range(len(below) - 1))]
+    for axes, label in zip(others, below, strict=True):
+        axes.set_ylabel(label)
+        axes.margins(x=0.0)
+        axes.tick_params(labelbottom=axes is others[-1])
+    others[-1].set_xlabel("time (s)")
+    return cone, others
 
 
-def _cone(axes: Axes, contact: xr.Dataset, name: str, colour: str) -> None:
+def _cone(axes: Axes, contact: xr.Dataset, name: str, look: str) -> None:
     normal, friction = contact["contact_normal_force"].values, contact["contact_friction"].values
     level = contact["contact_level"].values
     closed = normal > 0.0
-    axes.plot(normal[closed], friction[closed], color=colour, linewidth=0.8, label=name)
+    axes.plot(normal[closed], friction[closed], color=look, linewidth=thin(0.6), label=name)
     if closed.any():
         steepest = float(np.max(level[closed] / normal[closed]))
         end = float(normal.max())
-        axes.plot([0.0, end], [0.0, steepest * end], color=BLACK, linewidth=0.8, linestyle=(0, (4, 2)))
+        axes.plot([0.0, end], [0.0, steepest * end], color=colour(BLACK), linewidth=thin(0.6), linestyle=(0, (4, 2)))
     axes.set(xlabel="normal force (N)", ylabel="friction (N)")
     title(axes, "(b) friction cone")
 
@@ -97,7 +104,7 @@ def _moved(axes: Axes, result: xr.Dataset) -> None:
         for axis in names(result, "axis"):
             place = result["object_position"].sel(object=name, axis=axis).values
             label = f"{name} {axis}"
-            trace(axes, time, _MILLI * (place - place[0]), label=label, linewidth=1.1, **series(index))
+            trace(axes, time, _MILLI * (place - place[0]), label=label, linewidth=thin(), **series(index))
             index += 1
-    axes.legend(loc="best", ncols=3)
+    axes.legend(loc="best", ncols=3, fontsize="x-small")
     title(axes, "(d) free objects")

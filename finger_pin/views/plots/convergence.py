@@ -9,8 +9,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.views.plots.lines import names, series
-from finger_pin.views.plots.panels import legend, logarithmic, stack, title
-from finger_pin.views.plots.style import GREY, new_figure, styled
+from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
+from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled
 
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
@@ -22,16 +22,16 @@ _LEAST = 1e-14
 
 
 @styled
-def plot_convergence(result: xr.Dataset) -> Figure:
+def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw how far every joint is from the run at a tighter tolerance, rad, and where the two part.
 
     Args:
         result: Dataset of `simulate`, of any finger, with what `Convergence.attach` adds.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
-    # One row of the legend for every five entries.
-    bottom = 0.8 + 0.2 * (result.sizes["joint"] // 5)
-    figure = new_figure(8.0, 3.2 + bottom)
-    (axes,) = stack(figure, 0.0, 7.8, ["greatest difference (rad)"], bottom=bottom)
+    figure, (part,) = sheet([(8.0, 4.2)], width, titles)
+    (axes,) = stack(part, ["greatest difference (rad)"])
     values = np.abs(result["convergence_difference"].transpose("time", "joint").values)
     reached = np.isfinite(values).all(axis=1)
     time, values = result["time"].values[reached], np.maximum(values[reached], _LEAST)
@@ -40,13 +40,13 @@ def plot_convergence(result: xr.Dataset) -> Figure:
     logarithmic(axes)
     axes.set_xlim(time[0], max(time[-1], time[0] + 1e-9))
     limit, parting = result.attrs["convergence_limit"], result.attrs["convergence_parting_time"]
-    axes.axhline(limit, color=GREY, linestyle="--", linewidth=1.0, label=f"limit, {limit:g} rad")
+    axes.axhline(limit, label=f"limit, {limit:g} rad", **limit_line())
     lines = list(axes.get_lines())
     if np.isfinite(parting):
-        axes.axvline(parting, color=GREY, linestyle="--", linewidth=1.0)
-        axes.text(parting, 0.02, f" parts at {parting:.3g} s", color=GREY, transform=axes.get_xaxis_transform())
+        axes.axvline(parting, **limit_line())
+        axes.text(parting, 0.02, f" parts at {parting:.3g} s", color=colour(GREY), transform=axes.get_xaxis_transform())
     title(axes, f"from the run at rtol {result.attrs['convergence_rtol']:.0e}")
-    legend(axes, lines, columns=5)
+    legend(part, lines)
     return figure
 
 

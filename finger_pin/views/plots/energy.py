@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from finger_pin.views.account import account
 from finger_pin.views.plots.lines import shade, trace
-from finger_pin.views.plots.panels import labelled, logarithmic, stack, title
+from finger_pin.views.plots.panels import labelled, legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import (
     BLACK,
     BLUE,
@@ -22,9 +22,11 @@ from finger_pin.views.plots.style import (
     SKY,
     VERMILLION,
     YELLOW,
-    new_figure,
+    Width,
+    colour,
     power_of_ten,
     styled,
+    thin,
 )
 
 if TYPE_CHECKING:
@@ -76,7 +78,7 @@ _MILLI = 1e3
 
 
 @styled
-def plot_energy(result: xr.Dataset) -> Figure:
+def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw the energy account from a result.
 
     (a) Every stored energy that is not zero throughout, mJ. (b) What has been supplied, mJ, and on top of each other
@@ -85,6 +87,8 @@ def plot_energy(result: xr.Dataset) -> Figure:
 
     Args:
         result: Dataset of `simulate`, of any finger.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     time = result["time"].values
     energies = account(result)
@@ -92,15 +96,17 @@ def plot_energy(result: xr.Dataset) -> Figure:
     stored = {name: energies.stored[name].values for name in order}
     shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
     supplied = np.sum([each.values for each in energies.supplied.values()], axis=0)
-    figure = new_figure(11.0, max(6.6, 1.35 * len(shown)))
-    strips = stack(figure, 0.0, 5.0, [labelled(_STORED.get(name, name), "mJ") for name in shown], bottom=0.5)
+    figure, (left, right) = sheet([(5.1, max(6.6, 1.35 * len(shown))), (5.9, 6.6)], width, titles)
+    strips = stack(left, [labelled(_STORED.get(name, name), "mJ") for name in shown])
     title(strips[0], "(a) stored energy")
     for axes, values in zip(strips, shown.values(), strict=True):
-        trace(axes, time, _MILLI * values, color=BLUE, linewidth=1.1)
+        trace(axes, time, _MILLI * values, color=BLUE, linewidth=thin())
     labels = ["energy (mJ)", "|residual| / supplied"]
-    above, below = stack(figure, 5.1, 10.8, labels, heights=[2.2, 1.0], gap=0.4, bottom=0.5)
+    above, below = stack(right, labels, heights=[2.2, 1.0])
     lost = {name: each.values for name, each in energies.lost.items()}
     _balance(above, time, supplied, lost, np.asarray(sum(stored.values())))
+    handles = above.get_legend_handles_labels()[0]
+    legend(right, [handles[-1], *handles[-2::-1]])
     _residual(below, result, supplied)
     return figure
 
@@ -108,23 +114,20 @@ def plot_energy(result: xr.Dataset) -> Figure:
 def _balance(axes: Axes, time: Array, supplied: Array, lost: dict[str, Array], stored: Array) -> None:
     level = np.zeros(len(time))
     for name in sorted(lost, key=[*_LOST, *lost].index):
-        label, colour = _LOST.get(name, (name.replace("_", " "), _OTHER))
+        label, look = _LOST.get(name, (name.replace("_", " "), _OTHER))
         if np.any(lost[name]):
             above = level + _MILLI * lost[name]
-            shade(axes, time, level, above, color=colour, alpha=0.8, label=label)
+            shade(axes, time, level, above, color=look, alpha=0.8, label=label)
             level = above
     change = _MILLI * (stored - stored[0])
     shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
     if np.min(change) < 0.0:
-        taken = {"facecolor": "none", "edgecolor": BLACK, "hatch": "////", "alpha": 0.5}
+        taken = {"facecolor": "none", "edgecolor": colour(BLACK), "hatch": "////", "alpha": 0.5}
         shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **taken)
-    trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=1.6)
+    trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=thin(1.15))
     if axes.dataLim.y0 >= 0.0:
         axes.set_ylim(bottom=0.0)
     title(axes, "(b) what was supplied, and where it went")
-    handles, labels = axes.get_legend_handles_labels()
-    order = sorted(range(len(labels)), key=lambda index: (labels[index] != "supplied", -index))
-    axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
 
 
 def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
@@ -137,7 +140,7 @@ def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
         logarithmic(axes)
         axes.set_ylim(1e-4 * worst, 10.0 * worst)
         share = np.maximum(share, 1e-6 * worst)
-    trace(axes, time, share, color=BLUE, linewidth=0.9)
+    trace(axes, time, share, color=BLUE, linewidth=thin(0.65))
     title(axes, f"(c) unexplained: at most {_scientific(worst)} {'of the supplied energy' if scale else 'J'}")
     if not scale:
         axes.set_ylabel("|residual| (J)")

@@ -13,9 +13,10 @@ from finger_pin.analysis import Friction, force_polytope, largest_force, tension
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views.plots.lines import series
+from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.reach import flexion_section
 from finger_pin.views.plots.space import AXES, space
-from finger_pin.views.plots.style import BLACK, BLUE, GREY, new_figure, styled
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, Width, colour, styled, thin
 
 _LABELS = {
     Friction.HELPING: "can hold, friction helps",
@@ -28,7 +29,14 @@ _BESIDE = 0.02
 
 
 @styled
-def plot_force_polytope(finger: Finger, position: Sequence[float] | Array, limit: float | tuple[float, ...]) -> Figure:
+def plot_force_polytope(
+    finger: Finger,
+    position: Sequence[float] | Array,
+    limit: float | tuple[float, ...],
+    *,
+    width: Width = None,
+    titles: bool = True,
+) -> Figure:
     """Draw the forces that the fingertip can exert at a posture, within tension limits; N, base frame.
 
     (a) The frictionless polytope in space, (b) the section through zero in the flexion plane for every friction.
@@ -37,25 +45,32 @@ def plot_force_polytope(finger: Finger, position: Sequence[float] | Array, limit
         finger: A finger with force closure.
         position: theta, shape (n,), rad.
         limit: Greatest f^a, N, one number or one per actuated tendon.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
-    figure = new_figure(11.0, 5.2)
+    figure, (left, right) = sheet([(5.5, 5.2), (5.5, 5.2)], width, titles)
     polytope = force_polytope(finger, position, limit)
-    axes = space(figure, (0.01, 0.03, 0.44, 0.86), np.vstack([polytope.vertices, np.zeros(3)]), "N")
+    axes = space(left, np.vstack([polytope.vertices, np.zeros(3)]), "N")
     triangles = polytope.vertices[polytope.triangles()]
-    axes.add_collection3d(Poly3DCollection(triangles, facecolors=BLUE, alpha=0.18, edgecolors="none"))
+    axes.add_collection3d(Poly3DCollection(triangles, facecolors=colour(BLUE), alpha=0.18, edgecolors="none"))
     for first, second in polytope.ridges():
-        axes.plot(*polytope.vertices[[first, second]].T, color=BLUE, linewidth=0.9)
-    axes.scatter(0.0, 0.0, 0.0, color=BLACK, s=14)
-    figure.text(0.03, 0.95, "(a) forces within the tension limits, without friction", fontsize=10.5)
-    plane = figure.add_axes((0.55, 0.12, 0.43, 0.78))
+        axes.plot(*polytope.vertices[[first, second]].T, color=colour(BLUE), linewidth=thin(0.65))
+    axes.scatter(0.0, 0.0, 0.0, color=colour(BLACK), s=14)
+    title(axes, "(a) forces within the tension limits, without friction")
+    plane = right.subplots()
     _section(plane, finger, position, limit)
-    plane.set_title("(b) section in the flexion plane")
+    title(plane, "(b) section in the flexion plane")
     return figure
 
 
 @styled
 def plot_radius_sensitivity(
-    finger: Finger, position: Sequence[float] | Array, force: Sequence[float] | Array
+    finger: Finger,
+    position: Sequence[float] | Array,
+    force: Sequence[float] | Array,
+    *,
+    width: Width = None,
+    titles: bool = True,
 ) -> Figure:
     """Draw how the tension that a fingertip force needs changes with every winding radius, N/mm, without friction.
 
@@ -63,6 +78,8 @@ def plot_radius_sensitivity(
         finger: A finger with force closure.
         position: theta, shape (n,), rad.
         force: E, shape (3,), N, base frame.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     needed = tension_for_force(finger, position, force)
     names = [
@@ -70,16 +87,16 @@ def plot_radius_sensitivity(
         for row, (name, tendon) in enumerate(finger.description.tendons.items())
         for joint in tendon.crossings
     ]
-    figure = new_figure(7.5, 1.2 + 0.3 * len(names), "constrained")
-    axes = figure.subplots()
-    axes.barh(range(len(names)), [value for _, value in names], height=0.6, color=BLUE)
+    figure, (part,) = sheet([(7.5, 1.2 + 0.3 * len(names))], width, titles)
+    axes = part.subplots()
+    axes.barh(range(len(names)), [value for _, value in names], height=0.6, color=colour(BLUE))
     axes.set_yticks(range(len(names)), [name for name, _ in names])
     axes.invert_yaxis()
-    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.axvline(0.0, color=colour(GREY), linewidth=thin(0.6))
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("change of the largest tension with the signed radius (N/mm)")
     along = ", ".join(f"{each:.3g}" for each in force)
-    axes.set_title(f"largest tension {needed.largest:.3g} N for the force ({along}) N")
+    title(axes, f"largest tension {needed.largest:.3g} N for the force ({along}) N")
     return figure
 
 
@@ -97,7 +114,7 @@ def _section(axes: Axes, finger: Finger, position: Sequence[float] | Array, limi
         reach = np.array([largest_force(finger, position, each, limit, friction=friction) for each in directions])
         reach[~np.isfinite(reach)] = np.nan
         axes.plot(*(reach[:, None] * directions[:, plane]).T, label=label, **series(index))
-    axes.plot(0.0, 0.0, color=BLACK, marker="o", markersize=4)
+    axes.plot(0.0, 0.0, color=colour(BLACK), marker="o", markersize=4)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"{AXES[plane[0]]} (N)")
     axes.set_ylabel(f"{AXES[plane[1]]} (N)")

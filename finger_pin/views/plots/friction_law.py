@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from finger_pin.laws.bristle import friction_coefficient, steady_force
 from finger_pin.views.plots.lines import series
-from finger_pin.views.plots.style import new_figure, styled
+from finger_pin.views.plots.panels import heading, sheet, title
+from finger_pin.views.plots.style import Width, styled, thin
 
 #: The paper's normal force, N. It prints none of the other values: these are of the tendons' order.
 NORMAL = 10.0
@@ -23,21 +24,25 @@ FASTEST = 0.05
 
 
 @styled
-def plot_friction_law() -> Figure:
+def plot_friction_law(*, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 3: F^s of (9) with F^s' = 0 against the velocity, for F^n = 10 N.
 
     Top: varying M^c / M^d. Bottom: varying the Stribeck velocity omega. The viscous part of (9c) is left out.
+
+    Args:
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
-    figure = new_figure(7.5, 6.4, "constrained")
-    top, bottom = figure.subplots(2, 1, sharex=True, sharey=True)
+    figure, (part,) = sheet([(7.5, 6.4)], width, titles)
+    top, bottom = part.subplots(2, 1, sharex=True, sharey=True)
     _curves(top, ((ratio * KINETIC, STRIBECK_TOP, f"{ratio:g}") for ratio in RATIOS))
-    top.set_title(rf"varying $M^c$:  $M^d$ = {KINETIC:g},  $\omega$ = {1e3 * STRIBECK_TOP:g} mm/s")
+    title(top, rf"varying $M^c$:  $M^d$ = {KINETIC:g},  $\omega$ = {1e3 * STRIBECK_TOP:g} mm/s")
     top.legend(title=r"$M^c\,/\,M^d$", loc="upper left", alignment="left")
     _curves(bottom, ((RATIO * KINETIC, stribeck, f"{1e3 * stribeck:g} mm/s") for stribeck in STRIBECK))
-    bottom.set_title(rf"varying $\omega$:  $M^d$ = {KINETIC:g},  $M^c$ = {RATIO * KINETIC:g}")
+    title(bottom, rf"varying $\omega$:  $M^d$ = {KINETIC:g},  $M^c$ = {RATIO * KINETIC:g}")
     bottom.legend(title=r"$\omega$", loc="upper left", alignment="left")
     bottom.set_xlabel("velocity $v$ (mm/s)")
-    figure.suptitle(rf"Friction law for $F^n$ = {NORMAL:g} N", x=0.02, ha="left", fontsize=12)
+    heading(figure, rf"Friction law for $F^n$ = {NORMAL:g} N")
     return figure
 
 
@@ -48,6 +53,6 @@ def _curves(axes: Axes, variants: Iterable[tuple[float, float, str]]) -> None:
     for index, (static, stribeck, label) in enumerate(variants):
         coefficient = friction_coefficient(velocity, KINETIC, static, stribeck)
         force = steady_force(velocity, NORMAL, coefficient, 0.0)
-        axes.plot(1e3 * velocity, force, label=label, linewidth=1.8, **series(index))
+        axes.plot(1e3 * velocity, force, label=label, linewidth=thin(1.3), **series(index))
     axes.set_xlim(-1e3 * FASTEST, 1e3 * FASTEST)
     axes.set_ylabel("friction force $F^s$ (N)")

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.views.plots.lines import names, series, trace
-from finger_pin.views.plots.panels import stack, title
-from finger_pin.views.plots.style import new_figure, styled
+from finger_pin.views.plots.panels import sheet, stack, title
+from finger_pin.views.plots.style import Width, styled
 
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
@@ -20,23 +20,27 @@ _MOST = 5
 
 
 @styled
-def plot_hand_motion(result: xr.Dataset) -> Figure:
+def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw positions of all joints, rad or m, tensions of tendons and forces of actuators, N or N m.
 
     Args:
         result: Dataset of `simulate`, of a hand with a tree.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     moved = _panels(names(result, "joint"), result["joint_position"].transpose("time", "joint").values)
     driven = _panels(names(result, "tendon"), result["tendon_tension"].transpose("time", "tendon").values)
     if "actuator_force" in result:
         driven += _panels(names(result, "actuator"), result["actuator_force"].transpose("time", "actuator").values)
-    figure = new_figure(11.0, 1.2 + 1.5 * max(len(moved), len(driven), 2))
-    for left, right, panels, label, text in (
-        (0.0, 4.3, moved, "position", "(a) joints, rad or m"),
-        (5.5, 9.8, driven, "force", "(b) tendons and actuators, N or N m"),
-    ):
+    columns = (
+        (moved, "position", "(a) joints, rad or m"),
+        (driven, "force", "(b) tendons and actuators, N or N m"),
+    )
+    sizes = [(5.5, 1.0 + 1.5 * max(len(panels), 1)) for panels, _, _ in columns]
+    figure, parts = sheet(sizes, width, titles)
+    for part, (panels, label, text) in zip(parts, columns, strict=True):
         if panels:
-            axes = stack(figure, left, right, [label] * len(panels), bottom=0.6)
+            axes = stack(part, [label] * len(panels))
             title(axes[0], text)
             for each, panel in zip(axes, panels, strict=True):
                 _draw(each, result["time"].values, panel)

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, trace
-from finger_pin.views.plots.panels import labelled, legend, stack, title
-from finger_pin.views.plots.style import new_figure
+from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
+from finger_pin.views.plots.style import Width
 
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
@@ -53,25 +53,20 @@ def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
     return chosen.sel(finger=finger, drop=True) if "finger" in chosen.dims else chosen
 
 
-def plot_by_finger(result: xr.Dataset, columns: Sequence[Column]) -> Figure:
+def plot_by_finger(result: xr.Dataset, columns: Sequence[Column], width: Width, titles: bool) -> Figure:
     """Draw variables of joints or tendons of a hand: a row for each finger, a column for each variable."""
     parts = {name: finger_of(result, name) for name in fingers_of(result)}
     # Fingers may differ: the same name has the same look in all rows, and another name another one.
     looks = {kind: dict.fromkeys(name for part in parts.values() for name in names(part, kind)) for kind in _KINDS}
-    most = max(map(len, looks.values()))
-    width = 5 if most <= 5 else 4
-    bottom = 0.9 + 0.2 * ((most - 1) // width)
-    figure = new_figure(0.3 + _WIDTH * len(columns), 0.3 + bottom + _HEIGHT * len(parts))
-    for index, (text, variable, factor, unit) in enumerate(columns):
-        left = 0.1 + _WIDTH * index
-        labels = [labelled(name, unit) for name in parts]
-        panels = stack(figure, left, left + _WIDTH - 0.15, labels, bottom=bottom)
+    figure, places = sheet([(_WIDTH, 1.2 + _HEIGHT * len(parts))] * len(columns), width, titles)
+    for index, (place, (text, variable, factor, unit)) in enumerate(zip(places, columns, strict=True)):
+        panels = stack(place, [labelled(name, unit) for name in parts])
         title(panels[0], f"({'abcdef'[index]}) {text}")
         kind = next(each for each in _KINDS if each in result[variable].dims)
         lines: dict[str, Line2D] = {}
         for axes, part in zip(panels, parts.values(), strict=True):
             lines |= _lines(axes, part, kind, list(looks[kind]), factor * part[variable].transpose("time", kind).values)
-        legend(panels[-1], [lines[name] for name in looks[kind]], columns=width)
+        legend(place, [lines[name] for name in looks[kind]])
     return figure
 
 

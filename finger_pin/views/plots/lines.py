@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from finger_pin.views.plots.style import COLOURS, DASHES
+from finger_pin.views.plots.style import DASHES, colour, cycle_colours
 
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
@@ -61,6 +61,8 @@ def extremes(values: Array, bins: int = BINS) -> NDArray[np.intp]:
 def trace(axes: Axes, time: Array, values: Array, **options: Any) -> Line2D:
     """Draw a signal, shape (m,), against time, shape (m,), thinned by `extremes`; return the line."""
     kept = extremes(values)
+    if "color" in options:
+        options["color"] = colour(options["color"])
     if len(values) == 1:
         options["marker"] = "."
     return axes.plot(time[kept], values[kept], **options)[0]
@@ -69,9 +71,12 @@ def trace(axes: Axes, time: Array, values: Array, **options: Any) -> Line2D:
 def shade(axes: Axes, time: Array, first: Array, second: Array, **options: Any) -> None:
     """Fill between two signals, thinned so that no extreme of either is lost."""
     kept = np.union1d(extremes(first), extremes(second))
+    if "color" in options:
+        options["color"] = colour(options["color"])
     axes.fill_between(time[kept], first[kept], second[kept], linewidth=0.0, **options)
 
 
 def series(index: int) -> dict[str, Any]:
     """Return colour and dashes of the series with this index."""
-    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
+    colours = cycle_colours()
+    return {"color": colours[index % len(colours)], "linestyle": DASHES[index // len(colours) % len(DASHES)]}

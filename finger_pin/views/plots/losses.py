@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
-from finger_pin.views.plots.panels import flatten_rounding, labelled, legend, stack, title
-from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
+from finger_pin.views.plots.panels import flatten_rounding, labelled, legend, sheet, stack, title
+from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, styled, thin
 
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
@@ -23,7 +23,7 @@ _COLUMNS = (
 
 
 @styled
-def plot_losses(result: xr.Dataset, finger: str | None = None) -> Figure:
+def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw what friction takes, from a result.
 
     (a) One panel per tendon, N: the tension before its friction (the command, or that at a spool; of a passive tendon,
@@ -35,6 +35,8 @@ def plot_losses(result: xr.Dataset, finger: str | None = None) -> Figure:
     Args:
         result: Dataset of `simulate`, of any finger or hand.
         finger: One finger of a hand, drawn as a finger is.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
 
     Raises:
         InputError: If there is no such finger.
@@ -42,46 +44,46 @@ def plot_losses(result: xr.Dataset, finger: str | None = None) -> Figure:
     if finger is not None:
         result = finger_of(result, finger)
     elif len(fingers_of(result)) > 1:
-        return plot_by_finger(result, _COLUMNS)
-    rows = max(result.sizes["tendon"], result.sizes["joint"])
-    figure = new_figure(11.0, max(6.6, 1.3 * rows))
-    _tendons(figure, result)
-    _joints(figure, result)
+        return plot_by_finger(result, _COLUMNS, width, titles)
+    height = max(6.6, 1.3 * max(result.sizes["tendon"], result.sizes["joint"]))
+    figure, (left, right) = sheet([(5.5, height), (5.5, height)], width, titles)
+    _tendons(left, result)
+    _joints(right, result)
     return figure
 
 
-def _tendons(figure: Figure, result: xr.Dataset) -> None:
+def _tendons(part: SubFigure, result: xr.Dataset) -> None:
     time, tendons = result["time"].values, names(result, "tendon")
     entering = "spool_tension" if "spool_tension" in result else "tendon_command"
     before = result[entering].transpose("time", "tendon").values
     after = result["tendon_tension"].transpose("time", "tendon").values
     proximal = passive_proximal(result)
     titles = [f"{name}, passive" if name in proximal else name for name in tendons]
-    panels = stack(figure, 0.0, 5.4, [labelled(each, "N") for each in titles])
+    panels = stack(part, [labelled(each, "N") for each in titles])
     for index, (axes, name) in enumerate(zip(panels, tendons, strict=True)):
         _gap(axes, time, proximal.get(name, before[:, index]), after[:, index], "before", "after tendon friction")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     title(panels[0], "(a) tendon tension before and after tendon friction")
-    legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=3)
+    legend(part, panels[0].get_legend_handles_labels()[0])
 
 
-def _joints(figure: Figure, result: xr.Dataset) -> None:
+def _joints(part: SubFigure, result: xr.Dataset) -> None:
     time, joints = result["time"].values, names(result, "joint")
     command, torque, friction = (
         1e3 * result[name].transpose("time", "joint").values
         for name in ("joint_torque_command", "joint_torque", "joint_friction")
     )
-    panels = stack(figure, 5.5, 10.8, [labelled(name, "mN m") for name in joints])
+    panels = stack(part, [labelled(name, "mN m") for name in joints])
     for index, axes in enumerate(panels):
-        trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=1.0)
+        trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=thin())
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
         flatten_rounding(axes)
     title(panels[0], "(b) joint torque before and after joint friction")
-    legend(panels[-1], panels[0].get_legend_handles_labels()[0], columns=4)
+    legend(part, panels[0].get_legend_handles_labels()[0])
 
 
 def _gap(axes: Axes, time: Array, before: Array, after: Array, first: str, second: str) -> None:
     shade(axes, time, before, after, color=ORANGE, alpha=0.35, label="friction")
-    trace(axes, time, before, label=first, color=BLUE, linewidth=1.1)
-    trace(axes, time, after, label=second, color=VERMILLION, linewidth=1.1)
+    trace(axes, time, before, label=first, color=BLUE, linewidth=thin())
+    trace(axes, time, after, label=second, color=VERMILLION, linewidth=thin())

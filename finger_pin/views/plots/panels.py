@@ -1,4 +1,4 @@
-"""Columns of panels at given places: labels, titles and legends that need no measuring."""
+"""Panels of figures: parts side by side or below each other as the width allows, their labels, titles and legends."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ from collections.abc import Sequence
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from finger_pin.views.plots.style import power_of_ten
+from finger_pin.views.plots.style import Width, inches, new_figure, power_of_ten, settings
 
-# Distances in inches: the top margin, and where labels stand outside a panel.
-_TOP, _LABELS, _LABEL, _TIME = 0.32, 0.92, 0.52, 0.27
+# Parts are drawn at this share of their own width before they go below each other.
+_NARROWEST = 0.62
+# Of the heights of panels, where a figure is for a journal.
+_LOWER = 0.82
+# Mean width of a letter, in parts of the size of the text, and inches of a legend's entry besides its text.
+_LETTER, _HANDLE = 0.5, 0.45
 
 # What is below this in the unit of a panel is zero.
 _ROUNDING = 1e-9
@@ -24,52 +29,108 @@ _ROUNDING = 1e-9
 _FEW, _MANY = [1, 2, 5, 10], [1, 2, 2.5, 5, 10]
 
 
-def stack(
-    figure: Figure,
-    left: float,
-    right: float,
-    labels: Sequence[str],
-    *,
-    heights: Sequence[float] | None = None,
-    gap: float = 0.17,
-    bottom: float = 0.8,
-) -> list[Axes]:
-    """Return panels below each other that share their time axis. Distances in inches.
+def sheet(
+    parts: Sequence[tuple[float, float]], width: Width = None, titles: bool = True
+) -> tuple[Figure, list[SubFigure]]:
+    """Return a figure and its parts, side by side, or below each other where its width does not hold them.
 
     Args:
-        figure: Where.
-        left: Left edge of the column with its labels.
-        right: Right edge of the column.
+        parts: Width and height of every part where there is room, in.
+        width: Of the figure; default the parts' own.
+        titles: Whether panels have titles.
+    """
+    found = inches(width)
+    whole = found or sum(each for each, _ in parts)
+    rows: list[list[tuple[float, float]]] = [[]]
+    for part in parts:
+        if rows[-1] and _NARROWEST * (sum(each for each, _ in rows[-1]) + part[0]) > whole:
+            rows.append([])
+        rows[-1].append(part)
+    heights = [(1.0 if found is None else _LOWER) * max(height for _, height in row) for row in rows]
+    figure = new_figure(whole, sum(heights), titles=titles)
+    bands = figure.subfigures(len(rows), 1, squeeze=False, height_ratios=heights)[:, 0]
+    pairs = zip(bands, rows, strict=True)
+    columns = [band.subfigures(1, len(row), squeeze=False, width_ratios=[w for w, _ in row])[0] for band, row in pairs]
+    return figure, [part for row in columns for part in row]
+
+
+def grid(
+    count: int, columns: int, cell: tuple[float, float], width: Width = None, titles: bool = True, sharex: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its panels in rows, with as many columns as its width holds.
+
+    Args:
+        count: Number of panels.
+        columns: Most columns.
+        cell: Width and height of a panel where there is room, in.
+        width: Of the figure; default that of the columns.
+        titles: Whether panels have titles.
+        sharex: Whether the panels share their horizontal axis.
+    """
+    found = inches(width)
+    across = min(columns, count)
+    if found is not None:
+        across = max(1, min(across, int(found / (_NARROWEST * cell[0]))))
+    down = -(-count // across)
+    height = cell[1] * (1.0 if found is None else min(1.0, max(_NARROWEST, found / across / cell[0])))
+    figure = new_figure(found or cell[0] * across, height * down, titles=titles)
+    panels = list(figure.subplots(down, across, squeeze=False, sharex=sharex).ravel())
+    for spare in panels[count:]:
+        spare.remove()
+    return figure, panels[:count]
+
+
+def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[float] | None = None) -> list[Axes]:
+    """Return panels below each other that share their time axis.
+
+    Args:
+        part: Where.
         labels: Label of every panel's vertical axis, from the top.
         heights: Relative heights of the panels; equal by default.
-        gap: Between panels.
-        bottom: Margin below the lowest panel; the default leaves room for a legend.
     """
-    width, height = figure.get_size_inches()
-    panel = (height - _TOP - bottom - (len(labels) - 1) * gap) / len(labels)
-    grid = figure.add_gridspec(
-        len(labels), 1, height_ratios=heights, hspace=gap / panel,
-        left=(left + _LABELS) / width, right=right / width, top=1.0 - _TOP / height, bottom=bottom / height,
-    )  # fmt: skip
-    panels: list[Axes] = list(grid.subplots(sharex=True, squeeze=False)[:, 0])
+    ratios = {"height_ratios": heights} if heights else {}
+    panels: list[Axes] = list(part.subplots(len(labels), 1, sharex=True, squeeze=False, gridspec_kw=ratios)[:, 0])
     for axes, label in zip(panels, labels, strict=True):
         axes.set_ylabel(label)
-        # Labels at given places need no measuring, which is most of the time of drawing many small panels.
-        axes.yaxis.set_label_coords(-_LABEL / (right - left - _LABELS), 0.5)
         axes.yaxis.set_major_locator(MaxNLocator(4, steps=_FEW) if len(labels) > 2 else MaxNLocator(7, steps=_MANY))
         axes.xaxis.set_major_locator(MaxNLocator(6, steps=_FEW))
-        axes.yaxis.get_offset_text().set(x=-0.01, horizontalalignment="right")
         axes.margins(x=0.0)
-        axes.tick_params(labelbottom=axes is panels[-1])
-    lowest = panels[-1]
-    lowest.set_xlabel("time (s)")
-    lowest.xaxis.set_label_coords(0.5, -_TIME / (lowest.get_position().height * height))
+    panels[-1].set_xlabel("time (s)")
+    part.align_ylabels(panels)
     return panels
 
 
 def title(axes: Axes, text: str) -> None:
-    """Write a title at a fixed height, so that nothing has to be measured."""
-    axes.set_title(text, y=1.0)
+    """Write a title, unless the figure has none."""
+    figure = axes.get_figure(root=True)
+    if getattr(figure, "titled", True):
+        spot = axes.get_subplotspec()
+        share = 1.0 if spot is None else 1.0 / spot.get_gridspec().ncols
+        part = axes.get_figure()
+        assert part is not None
+        # Axes in space have a place of their own for titles.
+        wrapped = _wrap(text, _letters(part, share * 0.86, "axes.titlesize"))
+        axes.set_title(wrapped, loc=settings["axes.titlelocation"])
+
+
+def heading(figure: Figure, text: str) -> None:
+    """Write a title of a whole figure, unless it has none."""
+    if getattr(figure, "titled", True):
+        figure.suptitle(_wrap(text, _letters(figure, 0.92, "figure.titlesize")), x=0.02, ha="left")
+
+
+def _wrap(text: str, letters: int) -> str:
+    return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.splitlines())
+
+
+def _letters(part: Figure | SubFigure, share: float, size: str) -> int:
+    """Return how many letters a share of a part's width holds, in a size of the style."""
+    points = _points(size)
+    return max(12, int(72.0 * share * part.bbox.width / part.dpi / (_LETTER * points)))
+
+
+def _points(size: str) -> float:
+    return float(FontProperties(size=settings[size]).get_size_in_points())
 
 
 def flatten_rounding(axes: Axes) -> None:
@@ -78,15 +139,15 @@ def flatten_rounding(axes: Axes) -> None:
         axes.set_ylim(-1.0, 1.0)
 
 
-def legend(axes: Axes, handles: Sequence[Artist], columns: int) -> None:
-    """Write a legend below the lowest panel of a column, as wide as that is with its labels."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    box = axes.get_position()
-    figure.legend(
-        handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2, frameon=False,
-        loc="lower center", bbox_to_anchor=(0.5 * (box.x0 - _LABELS / figure.get_figwidth() + box.x1), 0.0),
-    )  # fmt: skip
+def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
+    """Write a legend below a part, in as many columns as its width holds."""
+    longest = max((len(str(each.get_label())) for each in handles), default=1)
+    entry = _HANDLE + _LETTER * _points("legend.fontsize") * longest / 72.0
+    columns = max(1, min(len(handles), int(part.bbox.width / part.dpi / entry)))
+    # As many columns as the rows that these make need: the last one is no stump.
+    columns = -(-len(handles) // -(-len(handles) // columns))
+    part.legend(handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2, frameon=False,
+                loc="outside lower center")  # fmt: skip
 
 
 def logarithmic(axes: Axes) -> None:
@@ -106,4 +167,4 @@ def plain(axis: Axis) -> None:
 def labelled(name: str, unit: str) -> str:
     """Return the label of a strip: its name and unit, on two lines where they are long together."""
     whole = unit.replace(" ", "\N{NO-BREAK SPACE}")
-    return textwrap.fill(f"{name} ({whole})", 17, break_long_words=False)
+    return textwrap.fill(f"{name} ({whole})", 13, break_long_words=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,7 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
+from finger_pin.views.plots.panels import grid, legend, title
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
 
 # Percentiles of the designs that are in view whatever they are, and the room around them, in shares of their span.
 _IN_VIEW, _ROOM = (0.0, 95.0), 0.08
@@ -20,7 +22,7 @@ _APART = (0.035, 0.04)
 
 
 @styled
-def plot_pareto(result: xr.Dataset) -> Figure:
+def plot_pareto(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw every design that keeps the constraints over each two objectives, the front, and the design at the start.
 
     Of one objective its course is drawn: every design, and the best so far. Designs that break a constraint are left
@@ -28,28 +30,23 @@ def plot_pareto(result: xr.Dataset) -> Figure:
 
     Args:
         result: Dataset of `optimise`.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     names = [name for kind in ("minimise", "maximise") for name in result.attrs[kind].split(", ") if name]
     if len(names) == 1:
-        return _course(result, names[0])
+        return _course(result, names[0], width, titles)
     if len(names) == 2:
-        figure = new_figure(11.0, 5.2, "constrained")
-        whole, close = figure.subplots(1, 2)
+        figure, (whole, close) = grid(2, 2, (5.5, 5.2), width, titles)
         _pair(whole, result, *names)
         _magnify(whole, close, result, *names)
         panels = [whole]
     else:
         pairs = list(combinations(names, 2))
-        columns = min(len(pairs), 3)
-        rows = -(-len(pairs) // columns)
-        figure = new_figure(max(7.5, 4.6 * columns), max(5.4, 4.2 * rows), "constrained")
-        grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for spare in grid[len(pairs) :]:
-            spare.remove()
-        panels = list(grid[: len(pairs)])
+        figure, panels = grid(len(pairs), 3, (4.6, 4.4), width, titles)
         for axes, (first, second) in zip(panels, pairs, strict=True):
             _pair(axes, result, first, second)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    legend(figure, panels[0].get_legend_handles_labels()[0])
     return figure
 
 
@@ -57,13 +54,13 @@ def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
     """Draw designs that keep the bounds, front and start, with all but the farthest designs in view."""
     x, y, front = (result[name].values for name in (first, second, "front"))
     kept = result["feasible"].values & (front == 0)
-    axes.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=4.0, markeredgewidth=0.0, label="kept bounds")
-    axes.plot(x[front > 0], y[front > 0], "o", color=VERMILLION, markersize=5.0, label="front")
+    axes.plot(x[kept], y[kept], "o", label="kept bounds", **_kept_look())
+    axes.plot(x[front > 0], y[front > 0], "o", color=colour(VERMILLION), markersize=5.0, label="front")
     if result["status"].values[0] == "done":
         note = "start" if result["feasible"].values[0] else "start, breaks a bound"
-        axes.plot(x[:1], y[:1], "*", color=BLACK, markersize=12.0, label=note)
-    axes.set_xlabel(textwrap.fill(_label(result, first), 60))
-    axes.set_ylabel(textwrap.fill(_label(result, second), 60))
+        axes.plot(x[:1], y[:1], "*", color=colour(BLACK), markersize=12.0, label=note)
+    axes.set_xlabel(textwrap.fill(_label(result, first), 42))
+    axes.set_ylabel(textwrap.fill(_label(result, second), 42))
     always = front > 0
     always[0] = True
     for values, limit in ((x, axes.set_xlim), (y, axes.set_ylim)):
@@ -74,7 +71,7 @@ def _pair(axes: Axes, result: xr.Dataset, first: str, second: str) -> None:
             limit(shown.min() - _ROOM * np.ptp(shown), shown.max() + _ROOM * np.ptp(shown))
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     beyond = int((kept & ~((x >= left) & (x <= right) & (y >= low) & (y <= high))).sum())
-    axes.set_title(f"{int(result['feasible'].sum())} designs" + (f", {beyond} beyond the edges" if beyond else ""))
+    title(axes, f"{int(result['feasible'].sum())} designs" + (f", {beyond} beyond the edges" if beyond else ""))
 
 
 def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: str) -> None:
@@ -84,14 +81,15 @@ def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: s
     close.set_xlabel(whole.get_xlabel())
     if not order.size:
         close.set_axis_off()
-        close.text(0.5, 0.5, "no design keeps all bounds", transform=close.transAxes, ha="center", color=GREY)
+        close.text(0.5, 0.5, "no design keeps all bounds", transform=close.transAxes, ha="center", color=colour(GREY))
         return
     kept = result["feasible"].values & (front == 0)
-    close.plot(x[kept], y[kept], "o", color=BLUE, alpha=0.35, markersize=4.0, markeredgewidth=0.0)
+    close.plot(x[kept], y[kept], "o", **_kept_look())
     # Between two designs of a front nothing is known to be better than the worse value of either.
     falls = second in result.attrs["minimise"].split(", ")
-    close.step(x[order], y[order], where="post" if falls else "pre", color=VERMILLION, linewidth=1.0, alpha=0.6)
-    close.plot(x[order], y[order], "o", color=VERMILLION, markersize=5.0)
+    between: Any = {"color": colour(VERMILLION), "linewidth": thin(), "alpha": 0.6}
+    close.step(x[order], y[order], where="post" if falls else "pre", **between)
+    close.plot(x[order], y[order], "o", color=colour(VERMILLION), markersize=5.0)
     for values, limit in ((x[order], close.set_xlim), (y[order], close.set_ylim)):
         span = np.ptp(values) or 0.02 * abs(values[0]) or 1.0
         limit(values.min() - 0.35 * span, values.max() + 0.35 * span)
@@ -100,31 +98,36 @@ def _magnify(whole: Axes, close: Axes, result: xr.Dataset, first: str, second: s
         at = close.transAxes.inverted().transform(close.transData.transform((x[row], y[row])))
         if all(np.any(np.abs(at - other) > _APART) for other in numbered):
             numbered.append(at)
-            close.annotate(str(front[row]), (x[row], y[row]), xytext=(5, 4), textcoords="offset points", fontsize=8.5)
-    close.set_title(f"the front: {len(order)} designs")
+            spot: Any = {"xytext": (5, 4), "textcoords": "offset points", "fontsize": "small"}
+            close.annotate(str(front[row]), (x[row], y[row]), **spot)
+    title(close, f"the front: {len(order)} designs")
     close.xaxis.set_major_locator(MaxNLocator(6))
     whole.indicate_inset(
         (*(e[0] for e in (close.get_xlim(), close.get_ylim())), *map(np.ptp, (close.get_xlim(), close.get_ylim()))),
-        edgecolor=GREY, alpha=0.8,
+        edgecolor=colour(GREY), alpha=0.8,
     )  # fmt: skip
 
 
-def _course(result: xr.Dataset, name: str) -> Figure:
-    figure = new_figure(7.5, 4.6, "constrained")
-    axes = figure.subplots()
+def _course(result: xr.Dataset, name: str, width: Width, titles: bool) -> Figure:
+    figure, (axes,) = grid(1, 1, (7.5, 4.6), width, titles)
     rows = np.flatnonzero(result["feasible"].values)
     values = result[name].values[rows]
     pick = np.minimum if result.attrs["minimise"] else np.maximum
-    axes.plot(rows, values, "o", color=BLUE, alpha=0.35, markersize=3.5, markeredgewidth=0.0, label="kept bounds")
+    axes.plot(rows, values, "o", label="kept bounds", **_kept_look())
     if rows.size:
-        axes.step(rows, pick.accumulate(values), where="post", color=VERMILLION, label="best so far")
+        axes.step(rows, pick.accumulate(values), where="post", color=colour(VERMILLION), label="best so far")
     else:
-        axes.text(0.5, 0.5, "no design keeps all bounds", transform=axes.transAxes, ha="center", color=GREY)
+        axes.text(0.5, 0.5, "no design keeps all bounds", transform=axes.transAxes, ha="center", color=colour(GREY))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("design, in the order of the search")
     axes.set_ylabel(_label(result, name))
     axes.legend(loc="best")
     return figure
+
+
+def _kept_look() -> dict[str, Any]:
+    """Return the look of designs that keep the bounds."""
+    return {"color": colour(BLUE), "alpha": 0.35, "markersize": 4.0, "markeredgewidth": 0.0}
 
 
 def _label(result: xr.Dataset, name: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -17,16 +18,18 @@ from finger_pin.views.plots.fig6 import plot_fig6
 from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.losses import plot_losses
 from finger_pin.views.plots.servo import plot_servo
+from finger_pin.views.plots.style import Width, settings
 from finger_pin.views.trees import is_tree
 
+FORMATS = ("png", "pdf", "svg")
 #: What is drawn of every result of a finger, and of a hand.
 FIGURES = {"fig6": plot_fig6, "losses": plot_losses, "energy": plot_energy}
 FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
 
 
-def figures_of(result: xr.Dataset) -> dict[str, Callable[[xr.Dataset], Figure]]:
+def figures_of(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
     """Return the figures that are drawn of a result, by name."""
-    figures: dict[str, Callable[[xr.Dataset], Figure]] = dict(FIGURES_OF_TREES if is_tree(result) else FIGURES)
+    figures: dict[str, Callable[..., Figure]] = dict(FIGURES_OF_TREES if is_tree(result) else FIGURES)
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
     if "contact_force" in result:
@@ -36,30 +39,53 @@ def figures_of(result: xr.Dataset) -> dict[str, Callable[[xr.Dataset], Figure]]:
     return figures
 
 
-def draw_all(result: xr.Dataset, folder: str | Path, names: Iterable[str] | None = None) -> list[Path]:
-    """Draw the figures of a result into a folder, made if need be, and return the paths of the PNG files.
+def draw_all(
+    result: xr.Dataset,
+    folder: str | Path,
+    names: Iterable[str] | None = None,
+    *,
+    format: str | None = None,
+    width: Width = None,
+    titles: bool = True,
+) -> list[Path]:
+    """Draw the figures of a result into a folder, made if need be, and return the paths of the files.
 
     Args:
         result: Dataset of `simulate`.
         folder: Where to write; a file of the same name is replaced whole or not at all.
         names: Which of `figures_of`; all by default.
+        format: `png`, `pdf` or `svg`; default that of matplotlib's setting ``savefig.format``, PNG unless changed.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
 
     Raises:
-        InputError: If there is no such figure of this result.
+        InputError: If there is no such figure of this result, or no such format.
     """
     figures = figures_of(result)
     wanted = list(figures if names is None else names)
     for name in wanted:
         if name not in figures:
             raise InputError("names", f"the figures of this result are {', '.join(figures)}", name)
-    return [save_figure(figures[name](result), Path(folder) / f"{name}.png") for name in wanted]
+    end = format or settings["savefig.format"]
+    return [
+        save_figure(figures[name](result, width=width, titles=titles), Path(folder) / f"{name}.{end}")
+        for name in wanted
+    ]
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write a figure as PNG, whole or not at all, and return its path."""
+    """Write a figure in the format that its name ends with, whole or not at all, and return its path.
+
+    Raises:
+        InputError: If there is no such format.
+    """
     target = Path(path)
+    end = target.suffix.removeprefix(".").lower()
+    if end not in FORMATS:
+        raise InputError("format", f"must be {', '.join(FORMATS)}", end)
     target.parent.mkdir(parents=True, exist_ok=True)
     with replacing(target) as temporary:
         # Little compression: it takes a fifth of the time, and a line drawing is small anyway.
-        figure.savefig(temporary, format="png", pil_kwargs={"compress_level": 2})
+        options: Any = {"pil_kwargs": {"compress_level": 2}} if end == "png" else {}
+        figure.savefig(temporary, format=end, **options)
     return target

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
@@ -14,16 +14,15 @@ AXES = "xyz"
 _THINNEST = 0.2
 
 
-def space(figure: Figure, place: tuple[float, float, float, float], corners: Array, unit: str) -> Axes3D:
+def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
     """Return axes, seen obliquely, that hold some points.
 
     Args:
-        figure: Where.
-        place: Left, bottom, width and height in parts of the figure.
+        part: Where.
         corners: That must be in view, shape (m, 3).
         unit: Of them.
     """
-    axes = figure.add_axes(place, projection="3d")
+    axes = part.add_subplot(projection="3d")
     assert isinstance(axes, Axes3D)
     low, high = corners.min(axis=0), corners.max(axis=0)
     most = float(np.max(high - low)) or 1.0
@@ -37,7 +36,7 @@ def space(figure: Figure, place: tuple[float, float, float, float], corners: Arr
             axis.set_ticks([round(middle, 9) + 0.0])
         else:
             axis.set_major_locator(MaxNLocator(2 if span[index] < 0.5 * most else 5, steps=[1, 2, 5, 10]))
-    axes.set_box_aspect(tuple(span), zoom=0.85)
+    axes.set_box_aspect(tuple(span), zoom=0.75)
     # Onto what lies flat one looks from higher up.
     axes.view_init(elev=20 if span[2] > 1.01 * _THINNEST * most else 40, azim=-55)
     return axes

@@ -12,28 +12,32 @@ from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.ticker import NullLocator
 
 from finger_pin.description.routing import Array
-from finger_pin.views.plots.panels import plain
-from finger_pin.views.plots.style import BLUE, GREY, VERMILLION, new_figure, styled
+from finger_pin.views.plots.panels import grid, plain, sheet, title
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled
 
 _MAP = "cividis"
 # Values that differ by more than this factor are coloured by their logarithm.
 _WIDE = 50.0
+# Most ticks along an axis of a map.
+_TICKS = 7
 # Parts of a key that a label does not need.
 _SILENT = {"finger", "joints", "link", "tendons", "crossings"}
 
 
 @styled
-def plot_sweep(result: xr.Dataset) -> Figure:
+def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw the metrics of a sweep: lines over one key, maps over two, parallel coordinates over more or over samples.
 
     Runs that failed are marked in lines and maps; in parallel coordinates they end at the last key. The values of a key
-    that holds names stand side by side.
+    that holds names stand side by side. What is the same at every point of a map is said in words.
 
     Args:
         result: Dataset of `sweep`.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     keys = [str(name) for name in result.coords]
     result = _numbered(result)
@@ -41,10 +45,10 @@ def plot_sweep(result: xr.Dataset) -> Figure:
         keys = [key for key in keys if result.sizes[key] > 1] or keys[:1]
         result = result.squeeze([name for name in result.dims if name not in keys], drop=True)
     if len(keys) == 1:
-        return _lines(result, keys[0])
+        return _lines(result, keys[0], width, titles)
     if len(keys) == 2 and "sample" not in result.dims:
-        return _maps(result, keys[0], keys[1])
-    return _parallel(result, keys)
+        return _maps(result, keys[0], keys[1], width, titles)
+    return _parallel(result, keys, width, titles)
 
 
 def short_key(key: str) -> str:
@@ -63,8 +67,8 @@ def _numbered(result: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def _lines(result: xr.Dataset, key: str) -> Figure:
-    figure, panels = _panels(result, 4.6, 2.5)
+def _lines(result: xr.Dataset, key: str, width: Width, titles: bool) -> Figure:
+    figure, panels = _panels(result, (4.6, 2.7), width, titles)
     # Between names there is nothing.
     named = "names" in result[key].attrs
     order = np.argsort(result[key].values)
@@ -73,7 +77,7 @@ def _lines(result: xr.Dataset, key: str) -> Figure:
     for name, axes in panels.items():
         found = result[name].values[order]
         marker, line = ("o" if len(values) <= 40 or named else ""), ("none" if named else "-")
-        axes.plot(values, found, color=BLUE, marker=marker, markersize=3.5, linestyle=line)
+        axes.plot(values, found, color=colour(BLUE), marker=marker, markersize=3.5, linestyle=line)
         axes.margins(x=0.2 if named else 0.02)
         _scale(axes.set_xscale, axes.xaxis, result[key])
         if not np.any(np.nan_to_num(found)):
@@ -82,45 +86,49 @@ def _lines(result: xr.Dataset, key: str) -> Figure:
         if failed.any():
             low = np.full(int(failed.sum()), 0.03)
             marks: Any = axes.get_xaxis_transform()
-            axes.plot(values[failed], low, "x", color=VERMILLION, transform=marks, clip_on=False, label="failed")
+            look: Any = {"color": colour(VERMILLION), "transform": marks, "clip_on": False}
+            axes.plot(values[failed], low, "x", label="failed", **look)
     _legend(figure, panels)
     _name_axes(panels, _label(result, key), None)
     return figure
 
 
-def _maps(result: xr.Dataset, first: str, second: str) -> Figure:
-    figure, panels = _panels(result, 4.9, 3.6)
+def _maps(result: xr.Dataset, first: str, second: str, width: Width, titles: bool) -> Figure:
+    figure, panels = _panels(result, (4.9, 3.8), width, titles)
     x, y = result[first].values, result[second].values
     status = result["status"].transpose(first, second).values
     for name, axes in panels.items():
         values = result[name].transpose(first, second).values
         axes.grid(visible=False)
         shown = np.ma.masked_invalid(values)
-        if shown.count():
+        _scale(axes.set_xscale, axes.xaxis, result[first], swept=True)
+        _scale(axes.set_yscale, axes.yaxis, result[second], swept=True)
+        axes.set(xlim=_edges(x)[[0, -1]], ylim=_edges(y)[[0, -1]])
+        if shown.count() and shown.min() == shown.max():
+            # A scale of made-up width would look like a range that was found.
+            where = "at every point" if shown.count() == shown.size else "wherever it ended"
+            text = f"{float(shown.min()):.4g} {_unit(result, name)}".strip() + f"\n{where}"
+            axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
+        elif shown.count():
             wide = shown.min() > 0.0 and shown.max() > _WIDE * shown.min()
             norm = LogNorm() if wide else None
             drawn = axes.pcolormesh(_edges(x), _edges(y), shown.T, cmap=_MAP, norm=norm)
-            bar = figure.colorbar(drawn, ax=axes, label=_unit(result, name))
-            if shown.min() == shown.max():
-                # A scale of made-up width would look like a range that was found.
-                bar.set_ticks([float(shown.min())])
-        _scale(axes.set_xscale, axes.xaxis, result[first])
-        _scale(axes.set_yscale, axes.yaxis, result[second])
-        for which, colour in (("failed", VERMILLION), ("missing", GREY)):
+            figure.colorbar(drawn, ax=axes, label=_unit(result, name))
+        for which, look in (("failed", VERMILLION), ("missing", GREY)):
             i, j = np.nonzero(status == which)
             if i.size:
-                axes.plot(x[i], y[j], "x", color=colour, markersize=5.0, label=which)
+                axes.plot(x[i], y[j], "x", color=colour(look), markersize=5.0, label=which)
     _legend(figure, panels)
     _name_axes(panels, _label(result, first), _label(result, second))
     return figure
 
 
-def _parallel(result: xr.Dataset, keys: list[str]) -> Figure:
+def _parallel(result: xr.Dataset, keys: list[str], width: Width, titles: bool) -> Figure:
     metrics = _metrics(result)
     columns = [*keys, *metrics]
     table = np.stack([_column(result, name) for name in columns], axis=1)
-    figure = new_figure(max(8.0, 1.45 * len(columns) + 1.6), 5.2, "constrained")
-    axes = figure.subplots()
+    figure, (part,) = sheet([(max(8.0, 1.45 * len(columns) + 1.6), 5.2)], width, titles)
+    axes = part.subplots()
     low, high = (pick(table, axis=0, where=np.isfinite(table), initial=start) for pick, start in _EXTREMES)
     low, high = (np.where(np.isfinite(each), each, 0.0) for each in (low, high))
     span = np.where(high > low, high - low, 1.0)
@@ -129,20 +137,20 @@ def _parallel(result: xr.Dataset, keys: list[str]) -> Figure:
     colours = table[:, len(keys)]
     order = np.argsort(-colours[done])
     places = np.arange(len(columns))
-    width, opacity = (1.2, 0.8) if len(table) <= 200 else (0.6, 0.45)
+    thickness, opacity = (1.2, 0.8) if len(table) <= 200 else (0.6, 0.45)
     lines = [np.column_stack([places, row]) for row in heights[done][order]]
     norm = Normalize(low[len(keys)], high[len(keys)])
-    drawn = LineCollection(lines, array=colours[done][order], cmap=_MAP, norm=norm, linewidth=width, alpha=opacity)
+    drawn = LineCollection(lines, array=colours[done][order], cmap=_MAP, norm=norm, linewidth=thickness, alpha=opacity)
     axes.add_collection(drawn)
     for row in heights[~done]:
-        axes.plot(places[: len(keys)], row[: len(keys)], color=GREY, linewidth=0.6, linestyle=":", alpha=0.7)
+        axes.plot(places[: len(keys)], row[: len(keys)], color=colour(GREY), linewidth=0.6, linestyle=":", alpha=0.7)
     for place, (least, most) in enumerate(zip(low, high, strict=True)):
-        axes.axvline(place, color="black" if place >= len(keys) else GREY, linewidth=1.0)
+        axes.axvline(place, color=colour(BLACK if place >= len(keys) else GREY), linewidth=1.0)
         names = result[columns[place]].attrs.get("names")
         marks = enumerate(names) if names else ((value, f"{value:.3g}") for value in dict.fromkeys((least, most)))
         for value, word in marks:
             height = (value - least) / (most - least) if most > least else 0.5
-            text = axes.annotate(word, (place, height), xytext=(3, 0), textcoords="offset points", fontsize=9)
+            text = axes.annotate(word, (place, height), xytext=(3, 0), textcoords="offset points", fontsize="small")
             text.set(va={0.0: "top", 1.0: "bottom"}.get(height, "center"))
     axes.set_xlim(-0.15, len(columns) - 0.5)
     axes.set_ylim(-0.06, 1.06)
@@ -151,10 +159,10 @@ def _parallel(result: xr.Dataset, keys: list[str]) -> Figure:
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.tick_params(axis="x", length=0.0)
     labels = [_label(result, key) for key in keys] + [f"{_spaced(n)} ({result[n].attrs['units']})" for n in metrics]
-    axes.set_xticks(places, [textwrap.fill(label, 16) for label in labels], fontsize=9.0)
+    axes.set_xticks(places, [textwrap.fill(label, 16) for label in labels])
     count = f"{done.sum()} runs" + (f", {(~done).sum()} failed or missing (dotted)" if (~done).any() else "")
-    axes.set_title(f"{count}; coloured by {_spaced(metrics[0])}")
-    figure.colorbar(drawn, ax=axes, label=f"{_spaced(metrics[0])} ({result[metrics[0]].attrs['units']})", pad=0.01)
+    title(axes, f"{count}; coloured by {_spaced(metrics[0])}")
+    part.colorbar(drawn, ax=axes, label=f"{_spaced(metrics[0])} ({result[metrics[0]].attrs['units']})", pad=0.01)
     return figure
 
 
@@ -167,18 +175,16 @@ def _column(result: xr.Dataset, name: str) -> Array:
     return np.asarray(values.broadcast_like(status).transpose(*status.dims).values, dtype=float).ravel()
 
 
-def _panels(result: xr.Dataset, width: float, height: float) -> tuple[Figure, dict[str, Axes]]:
-    """Return a figure with a panel per metric, entitled; widths and heights in inches."""
+def _panels(
+    result: xr.Dataset, cell: tuple[float, float], width: Width, titles: bool
+) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure with a panel per metric, each of a width and height in inches."""
     names = _metrics(result)
     columns = {1: 1, 2: 2, 4: 2}.get(len(names), 3)
-    rows = -(-len(names) // columns)
-    figure = new_figure(max(6.5, width * columns), height * rows + 0.6, "constrained")
-    grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=True)
-    for spare in grid.ravel()[len(names) :]:
-        spare.remove()
-    panels = dict(zip(names, grid.ravel(), strict=False))
+    figure, places = grid(len(names), columns, (max(cell[0], 6.5 / columns), cell[1]), width, titles, sharex=True)
+    panels = dict(zip(names, places, strict=True))
     for name, axes in panels.items():
-        axes.set_title(textwrap.fill(str(result[name].attrs["long_name"]), 46))
+        title(axes, str(result[name].attrs["long_name"]))
     return figure, panels
 
 
@@ -228,12 +234,17 @@ def _logarithmic(values: Array) -> bool:
     return bool(np.allclose(ratios, ratios[0], rtol=1e-3) and not np.allclose(steps, steps[0], rtol=1e-2))
 
 
-def _scale(set_scale: Any, axis: Axis, key: xr.DataArray) -> None:
+def _scale(set_scale: Any, axis: Axis, key: xr.DataArray, swept: bool = False) -> None:
+    """Give an axis the scale of a key, with its names; or with ticks at its values, as many as there is room for."""
     if "names" in key.attrs:
         axis.set_ticks(range(len(key.attrs["names"])), key.attrs["names"])
     elif _logarithmic(key.values):
         set_scale("log")
         plain(axis)
+    if swept and "names" not in key.attrs:
+        values = np.sort(key.values)[:: -(-key.size // _TICKS)]
+        axis.set_minor_locator(NullLocator())
+        axis.set_ticks(values, [f"{value:.4g}" for value in values])
 
 
 def _edges(values: Array) -> Array:

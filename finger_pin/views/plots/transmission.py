@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from finger_pin.analysis.transmission import flexion_postures, transmission_efficiency
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.views.plots.panels import grid, title
 from finger_pin.views.plots.reach import flexion_section
-from finger_pin.views.plots.style import BLACK, BLUE, COLOURS, GREY, VERMILLION, new_figure, styled
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, cycle_colours, styled, thin
 
 if TYPE_CHECKING:
     from finger_pin.studies.conclusions.posture import Transmission
@@ -23,14 +24,15 @@ _POINTS, _SIDE = 400, 41
 
 
 @styled
-def plot_transmission(found: Transmission) -> Figure:
+def plot_transmission(found: Transmission, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw (a) the efficiencies of all tendons over the workspace, (b) the most affected one by fingertip, (c) motion.
 
     Args:
         found: What the experiment `transmission` returned.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
-    figure = new_figure(12.5, 4.6, "constrained")
-    ranges, space, motion = figure.subplots(1, 3, width_ratios=[1.0, 1.15, 1.25])
+    figure, (ranges, space, motion) = grid(3, 3, (4.2, 4.6), width, titles)
     _ranges(ranges, found)
     _space(figure, space, found)
     _motion(motion, found)
@@ -40,27 +42,32 @@ def plot_transmission(found: Transmission) -> Figure:
 def _ranges(axes: Axes, found: Transmission) -> None:
     space = found.workspace
     for index in range(len(found.tendons)):
-        for values, colour in ((space.pulling, BLUE), (space.releasing, VERMILLION)):
+        for values, look in ((space.pulling, colour(BLUE)), (space.releasing, colour(VERMILLION))):
             low, high = values[:, index].min(), values[:, index].max()
-            axes.barh(index, high - low, left=low, height=0.42, color=colour)
+            axes.barh(index, high - low, left=low, height=0.42, color=look)
             # A range of no width is a line.
-            axes.plot([low, low], [index - 0.21, index + 0.21], color=colour, linewidth=2.0)
+            axes.plot([low, low], [index - 0.21, index + 0.21], color=look, linewidth=thin(1.4))
         least = space.least[:, index].min()
         greatest = space.greatest[:, index].max()
-        axes.plot([least, greatest], [index, index], color=GREY, linewidth=1.0, marker="|", markersize=9, zorder=0.5)
-    axes.axvline(1.0, color=BLACK, linewidth=0.8)
+        axes.plot([least, greatest], [index, index], **_possible_look(), linewidth=thin(), zorder=0.5)
+    axes.axvline(1.0, color=colour(BLACK), linewidth=thin(0.6))
     axes.set_yticks(range(len(found.tendons)), list(found.tendons))
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
     axes.set_xlabel(r"$f\,/\,f^a$")
     handles = [
-        axes.bar(0, 0, color=BLUE, label="pulling"),
-        axes.bar(0, 0, color=VERMILLION, label="releasing"),
-        axes.plot([], [], color=GREY, marker="|", markersize=9, label="possible at rest")[0],
+        axes.bar(0, 0, color=colour(BLUE), label="pulling"),
+        axes.bar(0, 0, color=colour(VERMILLION), label="releasing"),
+        axes.plot([], [], **_possible_look(), label="possible at rest")[0],
     ]
     axes.set_xlim(0.0, None)
-    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, columnspacing=1.0)
-    axes.set_title("(a) over the whole workspace")
+    below: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "frameon": False}
+    axes.legend(handles=handles, ncols=2, columnspacing=1.0, **below)
+    title(axes, "(a) over the whole workspace")
+
+
+def _possible_look() -> dict[str, Any]:
+    return {"color": colour(GREY), "marker": "|", "markersize": 9}
 
 
 def _space(figure: Figure, axes: Axes, found: Transmission) -> None:
@@ -75,12 +82,12 @@ def _space(figure: Figure, axes: Axes, found: Transmission) -> None:
     tips = tips.reshape(*positions.shape[:2], 3)
     values = transmission_efficiency(finger, positions).pulling[..., worst]
     drawn = axes.pcolormesh(tips[..., first], tips[..., second], values, shading="gouraud", cmap="cividis")
-    axes.plot(0.0, 0.0, color=BLACK, marker="o", markersize=4)
+    axes.plot(0.0, 0.0, color=colour(BLACK), marker="o", markersize=4)
     figure.colorbar(drawn, ax=axes, label=rf"$f\,/\,f^a$ of {found.tendons[worst]}, pulling")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"fingertip {_AXES[first]} (mm)")
     axes.set_ylabel(f"fingertip {_AXES[second]} (mm)")
-    axes.set_title(f"(b) {found.tendons[worst]} by fingertip position; the dot: joint 1")
+    title(axes, f"(b) {found.tendons[worst]} by fingertip position; the dot: joint 1")
 
 
 def _motion(axes: Axes, found: Transmission) -> None:
@@ -88,17 +95,17 @@ def _motion(axes: Axes, found: Transmission) -> None:
     phi = np.linspace(0.0, 1.05 * float(motion.curvature.max()), 100)
     if np.ptp(tendons.surface) == 0.0:
         for sign, label in ((-1.0, r"$e^{\mp\mu_e\varphi}$"), (1.0, None)):
-            axes.plot(phi, np.exp(sign * tendons.surface[0] * phi), color=BLACK, linewidth=1.2, label=label)
+            axes.plot(phi, np.exp(sign * tendons.surface[0] * phi), color=colour(BLACK), linewidth=thin(), label=label)
     step = max(1, len(found.time) // _POINTS)
     for index, name in enumerate(found.tendons):
         moving = motion.sliding[::step, index]
-        colour = COLOURS[index % len(COLOURS)]
+        look = cycle_colours()[index % len(cycle_colours())]
         curvature, ratio = motion.curvature[::step, index], motion.ratio[::step, index]
-        axes.scatter(curvature[moving], ratio[moving], s=5, color=colour, label=name, linewidths=0.0)
-        axes.scatter(curvature[~moving], ratio[~moving], s=3, color=colour, alpha=0.35, linewidths=0.0)
-    axes.axhline(1.0, color=GREY, linewidth=0.8)
+        axes.scatter(curvature[moving], ratio[moving], s=5, color=look, label=name, linewidths=0.0)
+        axes.scatter(curvature[~moving], ratio[~moving], s=3, color=look, alpha=0.35, linewidths=0.0)
+    axes.axhline(1.0, color=colour(GREY), linewidth=thin(0.6))
     axes.set_xlabel(r"curvature $\varphi$ (rad)")
     axes.set_ylabel(r"$f\,/\,f^a$")
-    axes.set_title(f"(c) in motion, {found.scenario.name}; pale: not yet sliding")
+    title(axes, f"(c) in motion, {found.scenario.name}; pale: not yet sliding")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, columnspacing=0.9, markerscale=2.5,
                 handletextpad=0.3, handlelength=1.2)  # fmt: skip

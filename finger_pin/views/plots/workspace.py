@@ -7,54 +7,56 @@ from collections.abc import Iterable
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from finger_pin.description.hand import one_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.reach import fingertip_surface, flexion_section
 from finger_pin.views.plots.space import AXES, space
-from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, new_figure, styled
+from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, colour, styled, thin
 
 _MILLI = 1e3
 _ISOLINES = 7
 
 
 @styled
-def plot_workspace(finger: Finger | FingerDescription) -> Figure:
+def plot_workspace(finger: Finger | FingerDescription, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 2: where the fingertip can go when the passive tendons do not stretch, equation (4).
 
     Left the surface in space, right the section in the flexion plane with the finger at three poses; mm, base frame.
 
     Args:
         finger: A finger, or the description of one.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
     """
     if isinstance(finger, FingerDescription):
         finger = Finger(finger)
     one_finger(finger.description)
     surface, section = fingertip_surface(finger), flexion_section(finger)
-    figure = new_figure(11.0, 5.2)
-    _surface(figure, _MILLI * surface, _MILLI * section.poses)
-    plane = figure.add_axes((0.575, 0.12, 0.415, 0.74))
+    figure, (left, right) = sheet([(5.5, 5.2), (5.5, 5.2)], width, titles)
+    solid = _surface(left, _MILLI * surface, _MILLI * section.poses)
+    plane = right.subplots()
     _section(plane, _MILLI * section.patches, _MILLI * section.poses, section.plane)
     imposed = ", with (4) imposed" if finger.routing.passive else ""
-    for left, text in (
-        (0.03, f"(a) where the fingertip can go{imposed}\n{_ranges(surface, range(3))}"),
-        (0.575, f"(b) section in the flexion plane{imposed}\n{_ranges(section.patches, section.plane)}"),
-    ):
-        figure.text(left, 0.985, text, va="top", fontsize=10.5, linespacing=1.4)
+    title(solid, f"(a) where the fingertip can go{imposed}\n{_ranges(surface, range(3))}")
+    title(plane, f"(b) section in the flexion plane{imposed}\n{_ranges(section.patches, section.plane)}")
     return figure
 
 
-def _surface(figure: Figure, patches: Array, poses: Array) -> None:
+def _surface(part: SubFigure, patches: Array, poses: Array) -> Axes3D:
     quads = _quads(patches)
     corners = np.concatenate([quads.reshape(-1, 3), poses[0]])
-    axes = space(figure, (0.0, 0.0, 0.475, 0.92), corners, "mm")
+    solid = space(part, corners, "mm")
     colours = _lit(quads)
-    axes.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=0.88 * colours, linewidths=0.3))
-    axes.plot(*poses[0].T, color=BLACK, marker="o", markersize=3.5, linewidth=2.0)
+    solid.add_collection3d(Poly3DCollection(quads, facecolors=colours, edgecolors=0.88 * colours, linewidths=0.3))
+    solid.plot(*poses[0].T, color=colour(BLACK), marker="o", markersize=3.5, linewidth=thin(1.4))
+    return solid
 
 
 def _section(axes: Axes, patches: Array, poses: Array, plane: tuple[int, int]) -> None:
@@ -66,10 +68,10 @@ def _section(axes: Axes, patches: Array, poses: Array, plane: tuple[int, int]) -
         # A single patch: lines along which one joint moves while the other stands.
         step = np.linspace(0, flat.shape[1] - 1, _ISOLINES).round().astype(int)
         lines = [*flat[0][step], *flat[0][:, step].swapaxes(0, 1)]
-        axes.add_collection(LineCollection(lines, colors=BLUE, linewidths=0.8))
+        axes.add_collection(LineCollection(lines, colors=colour(BLUE), linewidths=thin(0.6)))
     styles = zip(poses[..., plane], ("straight", "half flexed", "flexed"), (BLACK, ORANGE, VERMILLION), strict=True)
-    for pose, label, colour in styles:
-        axes.plot(*pose.T, color=colour, label=label, marker="o", markersize=4, linewidth=2.2)
+    for pose, label, look in styles:
+        axes.plot(*pose.T, color=colour(look), label=label, marker="o", markersize=4, linewidth=thin(1.6))
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     axes.set_xlabel(f"{AXES[plane[0]]} (mm)")

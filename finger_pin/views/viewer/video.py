@@ -72,7 +72,7 @@ def write_video(
             raise InputError(name, "must be a number above 0", value)
     writer = _writer(gif, rate)
     motion = Motion.of(result, rate / speed)
-    figure = new_figure(*_INCHES)
+    figure = new_figure(*_INCHES, layout=None)
     film = _Film(figure, motion)
     with replacing(target) as temporary, writer.saving(figure, temporary, (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]):
         step, last = speed / rate, motion.time[-1]
