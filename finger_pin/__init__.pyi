@@ -19,6 +19,7 @@ from .mechanism.mjcf import to_mjcf as to_mjcf
 from .simulation.convergence import check_convergence as check_convergence
 from .simulation.netcdf import load_result as load_result
 from .simulation.netcdf import save as save
+from .simulation.prepared import prepare as prepare
 from .simulation.simulate import simulate as simulate
 from .simulation.simulator import Simulator as Simulator
 from .studies import optimise as optimise

@@ -18,7 +18,7 @@ from finger_pin.control.position_drive import GivenVoltages, PositionDrives
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
-from finger_pin.core.evaluation import CompiledFinger, Room
+from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
@@ -208,17 +208,6 @@ class ClosedLoop:
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
         return LoopSignals(reference, control, self.dynamics.evaluate(x, *acting))
-
-    def fill(self, room: Room, time: Array, x: Array) -> tuple[ReferenceSignals, ControlSignals, Array]:
-        """Fill a room of the compiled core with what the mechanism does at times (m,) and states (m, size).
-
-        Returns:
-            What is desired and planned, and the inputs of the mechanism.
-        """
-        assert isinstance(self.dynamics, CompiledFinger)
-        reference, control, acting = self._acting(time, x)
-        self.dynamics.mechanism.fill(room, x, *acting)
-        return reference, control, acting[0]
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
         """Return what is desired and planned, and what acts: inputs of the mechanism, F, and how palm or objects move.

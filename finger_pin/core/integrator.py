@@ -20,8 +20,6 @@ from finger_pin.description.routing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
-#: Takes some steps: their ends, the start of the first among them, and what maps times within to packed states.
-Follow = Callable[[Array, Callable[[Array], Array]], None]
 
 # Slices of a simulation of several islands, between which it can be watched.
 _SLICES = 200
@@ -44,7 +42,7 @@ class _Recorder:
     def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
         self._stepper, self._index = stepper, index
         part = self.part
-        self.start = self._begin = (part.time, part.x.copy(), part.attitude.copy())
+        self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.kept = [part.room(0)]
         self.room = part.room(chunk)
         self.taken = 0
@@ -54,7 +52,6 @@ class _Recorder:
         """Go to a time, or until some chunks are full; return the status."""
         part = self.part
         while chunks != 0:
-            self._begin = (part.time, part.x.copy(), part.attitude.copy())
             status, steps = part.advance(end, self.room)
             self.kept.append(self.room.first(steps))
             self.taken += steps
@@ -77,10 +74,6 @@ class _Recorder:
         """Return the steps that were taken."""
         joined = {name: np.concatenate([getattr(record, name) for record in self.kept]) for name in vars(self.kept[0])}
         return _Steps(self.part, *self.start, Record(**joined))
-
-    def latest(self) -> _Steps:
-        """Return the steps of the last chunk."""
-        return _Steps(self.part, *self._begin, self.kept[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +124,6 @@ def integrate_compiled(
     chunk: int = 256,
     together: bool = False,
     stop: Stop | None = None,
-    follow: Follow | None = None,
 ) -> Trajectory:
     """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
 
@@ -146,7 +138,6 @@ def integrate_compiled(
         together: Whether islands stop at the same times to be watched, which cuts some of their steps; otherwise a
             state that is watched has each where it has got to.
         stop: Asked now and then; true ends the integration there.
-        follow: Called with the steps of every chunk of a single island.
     """
     if knots is not None:
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
@@ -171,9 +162,6 @@ def integrate_compiled(
             reason = reason or failure(recorder.part, status, [names[at] for at in places])
             if not reason and recorder.full and recorder.part.time < duration:
                 reason = f"after {recorder.taken} steps the trajectory has reached the most that is kept in memory"
-        if alone and follow is not None:
-            latest = recorders[0].latest()
-            follow(latest.times, _states(stepper, [latest]))
         if watch is not None:
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()

@@ -171,7 +171,7 @@ class Scenario(Description):
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
         if self.hand is not None:
-            table.pop("finger")
+            table.pop("finger", None)
         return table
 
     def parts(self) -> dict[str, Scenario]:

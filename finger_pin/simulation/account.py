@@ -58,7 +58,6 @@ def account(
     times: Array,
     signals: LoopSignals,
     motion: Motion,
-    known: Array | None = None,
 ) -> Account:
     """Keep the energy account of a trajectory.
 
@@ -68,7 +67,6 @@ def account(
         times: Saved times, shape (m,), beginning at the trajectory's start.
         signals: The signals at those times.
         motion: Fingertip and energies of the rigid body at those times.
-        known: The integrals of all powers up to those times, `Works.values`, where they are known already.
     """
     booked = powers(signals.finger)
     stored = energies(loop.finger, signals.finger, motion)
@@ -78,7 +76,7 @@ def account(
     columns = [
         [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)] for part, _, _ in parts
     ]
-    found = [Works(part, times).add(ends, states).values for part, ends, states in parts] if known is None else [known]
+    found = [Works(part, times).add(ends, states).values for part, ends, states in parts]
     done = np.zeros((len(times), len(booked.names)))
     for own, places in zip(found, columns, strict=True):
         done[:, places] += own

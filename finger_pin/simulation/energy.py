@@ -67,6 +67,13 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     return found
 
 
+def stored_names(finger: Finger) -> tuple[str, ...]:
+    """Return the names of the stored energies of a finger."""
+    rotors = ("rotors",) if finger.actuators.names else ()
+    objects = () if finger.surroundings is None else ("objects_kinetic", "objects_gravity")
+    return ("kinetic", "gravity", *finger.mechanism.books.stored, *rotors, *objects)
+
+
 def powers(signals: FingerSignals) -> Flows:
     """Return the powers supplied and lost at the given signals."""
     found = signals.mechanism

@@ -47,6 +47,10 @@ class Recording:
         entry = self.variables.get(name) or self.coordinates[name]
         return np.asarray(entry[1] if isinstance(entry, tuple) else entry)
 
+    def units(self, name: str) -> str:
+        """Return the unit of a variable."""
+        return self.variables[name][2]["units"]
+
     def cut(self, count: int) -> None:
         """Keep the first samples only."""
         self.variables = {name: (dims, all_[:count], own) for name, (dims, all_, own) in self.variables.items()}

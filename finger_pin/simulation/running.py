@@ -1,13 +1,11 @@
-"""A run: from the description of a scenario to arrays of everything that happened."""
+"""A run: from a scenario to its trajectory, and to arrays of everything that happened, judged."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,10 +16,11 @@ from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.own import OwnController
 from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.proportional import Controller
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.cvode import integrate_cvode
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import Follow, integrate_compiled
+from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.loading import to_toml
@@ -45,12 +44,8 @@ from finger_pin.simulation.accuracy import (
     ringing,
     too_stiff,
 )
-from finger_pin.simulation.following import Following
 from finger_pin.simulation.recorded import Recording
-from finger_pin.simulation.recording import record
-
-if TYPE_CHECKING:
-    pass
+from finger_pin.simulation.recording import Motions, record
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -60,6 +55,108 @@ _ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within t
 _CONTINUOUS = "Radau"
 # Steps between two looks at a compiled simulation that is observed.
 _CHUNK_OBSERVED = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A scenario with everything that moves it, once.
+
+    Attributes:
+        scenario: What is simulated.
+        loop: Finger, controller and reference, with what is sampled for this one motion.
+        method: The integrator; not the scenario's where its controller is Python and acts continuously.
+        answers: The controller itself, where the loop samples it.
+    """
+
+    scenario: Scenario
+    loop: ClosedLoop
+    method: str
+    answers: Controller
+
+    @classmethod
+    def of(
+        cls, scenario: Scenario, loop: ClosedLoop | None = None, own: str = "", control_period: float | None = None
+    ) -> Setup:
+        """Make a scenario ready.
+
+        Args:
+            scenario: What to simulate.
+            loop: Its loop, where something in it is a user's own.
+            own: What that is, as `own_parts` says.
+            control_period: As for `simulate`.
+
+        Raises:
+            InputError: If the method cannot sample, the controller must be sampled, bodies overlap at the start, or a
+                user's own controller answers wrongly.
+        """
+        method = scenario.simulation.method
+        loop = loop or ClosedLoop.from_scenario(scenario)
+        if loop.start is None and loop.finger.actuators.names:
+            # Before the controller is sampled: then it must not be asked for a start.
+            loop = replace(loop, start=loop.initial_state())
+        if loop.finger.surroundings is not None:
+            start = loop.finger.layout.unpack(loop.initial_state())
+            assert start.object_pose is not None
+            loop.finger.surroundings.check(start.position, start.object_pose)
+        sampling = sampling_settings(scenario, control_period)
+        if sampling is None and isinstance(loop.controller, MeasuringController):
+            raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
+        positioned = bool(np.any(loop.finger.actuators.holds))
+        if positioned and method not in TABLEAUS:
+            raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
+        if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
+            if positioned:
+                raise InputError(
+                    "controller.sampling.period", "is missing: beside position drives this controller is sampled"
+                )
+            method = _CONTINUOUS
+        if scenario.simulation.method not in METHODS_IN_NUMPY:
+            loop = loop.compiled()
+        answers = loop.controller
+        sampled = None if sampling is None else SampledController(loop, sampling)
+        if positioned:
+            duration = scenario.simulation.duration
+            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
+            loop = replace(loop, drives=drives, parts=())
+        if sampled is not None:
+            loop = replace(loop, controller=sampled, parts=())
+        elif own:
+            # A wrong answer of a user's own controller is refused before anything is computed.
+            loop.evaluate(0.0, loop.initial_state())
+        return cls(scenario, loop, method, answers)
+
+    def integrate(
+        self,
+        watch: Watch | None = None,
+        stop: Stop | None = None,
+        *,
+        scenario: Scenario | None = None,
+        chunk: int = CHUNK,
+    ) -> Trajectory:
+        """Integrate, at the tolerances of another scenario if given.
+
+        Args:
+            watch: Called with the simulated time and the state now and then.
+            stop: Asked now and then.
+            scenario: Like this one, with tolerances of its own.
+            chunk: Steps between two calls.
+        """
+        return _integrate(scenario or self.scenario, self.loop, self.method, watch, chunk, stop)
+
+    def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
+        """Return why a trajectory ended early, and what to try.
+
+        Args:
+            trajectory: One that failed.
+            slow: What made it slow, if that is known.
+        """
+        answers, settings = self.answers, self.scenario.simulation
+        if isinstance(answers, OwnController) and answers.problem_time >= trajectory.breakpoints[-1]:
+            return answers.problem, "another controller"
+        advice = _ADVICE_TIGHT if min(settings.rtol, settings.atol_scale) < _TIGHT else _ADVICE
+        if "physical range" in trajectory.failure:
+            advice = _ADVICE_RUNAWAY
+        return f"{trajectory.failure}; {slow}" if slow else trajectory.failure, advice
 
 
 def run(
@@ -82,48 +179,13 @@ def run(
         observe: Called with the simulated time, s, and all signals.
         stop: Asked now and then.
     """
-    method = scenario.simulation.method
     loop = loop or ClosedLoop.from_scenario(scenario)
     check_memory(scenario.simulation, loop.finger)
-    if loop.start is None and loop.finger.actuators.names:
-        # Before the controller is sampled: then it must not be asked for a start.
-        loop = replace(loop, start=loop.initial_state())
-    if loop.finger.surroundings is not None:
-        start = loop.finger.layout.unpack(loop.initial_state())
-        assert start.object_pose is not None
-        loop.finger.surroundings.check(start.position, start.object_pose)
-    # The margin is that of the paper's controller on the scenario's reference.
-    planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
-    judged = planned and not {"controller", "reference"} & set(own.split(", "))
-    judged = judged and loop.finger.routing.force_closure().holds
     driving = micro_damping_advice(scenario.finger)
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=3)
-    sampling = sampling_settings(scenario, control_period)
-    if sampling is None and isinstance(loop.controller, MeasuringController):
-        raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
-    positioned = bool(np.any(loop.finger.actuators.holds))
-    if positioned and method not in TABLEAUS:
-        raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
-    if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
-        if positioned:
-            raise InputError(
-                "controller.sampling.period", "is missing: beside position drives this controller is sampled"
-            )
-        method = _CONTINUOUS
-    if scenario.simulation.method not in METHODS_IN_NUMPY:
-        loop = loop.compiled()
-    answers = loop.controller
-    sampled = None if sampling is None else SampledController(loop, sampling)
-    if positioned:
-        duration = scenario.simulation.duration
-        drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
-        loop = replace(loop, drives=drives, parts=())
-    if sampled is not None:
-        loop = replace(loop, controller=sampled, parts=())
-    elif own:
-        # A wrong answer of a user's own controller is refused before anything is computed.
-        loop.evaluate(0.0, loop.initial_state())
+    setup = Setup.of(scenario, loop, own, control_period)
+    loop = setup.loop
 
     def watch(time: float, x: Array) -> None:
         if progress is not None:
@@ -133,29 +195,22 @@ def run(
 
     def repeated(other: Scenario, enough: Stop) -> Trajectory:
         asked = stop or (lambda: False)
-        return _integrate(other, loop, method, lambda time, x: None, CHUNK, lambda: enough() or asked())
+        return setup.integrate(None, lambda: enough() or asked(), scenario=other)
+
+    text = to_toml(scenario)
 
     def recorded(found: Trajectory) -> Recording:
         # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            followed = following if found is first else None
-            return record(scenario, loop, found, method, following=followed, text=text.result())
+            motions = Motions(loop, found, scenario.sample_times())
+            return record(scenario, motions, found, setup.method, text=text)
 
-    chunk = CHUNK if observe is None else _CHUNK_OBSERVED
-    # Only what is a function of time and state can be evaluated beside the integration.
-    pure = method in TABLEAUS and loop.drives is None and compiled_control(loop) is not None
-    # The fingers of a hand that move apart are integrated side by side already.
-    beside = pure and observe is None and not loop.parts
-    with ThreadPoolExecutor(1) as thread:
-        judging = thread.submit(quick_margin, scenario) if judged else None
-        text = thread.submit(to_toml, scenario)
-        following = Following(loop, scenario.sample_times(), thread) if beside else None
-        first = _integrate(scenario, loop, method, watch, chunk, stop, following.add if following else None)
-        margin = judging.result() if judging else None
-        close = locking_advice(math.inf if margin is None else margin)
-        if close:
-            warnings.warn(close, SelfLockingWarning, stacklevel=3)
-        closed = close_account(scenario, first, repeated, recorded)
+    first = setup.integrate(watch, stop, chunk=CHUNK if observe is None else _CHUNK_OBSERVED)
+    margin = _margin(scenario, loop, own)
+    close = locking_advice(math.inf if margin is None else margin)
+    if close:
+        warnings.warn(close, SelfLockingWarning, stacklevel=3)
+    closed = close_account(scenario, first, repeated, recorded)
     trajectory, recording = closed.trajectory, closed.result
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(scenario, closed, repeated, margin=math.inf if margin is None else margin)
@@ -173,13 +228,7 @@ def run(
     recording.attrs |= {name: text for name, text in told.items() if text}
     excess = finite_part(recording)
     if trajectory.failure:
-        if isinstance(answers, OwnController) and answers.problem_time >= reached:
-            raise IntegrationError(reached, answers.problem, "another controller", recording.dataset())
-        tight = min(scenario.simulation.rtol, scenario.simulation.atol_scale) < _TIGHT
-        advice = _ADVICE_TIGHT if tight else _ADVICE
-        if "physical range" in trajectory.failure:
-            advice = _ADVICE_RUNAWAY
-        reason = f"{trajectory.failure}; {slow}" if slow else trajectory.failure
+        reason, advice = setup.failure(trajectory, slow)
         raise IntegrationError(reached, reason, advice, recording.dataset())
     if excess:
         reason, reached = f"{excess} is not finite after that", recording.attrs["end_time"]
@@ -189,14 +238,24 @@ def run(
     return recording
 
 
+def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
+    """Return how far the joints' friction is from what locks the finger; None where the reference is not planned.
+
+    The margin is that of the paper's controller on the scenario's reference.
+    """
+    planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
+    if not planned or {"controller", "reference"} & set(own.split(", ")):
+        return None
+    return quick_margin(scenario) if loop.finger.routing.force_closure().holds else None
+
+
 def _integrate(
     scenario: Scenario,
     loop: ClosedLoop,
     method: str,
-    watch: Watch,
+    watch: Watch | None,
     chunk: int,
     stop: Stop | None,
-    follow: Follow | None = None,
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
@@ -215,7 +274,6 @@ def _integrate(
             chunk=chunk,
             together=chunk == _CHUNK_OBSERVED,
             stop=stop,
-            follow=follow,
         )
     if method == "CVODE":
         return integrate_cvode(

@@ -24,7 +24,7 @@ from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import check_memory, left_open, open_account
-from finger_pin.simulation.recording import record
+from finger_pin.simulation.recording import Motions, record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,7 +105,7 @@ class Told:
         times = knots[0] + scenario.sample_times()
         near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
         times = np.where(np.abs(near - times) < _SAME, near, times)
-        result = record(scenario, loop, trajectory, str(settings["method"]), times)
+        result = record(scenario, Motions(loop, trajectory, times), trajectory, str(settings["method"]))
         result.attrs["own"] = "loop"
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])

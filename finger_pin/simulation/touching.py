@@ -17,7 +17,8 @@ from finger_pin.mechanism.surroundings import POSE, VELOCITY
 if TYPE_CHECKING:
     import xarray as xr
 
-Variables = dict[str, tuple[Any, Array, dict[str, str]]]
+# Dimensions, unit and name.
+Variables = dict[str, tuple[tuple[str, ...], str, str]]
 _OBJECTS = {
     "object_pose": ("object_position", "object_orientation"),
     "object_velocity": ("object_velocity", "object_angular_velocity"),
@@ -25,8 +26,39 @@ _OBJECTS = {
 _CONTACT, _SPACE = ("time", "contact"), ("time", "contact", "axis")
 
 
-def contact_variables(finger: Finger, signals: FingerSignals) -> Variables:
-    """Return what contacts and free objects do over time; nothing without surroundings."""
+def contact_variables(finger: Finger) -> Variables:
+    """Return dimensions, units and names of what contacts and free objects do; nothing without surroundings."""
+    around = finger.surroundings
+    if around is None:
+        return {}
+    table: Variables = {
+        "contact_gap": (
+            _CONTACT,
+            "m",
+            "distance of the surfaces, negative where they penetrate; far apart, no more than it",
+        ),
+        "contact_slip": (_CONTACT, "m/s", "speed of sliding"),
+        "contact_force": (_SPACE, "N", "force on the second body of the pair"),
+        "contact_normal_force": (_CONTACT, "N", "normal force"),
+        "contact_friction": (_CONTACT, "N", "friction force"),
+        "contact_level": (_CONTACT, "N", "most friction, mu times the normal force"),
+        "contact_point": (_SPACE, "m", "midway between the surfaces; zero where they are open"),
+        "contact_normal": (_SPACE, "1", "normal of the second body; zero where they are open"),
+        "contact_bend": (("time", "contact", "tangent"), "m", "bend of the bristles along two tangents"),
+    }
+    if around.free:
+        axes, turns = ("time", "object", "axis"), ("time", "object", "quaternion")
+        table |= {
+            "object_position": (axes, "m", "position of a free object"),
+            "object_orientation": (turns, "1", "its orientation, a unit quaternion"),
+            "object_velocity": (axes, "m/s", "its velocity"),
+            "object_angular_velocity": (axes, "rad/s", "its angular velocity, in its own frame"),
+        }
+    return table
+
+
+def contact_values(finger: Finger, signals: FingerSignals) -> dict[str, Array]:
+    """Return the values of these variables."""
     around, state = finger.surroundings, signals.state
     if around is None or state.object_pose is None or state.object_velocity is None or state.contact_bend is None:
         return {}
@@ -35,35 +67,22 @@ def contact_variables(finger: Finger, signals: FingerSignals) -> Variables:
     assert isinstance(touch, Touch)
     space = signals.mechanism.touching or around.touching(state.position, state.object_pose, found.force)
     friction = np.hypot(found.force[:, 1::arms], found.force[:, 2::arms])
-    text = "distance of the surfaces, negative where they penetrate; far apart, no more than it"
-    table = {
-        "contact_gap": _entry(_CONTACT, touch.gap, "m", text),
-        "contact_slip": _entry(_CONTACT, found["sliding_speed"] * (friction > 0.0), "m/s", "speed of sliding"),
-        "contact_force": _entry(_SPACE, space.force, "N", "force on the second body of the pair"),
-        "contact_normal_force": _entry(_CONTACT, found.force[:, ::arms], "N", "normal force"),
-        "contact_friction": _entry(_CONTACT, friction, "N", "friction force"),
-        "contact_level": _entry(_CONTACT, found["level"], "N", "most friction, mu times the normal force"),
-        "contact_point": _entry(_SPACE, space.point, "m", "midway between the surfaces; zero where they are open"),
-        "contact_normal": _entry(_SPACE, space.normal, "1", "normal of the second body; zero where they are open"),
-        "contact_bend": _entry(
-            ("time", "contact", "tangent"),
-            _split(state.contact_bend, 2),
-            "m",
-            "bend of the bristles along two tangents",
-        ),
+    pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
+    return {
+        "contact_gap": touch.gap,
+        "contact_slip": found["sliding_speed"] * (friction > 0.0),
+        "contact_force": space.force,
+        "contact_normal_force": found.force[:, ::arms],
+        "contact_friction": friction,
+        "contact_level": found["level"],
+        "contact_point": space.point,
+        "contact_normal": space.normal,
+        "contact_bend": _split(state.contact_bend, 2),
+        "object_position": pose[..., :3],
+        "object_orientation": pose[..., 3:],
+        "object_velocity": velocity[..., :3],
+        "object_angular_velocity": velocity[..., 3:],
     }
-    if around.free:
-        pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
-        axes, turns = ("time", "object", "axis"), ("time", "object", "quaternion")
-        table |= {
-            "object_position": _entry(axes, pose[..., :3], "m", "position of a free object"),
-            "object_orientation": _entry(turns, pose[..., 3:], "1", "its orientation, a unit quaternion"),
-            "object_velocity": _entry(axes, velocity[..., :3], "m/s", "its velocity"),
-            "object_angular_velocity": _entry(
-                axes, velocity[..., 3:], "rad/s", "its angular velocity, in its own frame"
-            ),
-        }
-    return table
 
 
 def contact_coordinates(finger: Finger) -> dict[str, Any]:
@@ -103,7 +122,3 @@ def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
 
 def _split(values: Array, size: int) -> Array:
     return values.reshape(*values.shape[:-1], -1, size)
-
-
-def _entry(dims: Any, values: Array, units: str, long_name: str) -> tuple[Any, Array, dict[str, str]]:
-    return dims, np.asarray(values), {"units": units, "long_name": long_name}

@@ -1,0 +1,158 @@
+"""A prepared scenario: many runs with other numbers, at the cost of their steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.core.textbook import Stop
+from finger_pin.description.family import Family
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import nearest
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.simulation.recorded import Recording
+from finger_pin.simulation.recording import Motions, record, variables
+from finger_pin.simulation.running import Setup, run
+from finger_pin.simulation.starting import own_parts, packed_state
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: What a run records unless it is told otherwise.
+RECORDED = ("joint_position", "tendon_tension")
+
+
+def prepare(
+    scenario: Scenario | str | Path, parameters: Sequence[str] = (), record: Sequence[str] = RECORDED
+) -> Prepared:
+    """Prepare a scenario for many runs with other numbers.
+
+        prepared = fp.prepare("fig6", ["finger.tendon_friction.coulomb", "controller.gain"], ["joint_position"])
+        run = prepared.run([0.12, 1.0])
+        print(run.time, run["joint_position"], run.units("joint_position"))
+
+    Args:
+        scenario: From `load_scenario`, or what that takes: the name of one, or the path of a file.
+        parameters: Dotted keys, as of `load_scenario`, whose values every run is given; ``[2]`` at the end of one
+            stands for one number of a list, a star for every name.
+        record: The variables of the result that runs return, by their names in a Dataset.
+
+    Raises:
+        InputError: If there is no such key or variable.
+    """
+    if isinstance(scenario, str | Path):
+        scenario = load_scenario(scenario)
+    return Prepared(Family(scenario, tuple(parameters)), tuple(record))
+
+
+class Prepared:
+    """A scenario that is run many times, also in several threads at once.
+
+    Attributes:
+        family: The scenario, and those that other values make of it.
+        record: Names of the variables that `run` returns.
+        start: The packed state at the start, shape (size,), with the scenario's own values.
+    """
+
+    def __init__(self, family: Family, record: tuple[str, ...]) -> None:
+        """Build what the runs share; use `prepare`."""
+        self.family, self.record = family, record
+        loop = ClosedLoop.from_scenario(family.scenario)
+        self._check(loop)
+        self.start: Array = loop.initial_state()
+        self.start.flags.writeable = False
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The keys whose values runs are given."""
+        return self.family.keys
+
+    @property
+    def values(self) -> tuple[Any, ...]:
+        """What the scenario itself has there."""
+        return self.family.values
+
+    def scenario(self, values: Sequence[Any] | None = None) -> Scenario:
+        """Return the scenario with values at the keys, by default its own.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+        """
+        return self.family.scenario if values is None else self.family.at(values)
+
+    def run(
+        self,
+        values: Sequence[Any] | None = None,
+        *,
+        initial: ArrayLike | xr.Dataset | None = None,
+        stop: Stop | None = None,
+    ) -> Recording:
+        """Simulate, and return what is recorded, and no more: bit for bit as in the result of `simulate`.
+
+        Nothing is judged: whether the energy account closes, or how large the error is, `simulate` says.
+
+        Args:
+            values: One for each key, in their order; by default the scenario's own.
+            initial: The packed state to start from, shape (size,), or a result to continue from, as for `fp.simulate`.
+            stop: Asked now and then; when it returns true the run ends there.
+
+        Raises:
+            InputError: Naming the entry that is wrong.
+            IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
+            Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
+        """
+        scenario = self.scenario(values)
+        setup = Setup.of(scenario, _started(scenario, initial))
+        self._check(setup.loop)
+        trajectory = setup.integrate(stop=stop)
+        motions = Motions(setup.loop, trajectory, scenario.sample_times())
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            found = record(scenario, motions, trajectory, setup.method, self.record)
+        reached = float(trajectory.breakpoints[-1])
+        if trajectory.failure:
+            raise IntegrationError(reached, *setup.failure(trajectory), found.dataset())
+        if trajectory.interrupted:
+            raise Interrupted(reached, found.dataset())
+        return found
+
+    def simulate(
+        self,
+        values: Sequence[Any] | None = None,
+        *,
+        initial: ArrayLike | xr.Dataset | None = None,
+        progress: Callable[[float], None] | None = None,
+        stop: Stop | None = None,
+    ) -> xr.Dataset:
+        """Simulate, and return the whole Dataset with its energy account, as `fp.simulate` does.
+
+        Args:
+            values: One for each key, in their order; by default the scenario's own.
+            initial: As for `run`.
+            progress: Called with the simulated time, s, now and then.
+            stop: Asked now and then; when it returns true the run ends there.
+        """
+        scenario = self.scenario(values)
+        own = own_parts(None, None, None, initial)
+        return run(scenario, _started(scenario, initial), own, progress=progress, stop=stop).dataset()
+
+    def _check(self, loop: ClosedLoop) -> None:
+        """Raise unless the result of a loop has everything that is recorded."""
+        known = variables(loop)
+        for name in self.record:
+            if name not in known:
+                near = nearest(name, known)
+                hint = f"; did you mean {near}?" if near else ""
+                raise InputError("record", f"the result has no such variable; it has {', '.join(known)}{hint}", name)
+
+
+def _started(scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
+    loop = ClosedLoop.from_scenario(scenario)
+    return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))

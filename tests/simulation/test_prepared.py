@@ -1,0 +1,147 @@
+"""Prepared scenarios: many runs with other numbers, bit for bit those of scenarios that are read anew."""
+
+import itertools
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import compiled_control
+from finger_pin.core.tables import build_tables
+from finger_pin.description.family import Family
+from finger_pin.exceptions import InputError, Interrupted
+
+SCENARIOS = ("fig6", "stick_slip", "servo", "servo_position", "press", "pinch", "hand", "grasp")
+
+
+def numbers(table, above=()):
+    """Give the keys of all numbers and lists of numbers of a table, and what stands there."""
+    for name, value in table.items():
+        key = (*above, name)
+        if isinstance(value, dict):
+            yield from numbers(value, key)
+        elif isinstance(value, float) or (isinstance(value, tuple) and isinstance(value[0], float)):
+            yield ".".join(key), value
+
+
+def changed(value):
+    """Return a number, or all numbers of a list, changed a little."""
+    if isinstance(value, tuple):
+        return [changed(each) for each in value]
+    return 1.03 * value or 1e-3
+
+
+def same(one, other):
+    """Whether tables of tables of arrays and numbers are the same, bit for bit."""
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    return np.array_equal(one, other)
+
+
+def built(scenario):
+    """Return all that a run of a scenario computes with."""
+    loop = ClosedLoop.from_scenario(scenario)
+    return build_tables(loop.finger.mechanism), compiled_control(loop), loop.initial_state(), loop.fingertip_force
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
+    """The scenario of each number alone; and, of all that can be changed together, everything a run computes with."""
+    scenario, together = fp.load_scenario(name), {}
+    for key, value in numbers(scenario.model_dump(mode="python", exclude_none=True)):
+        given, family = changed(value), Family(scenario, [key])
+        try:
+            read = fp.load_scenario(name, {key: given})
+        except InputError as error:
+            with pytest.raises(InputError) as said:
+                family.at([given])
+            assert str(said.value) == str(error)
+            continue
+        assert family.at([given]) == read, key
+        together[key] = given
+    assert len(together) > 50
+    family = Family(scenario, [*together])
+    assert same(built(family.at([*together.values()])), built(fp.load_scenario(name, together)))
+
+
+@pytest.mark.parametrize(
+    ("name", "finger"), [("fig6", ""), ("servo_position", ""), ("pinch", "left"), ("hand", "thumb")]
+)
+def test_a_run_records_bit_for_bit_what_simulating_the_scenario_read_anew_does(name, finger):
+    key = f"hand.fingers.{finger}.finger.tendon_friction.coulomb" if finger else "finger.tendon_friction.coulomb"
+    record = ["tendon_tension", "joint_position", "energy_exchanged_tendon_coulomb"]
+    prepared = fp.prepare(name, [key, "simulation.duration"], record)
+    run = prepared.run([0.09, 0.05])
+    read = fp.simulate(fp.load_scenario(name, {key: 0.09, "simulation.duration": 0.05}))
+    whole = prepared.simulate([0.09, 0.05])
+    assert whole.equals(read)
+    for each in record:
+        assert np.array_equal(run[each], read[each].values)
+        assert run.units(each) == read[each].units
+
+
+def test_runs_in_several_threads_at_once_give_the_bits_of_one_after_the_other():
+    prepared = fp.prepare("stick_slip", ["finger.tendon_friction.coulomb", "simulation.duration"])
+    values = [(coulomb, 0.2) for coulomb in np.linspace(0.05, 0.15, 12)]
+    alone = [prepared.run(each) for each in values]
+    with ThreadPoolExecutor(4) as pool:
+        beside = list(pool.map(prepared.run, values))
+    for one, other in zip(alone, beside, strict=True):
+        assert np.array_equal(one["joint_position"], other["joint_position"])
+        assert np.array_equal(one["tendon_tension"], other["tendon_tension"])
+
+
+def test_what_changes_the_structure_is_built_anew():
+    motors = fp.prepare("servo", ["finger.actuators.*.motor", "simulation.duration"], ["motor_current"])
+    other = {"finger.actuators.*.motor": "XC330-M288", "simulation.duration": 0.02}
+    assert np.array_equal(
+        motors.run([*other.values()])["motor_current"], fp.simulate(fp.load_scenario("servo", other)).motor_current
+    )
+    fingers = fp.prepare("fig6", ["finger", "reference", "simulation.duration"], ["joint_position"])
+    planar = {"finger": "planar", "reference": {"joints": {}}, "simulation.duration": 0.02}
+    run, read = fingers.run([*planar.values()]), fp.prepare(fp.load_scenario("fig6", planar), [], ["joint_position"])
+    assert np.array_equal(run["joint_position"], read.run()["joint_position"])
+    assert run["joint_position"].shape != fingers.run(["ub", {"joints": {}}, 0.02])["joint_position"].shape
+
+
+def test_one_number_of_a_list_and_a_star_stand_for_themselves():
+    prepared = fp.prepare("servo", ["finger.gravity[2]", "finger.actuators.*.spool_radius"])
+    gravity, radius = (0.0, 0.0, -1.62), 0.009
+    read = fp.load_scenario("servo", {"finger.gravity": gravity, "finger.actuators.*.spool_radius": radius})
+    assert prepared.scenario([gravity[2], radius]) == read
+    assert prepared.values[0] == fp.load_scenario("servo").finger.gravity[2]
+
+
+@pytest.mark.parametrize(
+    ("keys", "values", "said"),
+    [
+        (["finger.tendon_friction.coulom"], None, "did you mean finger.tendon_friction.coulomb?"),
+        (["finger.joints.elbow.link.mass"], None, "no such joint"),
+        (["finger.gravity[3]"], None, "it is a list of 3"),
+        (["finger.tendon_friction.coulomb"], [-0.1], "finger.tendon_friction.coulomb = -0.1: must be at least 0"),
+        (["finger.joint_friction.stiction"], [1e-5], "finger.joint_friction.stiction"),
+        (["controller.gain"], [np.nan], "controller.gain = nan: must be a finite number"),
+        (["controller.gain"], [1.0, 2.0], "values = 2: must be 1"),
+    ],
+)
+def test_what_is_wrong_is_refused_in_one_line(keys, values, said):
+    with pytest.raises(InputError) as error:
+        fp.prepare("fig6", keys).run(values)
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_variable_that_the_result_does_not_have_is_refused():
+    with pytest.raises(InputError, match="did you mean joint_position"):
+        fp.prepare("fig6", record=["joint_positon"])
+
+
+def test_what_is_interrupted_is_the_begin_of_the_whole():
+    looks = itertools.count()
+    prepared = fp.prepare("fig6", ["simulation.duration"])
+    with pytest.raises(Interrupted) as said:
+        prepared.run([2.0], stop=lambda: next(looks) == 3)
+    found, whole = said.value.result, prepared.run([2.0])
+    assert 0.0 < float(found.time[-1]) < 2.0
+    assert np.allclose(found.joint_position, whole["joint_position"][: found.sizes["time"]], rtol=0.0, atol=1e-13)
