@@ -28,7 +28,10 @@ def test_every_finger_moves_bit_by_bit_as_alone_on_the_palm(scenario, result):
         for variable in ("joint_position", "joint_velocity", "joint_friction", "tracking_error"):
             np.testing.assert_array_equal(result[variable].sel(joint=alone.joint), alone[variable])
         for variable in ("tendon_tension", "tendon_command", "tendon_friction"):
-            np.testing.assert_array_equal(result[variable].sel(tendon=alone.tendon), alone[variable])
+            # What is planned is computed anew for all fingers at once: sums may be in another order.
+            np.testing.assert_allclose(
+                result[variable].sel(tendon=alone.tendon), alone[variable], rtol=1e-13, atol=1e-14
+            )
         np.testing.assert_array_equal(result.fingertip_position.sel(finger=name), alone.fingertip_position)
 
 
