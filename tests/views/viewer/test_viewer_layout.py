@@ -6,6 +6,7 @@ import xarray as xr
 from motion import fingertip, joint_position
 from pages import opened, seek
 
+import finger_pin as fp
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario, to_toml
 from finger_pin.mechanism.from_mujoco import from_mujoco
@@ -86,3 +87,23 @@ def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(b
     page = opened(browser, write_animation(result, tmp_path / "alone.html").as_uri())
     assert page.find_element("id", "joints").text.startswith("knuckle")
     assert [each.is_displayed() for each in page.find_elements("css selector", "#legend, #tensions")] == [False, False]
+
+
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (1400, 900)])
+def test_no_table_is_cut_and_nothing_lies_over_the_page(browser, tmp_path, result, size):
+    hand = fp.simulate(fp.load_scenario("hand", {"simulation.duration": 0.01}))
+    shape = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", shape)
+    try:
+        for each in (result, hand):
+            page = opened(browser, write_animation(each, tmp_path / "page.html").as_uri())
+            # A joint that rounding has turned by less than nothing.
+            page.execute_script("fingerPlayer.frames.columns.joint.data.fill(-1e-5); fingerPlayer.seek(0)")
+            assert page.find_elements("css selector", "#joints td.value")[-1].text in ("0°", "0.0°")
+            panel, table, over = page.execute_script("""
+            const bottom = (id) => document.getElementById(id).getBoundingClientRect().bottom;
+            const bars = [...document.querySelectorAll(".dg")].filter((each) => each.offsetHeight > 0);
+            return [bottom("panel"), bottom("joints"), bars.length];""")
+            assert table <= panel and not over
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

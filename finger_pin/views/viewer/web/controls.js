@@ -124,7 +124,7 @@ class Player {
       value.textContent = slack ? "slack" : this.hand ? tensions[i].toFixed(1) : `${tensions[i].toFixed(2)} N`;
       value.classList.toggle("slack", slack);
     });
-    this.angles.forEach((cell, i) => { cell.textContent = `${((180 / Math.PI) * angles[i]).toFixed(this.hand ? 0 : 1)}°`; });
+    this.angles.forEach((cell, i) => { cell.textContent = degrees(angles[i], this.hand ? 0 : 1); });
   }
 
   refresh() {
@@ -229,6 +229,9 @@ function byFinger(table, names, bars) {
     return { value: cell.firstChild, bar: bars ? cell.lastChild.firstChild.firstChild : null };
   });
 }
+
+// What rounds to zero has no sign.
+const degrees = (angle, digits) => `${((180 / Math.PI) * angle).toFixed(digits).replace(/^-(?=[0.]*$)/, "")}°`;
 
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(",")})`;
 
