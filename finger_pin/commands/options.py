@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 # A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
 _BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
 
+# Tables that the name of a folder leaves out: what stands in them has other names than what stands elsewhere.
+_OUTER = re.compile(r"^(?:controller|finger|simulation)\.")
+_LONGEST = 60
+
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, or path of a .toml file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="Override an entry; repeatable.")]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Where results go.")]
@@ -98,10 +102,13 @@ def folder_name(name: str, *variants: str) -> str:
 
     Args:
         name: Of the scenario, or of a study on it.
-        variants: Such as ``controller.gain=2``. What a path cannot hold is replaced, and a digest keeps them apart.
+        variants: Such as ``controller.gain=2``. What a shell would want to have quoted is replaced; what is
+            too long, or lost that way, is told apart by a digest.
     """
-    text = ",".join([name, *(re.sub(r"[\s\[\]{}\"']", "", each).replace(":", "_") for each in variants)])
-    plain = re.sub(r"[^\w.=,+-]+", "-", text, flags=re.ASCII)
-    if plain == text and len(text) <= 120:
+    told = [re.sub(r"[\s\[\]{}\"']", "", each) for each in variants]
+    words = [_OUTER.sub("", each).replace("=", "-").replace(":", "to").replace(",", "_") for each in told]
+    text = "-".join([name, *words])
+    plain = re.sub(r"[^\w.+-]+", "_", text, flags=re.ASCII)
+    if plain == text and len(text) <= _LONGEST:
         return text
-    return f"{plain[:110]}-{hashlib.sha256(text.encode(errors='surrogateescape')).hexdigest()[:8]}"
+    return f"{plain[:_LONGEST]}-{hashlib.sha256(','.join(told).encode(errors='surrogateescape')).hexdigest()[:6]}"
