@@ -155,5 +155,7 @@ def locking_advice(margin: float) -> str:
     """Return what to say about a margin, in one line; nothing where it is wide."""
     if not margin < CLOSE_TO_LOCKING:
         return ""
-    effect = "tensions run away" if margin < 1.0 else "tensions multiply"
-    return f"joint friction is at {1.0 / margin:.2f} of what locks the finger: {effect}"
+    if margin < 1.0:
+        share = f"{1.0 / margin:.3g} times" if margin > 0.0 else "far above"
+        return f"joint friction is {share} what locks the finger: tensions run away"
+    return f"joint friction is {100.0 / margin:.0f} % of what locks the finger: tensions multiply"

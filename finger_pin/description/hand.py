@@ -124,6 +124,12 @@ class HandDescription(Description):
 
     file_keys = ("base",)
 
+    def __repr__(self) -> str:
+        """Return what it is in a line; `to_toml` writes all of it."""
+        return f"<{type(self).__name__} {self.name}: fingers {', '.join(self.fingers)}>"
+
+    __str__ = __repr__
+
     name: Name = Field(description="Of the hand.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(

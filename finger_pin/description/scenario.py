@@ -151,6 +151,13 @@ class Scenario(Description):
     environment: EnvironmentSettings = EnvironmentSettings()
     simulation: SimulationSettings = SimulationSettings()
 
+    def __repr__(self) -> str:
+        """Return what it is in a line; `to_toml` writes all of it."""
+        moved = self.finger if self.hand is None else self.hand
+        return f"<{type(self).__name__} {self.name}: {self.simulation.duration:g} s of {moved!r}>"
+
+    __str__ = __repr__
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.hand is not None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FACTOR, LIMIT = 100.0, 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Convergence:
     """A run against its repetition at a tighter tolerance.
 
@@ -78,6 +78,10 @@ class Convergence:
             "What comes after that depends on the tolerance. Loops that hunt are that sensitive: "
             "try a smaller simulation.rtol and atol_scale, or a smaller controller.gain."
         )
+
+    def __repr__(self) -> str:
+        """Return the verdict: the arrays are thousands of numbers."""
+        return f"<{type(self).__name__}: {self.verdict}>"
 
     def attach(self, result: xr.Dataset) -> xr.Dataset:
         """Return a result with the difference as a variable and the rest as attributes."""

@@ -209,7 +209,7 @@ def test_the_scenarios_that_ship_keep_their_distance_and_say_so(name, recwarn):
     assert quick_margin(fp.load_scenario(name)) > 2.0
 
 
-@pytest.mark.parametrize(("coefficient", "said"), [(6.5e-4, "0.88 of what locks"), (7.6e-4, "1.02 of what locks")])
+@pytest.mark.parametrize(("coefficient", "said"), [(6.5e-4, "88 % of what locks"), (7.6e-4, "1.02 times what locks")])
 def test_a_simulation_close_to_locking_warns_whoever_calls_it_and_its_summary_says_so(coefficient, said):
     """The critical coefficient of the reference is 0.7418 mm."""
     with pytest.warns(fp.exceptions.SelfLockingWarning, match=said) as caught:

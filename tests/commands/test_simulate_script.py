@@ -73,7 +73,7 @@ def test_a_finger_that_locks_itself_is_told_in_one_line_of_the_summary_and_nowhe
     code, out, lines = run(*stuck)
     assert (code, lines) == (0, [])
     (told,) = [line for line in out.splitlines() if line.startswith("Warning:")]
-    assert "of what locks the finger: tensions run away" in told and len(told) <= 80
+    assert "times what locks the finger: tensions run away" in told and len(told) <= 80
     assert run(*stuck, "--quiet") == (0, "", [])
     assert "Warning" not in run("fig6", "--duration", "0.01")[1]
 

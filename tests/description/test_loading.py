@@ -196,3 +196,10 @@ def test_a_scenario_without_a_name_is_called_after_its_file_in_plain_letters(ste
     path = tmp_path / f"{stem}.toml"
     path.write_text(PLANAR)
     assert load_scenario(path).name == name
+
+
+def test_descriptions_are_printed_in_a_line():
+    printed = [str(each) for each in (fp.load_scenario("fig6"), fp.load_scenario("hand"), fp.load_finger("ub"))]
+    assert printed[0] == "<Scenario fig6: 8 s of <FingerDescription ub: 4 joints, 5 tendons>>"
+    assert "fingers thumb, index, middle, ring, little" in printed[1]
+    assert max(map(len, printed)) < 120 and f"[{printed[2]}]" == repr([fp.load_finger("ub")])

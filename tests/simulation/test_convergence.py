@@ -55,6 +55,7 @@ def test_the_main_job_does_not_depend_on_its_tolerance(calm):
     _, _, found = calm
     assert found.converged and found.parting_time is None
     assert found.verdict.startswith("Converged: repeated at rtol 1e-08")
+    assert repr(found) == f"<Convergence: {found.verdict}>"
 
 
 def test_a_stiff_loop_with_high_joint_friction_hunts_and_parts_from_its_repetition(calm, hunting):

@@ -53,6 +53,17 @@ def test_two_keys_are_drawn_as_a_map_with_each_number_in_its_own_cell():
     assert (cross.get_xdata().tolist(), cross.get_ydata().tolist()) == ([1.0], [10.0])
 
 
+def test_a_map_has_ticks_at_the_values_swept_and_says_in_words_what_is_the_same_everywhere():
+    keys = {"a": [0.5, 0.65, 1.3], "b": [1.0, 10.0, 100.0]}
+    figure = plot_sweep(made(keys, ("a", "b"), m=np.arange(9.0).reshape(3, 3), same=np.full((3, 3), 2.5)))
+    figure.draw_without_rendering()
+    varied, same, _ = figure.axes
+    assert [label.get_text() for label in varied.get_xticklabels()] == ["0.5", "0.65", "1.3"]
+    np.testing.assert_array_equal(varied.get_yticks(), keys["b"])
+    assert not any(isinstance(each, matplotlib.collections.QuadMesh) for each in same.collections)
+    assert [text.get_text() for text in same.texts] == ["2.5 N\nat every point"]
+
+
 @pytest.mark.parametrize("kind", ["sample", "grid"])
 def test_more_keys_and_samples_are_drawn_as_parallel_coordinates_of_all_runs(kind):
     if kind == "sample":
