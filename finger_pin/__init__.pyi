@@ -24,6 +24,7 @@ from .simulation.simulate import simulate as simulate
 from .simulation.simulator import Simulator as Simulator
 from .studies import optimise as optimise
 from .studies import sweep as sweep
+from .studies.identification.identifying import identify as identify
 from .studies.many import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .views import plots as plots

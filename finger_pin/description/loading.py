@@ -10,10 +10,19 @@ from typing import Any, TypeVar
 
 import tomli_w
 
+from finger_pin.description.bench import IdentifySettings
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.overriding import from_here, override
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.reading import Table, as_name, read_scenario_file, resolve_signals, shipped
+from finger_pin.description.reading import (
+    Table,
+    as_name,
+    as_table,
+    merge,
+    read_scenario_file,
+    resolve_signals,
+    shipped,
+)
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
@@ -34,6 +43,11 @@ def list_hands() -> dict[str, str]:
 def list_scenarios() -> dict[str, str]:
     """Return the scenarios that ship with the package, with a line about each."""
     return shipped("scenarios")
+
+
+def list_benches() -> dict[str, str]:
+    """Return the benches that ship with the package, with a line about each."""
+    return shipped("benches")
 
 
 def list_motors() -> dict[str, str]:
@@ -85,11 +99,38 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     """
     overrides = from_here(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
+        return _scenario(*read_scenario_file(str(name), Path()), str(name), overrides)
+
+
+def load_bench(
+    name: str | Path, overrides: Mapping[str, Any] | None = None, identify: Mapping[str, Any] | None = None
+) -> tuple[Scenario, IdentifySettings]:
+    """Load a scenario with its table ``[identify]``: what was recorded of it, and what is to be found.
+
+    Args:
+        name: Name of a bench or scenario that ships, or path of a TOML file.
+        overrides: As for `load_scenario`.
+        identify: Entries of the table, on top of the file's.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    overrides = from_here(overrides or {}, set(Scenario.model_fields))
+    with _depth_limited("scenario"):
         table, folder = read_scenario_file(str(name), Path())
-        table.setdefault("name", as_name(Path(str(name)).stem))
-        override(overrides, table, folder)
-        resolve_signals(table, Path())
-        return validate(Scenario, table, ())
+        wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))
+        if not wanted:
+            raise InputError("identify", "is missing: which parameters are to be found, and from which recordings")
+        return _scenario(table, folder, str(name), overrides), validate(IdentifySettings, wanted, ("identify",))
+
+
+def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenario:
+    """Return the scenario of a file's table; what is to be identified by it is none of its business."""
+    table.pop("identify", None)
+    table.setdefault("name", as_name(Path(name).stem))
+    override(overrides, table, folder)
+    resolve_signals(table, Path())
+    return validate(Scenario, table, ())
 
 
 def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Scenario:

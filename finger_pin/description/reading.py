@@ -87,12 +87,15 @@ def _read_bytes(what: str, path: Path) -> bytes:
 
 def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
     """Return the table of a scenario on top of the ones that it extends, and the folder that it lies in."""
+    if not is_path(name) and name in shipped("benches"):
+        name = str(resources.files("finger_pin.description").joinpath(f"benches/{name}.toml"))
     table, path = _read("scenario", name, folder)
     identity = path.resolve()
     if identity in seen:
         raise InputError("extends", "a scenario cannot start from itself", name)
     folder = path.parent
     resolve_signals(table, folder)
+    _resolve_recordings(table, folder)
     if "extends" not in table:
         return table, folder
     base = table.pop("extends")
@@ -111,7 +114,7 @@ def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> 
         parent.pop("hand", None)
     if "hand" in parent and "hand" in table:
         table["hand"] = _on_top(parent.pop("hand"), table["hand"], folder)
-    return _merge(parent, table), folder
+    return merge(parent, table), folder
 
 
 def _opened(kind: str, name: str, folder: Path, seen: tuple[Path, ...]) -> tuple[Table, Path, tuple[Path, ...]]:
@@ -133,7 +136,7 @@ def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> An
         base = rest.pop("base")
         if not isinstance(base, str):
             raise InputError("finger.base", "must be the name or path of a finger", base)
-        return with_motors(_merge(resolve_finger(base, folder, seen), rest), folder)
+        return with_motors(merge(resolve_finger(base, folder, seen), rest), folder)
     if not isinstance(finger, dict):
         raise InputError("finger", "must be the name of a finger, the path of a .toml file, or a table", finger)
     return with_motors(finger, folder)
@@ -154,7 +157,7 @@ def _resolve_motor(motor: Any, folder: Path) -> Any:
         return _resolve_motor(table, path.parent)
     if isinstance(motor, dict) and "base" in motor:
         rest = dict(motor)
-        return _merge(as_table(_resolve_motor(rest.pop("base"), folder)), rest)
+        return merge(as_table(_resolve_motor(rest.pop("base"), folder)), rest)
     return motor
 
 
@@ -179,7 +182,7 @@ def _on_top(base: Table, hand: Table, folder: Path) -> Table:
             with _named(f"hand.fingers.{name}."):
                 placed["finger"] = resolve_finger(finger, folder)
             as_table(as_table(base.get("fingers")).get(name)).pop("finger", None)
-    return _merge(base, hand)
+    return merge(base, hand)
 
 
 @contextmanager
@@ -210,18 +213,27 @@ def resolve_signals(table: Table, folder: Path) -> None:
         settings[target] = {**as_table(settings.get(target)), **samples}
 
 
+def _resolve_recordings(table: Table, folder: Path) -> None:
+    """Make the paths of recordings absolute, so that a scenario that extends this one finds them."""
+    for recording in as_table(as_table(table.get("identify")).get("recordings")).values():
+        name = as_table(recording).get("file")
+        if isinstance(name, str):
+            recording["file"] = str((folder / expand(name)).absolute())
+
+
 def is_other_kind(base: Table, top: Table) -> bool:
     """Return whether a signal or controller is of another kind than the one that it is put on."""
     kinds = {base.get("kind"), top["kind"]} if "kind" in top else set()
     return len(kinds) == 2 and not _KINDS_APART.isdisjoint(kinds)
 
 
-def _merge(base: Table, top: Table) -> Table:
+def merge(base: Table, top: Table) -> Table:
+    """Return a table with the entries of another on top."""
     merged = dict(base)
     for key, value in top.items():
         both = isinstance(value, dict) and isinstance(merged.get(key), dict) and not is_other_kind(merged[key], value)
         # A table that names its base starts from that one.
-        merged[key] = _merge(merged[key], value) if both and "base" not in value else value
+        merged[key] = merge(merged[key], value) if both and "base" not in value else value
     return merged
 
 

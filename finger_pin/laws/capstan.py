@@ -66,11 +66,11 @@ def _haste(p: Any) -> Any:
     return np.sqrt(_INSTANT * p[2] * p[3]) + _INSTANT * p[2]
 
 
-def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, drag: Any) -> Any:
+def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, drag: Any = 0.0, floor: Any = 0.0) -> Any:
     """Return the f, N, that a driven tendon delivers in steady sliding, shape of what is given.
 
-    From f = f^a - s (M (f + f^a) + drag) - b v, with s the sign of v: where M = mu^d and b = 0, the capstan law less
-    drag / (1 + mu^d) when pulling.
+    From f = f^a - s max(M (f + f^a) + drag, g_min) - b v, with s the sign of v: where M = mu^d and b = 0, the capstan
+    law less drag / (1 + mu^d) when pulling.
 
     Args:
         command: f^a, N.
@@ -78,11 +78,12 @@ def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, dr
         speed: v, m/s; positive where the tendon is drawn in.
         viscous: b, N s/m.
         drag: N.
+        floor: g_min, N.
     """
     way = np.sign(speed)
-    return delivered_tension((1.0 - way * coefficient) * command, way * drag + viscous * speed) / (
-        1.0 + way * coefficient
-    )
+    signed, lost = way * coefficient, viscous * speed
+    left = ((1.0 - signed) * command - way * drag - lost) / (1.0 + signed)
+    return np.maximum(0.0, left - way * np.maximum(0.0, floor - way * (command - left - lost)))
 
 
 def _level(normal: Any, sliding: Any, speed: Any, p: Any) -> Any:

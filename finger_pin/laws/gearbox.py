@@ -49,7 +49,7 @@ def stribeck_share_slope(speed: Any, stribeck: Any, exponent: Any, share: Any) -
     return -share * exponent * square ** (0.5 * exponent - 1.0) * speed / (stribeck * stribeck)
 
 
-def _lost(pull: Any, speed: Any, driving: Any, driven: Any) -> Any:
+def loss_share(pull: Any, speed: Any, driving: Any, driven: Any) -> Any:
     """Return what is lost over the torque T of the tendons, by the direction in which power goes through the gears."""
     way = np.sign(pull * speed)
     return 0.5 * ((1.0 + way) * driving + (1.0 - way) * driven)
@@ -59,7 +59,7 @@ def _value(row: Row, p: Any) -> Any:
     base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     share = stribeck_share(row.speed, velocity, exponent)
     dry = base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share
-    lost = _lost(row.command, row.speed, driving, driven) * np.abs(row.command)
+    lost = loss_share(row.command, row.speed, driving, driven) * np.abs(row.command)
     level = friction_level(1.0, dry + lost, _FLOOR)
     loss = friction_force(row.state, row.speed, viscous)
     return -loss, stiction_rate(row.state, row.speed, level, stiffness), loss, share, level
@@ -72,7 +72,7 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
     by_level = by_level * (level > _FLOOR)
     steep = (stribeck + stribeck_by_load * row.load) * stribeck_share_slope(row.speed, velocity, exponent, share)
     pressed = by_level * (by_load + stribeck_by_load * share)
-    pulled = by_level * _lost(row.command, row.speed, driving, driven) * np.sign(row.command)
+    pulled = by_level * loss_share(row.command, row.speed, driving, driven) * np.sign(row.command)
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, pulled, 0.0)
 
 

@@ -59,7 +59,7 @@ def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     (folder / "urdf").symlink_to(ROOT / "urdf")
     shipped = folder / "shipped"
-    for kind in ("fingers", "hands", "scenarios", "motors"):
+    for kind in ("fingers", "hands", "scenarios", "motors", "benches"):
         shutil.copytree(Path(reading.__file__).parent / kind, shipped / kind)
     for path in (shipped / "scenarios").iterdir():
         path.write_text(re.sub(r"(?m)^duration = .*", f"duration = {DURATION}", path.read_text("utf-8")), "utf-8")

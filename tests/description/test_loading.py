@@ -37,7 +37,7 @@ def test_fig6_is_the_papers_finger_with_the_published_friction_coefficient():
 
 @pytest.mark.parametrize("name", list_scenarios())
 def test_the_resolved_text_of_a_scenario_reads_back_as_the_same_scenario(name, tmp_path):
-    scenario = load_scenario(name, {"controller.gain": [0.1, 1 / 3, 2, 1e-7]})
+    scenario = load_scenario(name, {"environment.fingertip_force": [0.1, 1 / 3, 1e-7]})
     path = tmp_path / "resolved.toml"
     path.write_text(to_toml(scenario), encoding="utf-8")
     assert load_scenario(path) == scenario

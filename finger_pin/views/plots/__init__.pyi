@@ -8,6 +8,8 @@ from .force_capability import plot_radius_sensitivity as plot_radius_sensitivity
 from .friction_influence import plot_friction_influence as plot_friction_influence
 from .friction_law import plot_friction_law as plot_friction_law
 from .hand_motion import plot_hand_motion as plot_hand_motion
+from .identification import plot_identification as plot_identification
+from .identification import plot_profiles as plot_profiles
 from .losses import plot_losses as plot_losses
 from .pareto import plot_pareto as plot_pareto
 from .passive_delivery import plot_passive_delivery as plot_passive_delivery

@@ -1,0 +1,86 @@
+"""Steady states of tendons and servos in closed form: everything slides evenly, or rests after having slid so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.analysis.finding import Finding
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.laws.bristle import friction_coefficient
+from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
+from finger_pin.laws.gearbox import loss_share, stribeck_share
+from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.tendons import Tendons
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SteadyState(Finding):
+    """What tendons deliver and motors draw while a finger's actuated tendons slide evenly; m states.
+
+    Attributes:
+        tension: f, shape (m, a), N.
+        friction: f^f, shape (m, a), N.
+        current: Of the motors, shape (m, k), A; without limits of voltage and current.
+    """
+
+    tension: Array
+    friction: Array
+    current: Array
+
+
+def steady_state(
+    description: FingerDescription, command: Array, speed: Array, position: Array | None = None, at_rest: bool = False
+) -> SteadyState:
+    """Return the steady states of a finger's actuated tendons.
+
+    Args:
+        description: The finger.
+        command: f^a at the entrances of the canals, shape (m, a), N.
+        speed: v, shape (m,), m/s, of all of them; positive as they are drawn in.
+        position: theta, shape (m, n), rad, for the curvature of the paths; zero by default.
+        at_rest: Whether they rest after having slid so: bristles keep what they hold, viscous friction is gone.
+    """
+    tendons = Tendons.from_description(description)
+    actuators = Actuators.from_description(description, tendons.routing)
+    actuated, v = tendons.routing.actuated, np.asarray(speed, dtype=float)[:, None]
+    posture = np.zeros((len(v), len(tendons.routing.joints))) if position is None else position
+    kinetic = capstan_coefficient(tendons.surface, tendons.routing.curvature(posture))[:, :actuated]
+    ratio, viscous, stribeck, exponent, drag, floor = (
+        each[:actuated]
+        for each in (
+            tendons.stiction_ratio,
+            tendons.viscous,
+            tendons.stribeck_velocity,
+            tendons.stribeck_exponent,
+            tendons.drag,
+            tendons.floor,
+        )
+    )
+    coefficient = friction_coefficient(v, kinetic, ratio * kinetic, stribeck, exponent)
+    tension = sliding_tension(command, coefficient, v, viscous, drag, floor)
+    if at_rest:
+        tension = np.where(tension > 0.0, np.maximum(0.0, tension + viscous * v), tension)
+    return SteadyState(tension, command - tension, _current(actuators, command, v, at_rest))
+
+
+def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:
+    """Return the motors' currents, shape (m, k): what holds the tendons' torque and slides the gears.
+
+    With s the sign of the speed and T the tendons' torque, tau = T + s level + b w and N = |tau - x T|; the level is
+    linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign.
+    """
+    base, by_load, more, more_by_load, velocity, exponent, viscous, _, driving, driven = actuators.gearbox
+    torque = command[:, actuators.tendons] @ actuators.spools
+    radius = np.max(actuators.spools, axis=0, initial=0.0)
+    speed = v / np.where(radius > 0.0, radius, 1.0)
+    way, share = np.sign(speed), stribeck_share(speed, velocity, exponent)
+    lost = loss_share(torque, speed, driving, driven) * np.abs(torque)
+    dry, slope = base + more * share + lost, by_load + more_by_load * share
+    unheld = (1.0 - actuators.external_weight) * torque
+    sided = [(side, (dry + slope * side * unheld) / (1.0 - slope * side * way)) for side in (1.0, -1.0)]
+    level = np.where(unheld + way * sided[0][1] >= 0.0, sided[0][1], sided[1][1])
+    current: Array = (torque + way * level + (0.0 if at_rest else viscous * speed)) / actuators.motor[0]
+    return current

@@ -1,0 +1,92 @@
+"""Benches as data: what was recorded, which columns feed the model or are compared with it, and what is to be found."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+
+
+class Column(Description):
+    """A column of a recording: SI value = scale times the number in its unit, plus offset; in a file a name will do."""
+
+    column: str = Field(strict=True, min_length=1, max_length=200, description="Its name in the header.")
+    unit: str | None = Field(None, strict=True, description="Such as mm, deg, gf; SI if it is left out.")
+    scale: Annotated[float, real(-1e12, 1e12)] = quantity(1.0, unit="1", source="calibration", doc="Factor.")
+    offset: Annotated[float, real(-1e12, 1e12)] = quantity(0.0, unit="SI", source="calibration", doc="Added, in SI.")
+    delay: Annotated[float, real(-10.0, 10.0)] = quantity(
+        0.0, unit="s", source="calibration", doc="By how much the column comes after what it measures; motions only."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        return {"column": value} if isinstance(value, str) else value
+
+
+class RecordingSettings(Description):
+    """A table of readings or of a motion. Columns are named ``variable.label`` as in a result."""
+
+    file: str | None = Field(None, strict=True, description="A CSV file, relative to the file that names it.")
+    kind: Annotated[Literal["motion", "steady"], choice("motion", "steady")] = quantity(
+        "motion", unit="1", source="the recording", doc="Samples over time, or rows each of which is a steady state."
+    )
+    inputs: dict[str, Column] = Field({}, description="What the model is given, by variable.label.")
+    outputs: dict[str, Column] = Field(min_length=1, description="What it is compared with, by variable.label.")
+    speed: Column | float | None = Field(
+        None, description="Steady: of sliding, m/s, positive as the tendon is drawn in; a number or a column."
+    )
+    at_rest: bool = Field(False, strict=True, description="Steady: read at rest, after having slid at that speed.")
+    time: Column | None = Field(None, description="Motion: the column of times.")
+    start: Annotated[Literal["rest", "recorded", "found"], choice("rest", "recorded", "found")] = quantity(
+        "rest",
+        unit="1",
+        source="the recording",
+        doc="Motion: at rest where the scenario starts, at the recorded positions, or at positions to be found.",
+    )
+    window: Annotated[float, real(0.0, 1e6, above=True)] | None = quantity(
+        None, unit="s", source="chosen", doc="Motion: cut into pieces of this length with starts of their own."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for group in ("inputs", "outputs"):
+            for name in getattr(self, group):
+                if not all(name.partition(".")[::2]):
+                    raise problem(f"{group}.{name}", "must be variable.label, such as tendon_tension.T1")
+        if self.kind == "steady":
+            if self.speed is None:
+                raise problem("speed", "is missing: of sliding, m/s, positive where the tendon is drawn in")
+            for name in ("time", "window"):
+                if getattr(self, name) is not None:
+                    raise problem(name, "is for motions only")
+            if isinstance(self.speed, float) and (not math.isfinite(self.speed) or self.speed == 0.0):
+                raise problem("speed", "must be finite and not zero: friction has the sign of sliding", self.speed)
+        else:
+            if self.time is None:
+                raise problem("time", 'is missing: the column of times, such as time = "t"')
+            if self.speed is not None or self.at_rest:
+                raise problem("speed" if self.speed is not None else "at_rest", "is for steady readings only")
+        return self
+
+
+class IdentifySettings(Description):
+    """The table ``[identify]`` of a scenario: what is to be found, from which recordings, against which other laws."""
+
+    parameters: dict[str, Annotated[tuple[float, float], vector(2)]] = Field(
+        min_length=1, description="By dotted key of the scenario, the least and the greatest value."
+    )
+    recordings: dict[Name, RecordingSettings] = Field(min_length=1, description="By name.")
+    compare: dict[str, dict[str, Any]] = Field(
+        {}, description="Other laws, by name: keys with a number that is held, or with bounds."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for key, (low, high) in self.parameters.items():
+            if low >= high:
+                raise problem(f"parameters.{key}", "the least value must be below the greatest", [low, high])
+        return self

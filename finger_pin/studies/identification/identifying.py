@@ -1,0 +1,210 @@
+"""Identification: from recordings to the numbers of a scenario, and how sure they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger_pin.description.bench import IdentifySettings
+from finger_pin.description.loading import load_bench
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.studies.identification.comparing import Comparison, compare_laws
+from finger_pin.studies.identification.estimate import Fit, fit
+from finger_pin.studies.identification.intervals import Side, covariance, profile
+from finger_pin.studies.identification.ledger import Ledger, digest
+from finger_pin.studies.identification.outcome import outcome, write_outcome
+from finger_pin.studies.identification.problem import Model, Problem, Signal, Stopped
+from finger_pin.studies.identification.readings import SteadyReadings
+from finger_pin.studies.identification.recordings import Recording, read_recording, unit_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Called with what is being done, how much of it is finished, and how much there is.
+Progress = Callable[[str, int, int], None]
+Data = Mapping[str, Mapping[str, Any]]
+
+
+def identify(
+    bench: str | Path,
+    *,
+    parameters: Mapping[str, Sequence[float]] | None = None,
+    recordings: Mapping[str, Mapping[str, Any]] | None = None,
+    compare: Mapping[str, Mapping[str, Any]] | None = None,
+    data: Data | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    output: str | Path | None = None,
+    starts: int = 3,
+    seed: int = 0,
+    loss: str = "linear",
+    restart: bool = False,
+    progress: Progress | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> xr.Dataset:
+    """Find the numbers of a scenario with which it does what was recorded, with intervals by the profile likelihood.
+
+    Every signal has a noise of its own, estimated with the parameters. Neighbouring residuals of a motion are
+    correlated: n of them count as n (1 - rho) / (1 + rho) (Bartlett). Parameters whose least value is positive are
+    searched for as logarithms, from the scenario's own numbers and from a Latin hypercube.
+
+    Args:
+        bench: Name of a bench or scenario that ships, or path of a TOML file; its table ``[identify]`` says the rest.
+        parameters: By dotted key, the least and the greatest value; on top of the table's, as the next two.
+        recordings: By name, entries as in a file.
+        compare: By name, other laws: keys with a number that is held, or with bounds.
+        data: By name of a recording, columns by name, in place of its file.
+        overrides: Values by dotted key, as for `load_scenario`.
+        output: Folder for ``identification.nc``, ``identified.toml`` and ``identification.html``; work that is done is
+            kept there too, so that the same call goes on where another was stopped.
+        starts: From how many points to search.
+        seed: Of those points.
+        loss: ``linear``, or as of `scipy.optimize.least_squares` where outliers are to count less.
+        restart: Whether to forget what the folder holds of this.
+        progress: Called with what is being done, how much of it is finished, and how much there is.
+        stop: Asked now and then; when it returns true the best so far is returned, attribute ``unfinished``.
+
+    Returns:
+        Along ``parameter``: ``estimate``, ``lower`` and ``upper`` at 95 %, infinite where open, ``determined``,
+        ``units``, ``correlation``, profiles; along ``signal`` noise and correlation; along ``sample`` what was measured
+        and the residuals; along ``law`` what `compare` found. Attribute ``undetermined``: what the recordings leave
+        open, in words.
+
+    Raises:
+        InputError: If the table or a recording is wrong, there are fewer readings than parameters, or a parameter is
+            felt by no output.
+        OSError: If the folder cannot be written.
+    """
+    given = {"parameters": parameters, "recordings": recordings, "compare": compare}
+    entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in given.items() if table}
+    scenario, settings = load_bench(bench, overrides, entries)
+    taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
+    problem = build_problem(scenario, settings, taken)
+    problem.stop = stop or (lambda: False)
+    asked = digest(scenario, settings, taken, (starts, seed, loss))
+    with Ledger(None if output is None else Path(output), asked, restart) as ledger:
+        result = _work(problem, settings, _starts(problem, starts, seed), _Work(problem, ledger, loss, progress))
+        result.attrs["bench"] = str(bench)
+        if output is not None:
+            write_outcome(result, Path(output), bench, problem)
+    return result
+
+
+def build_problem(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording]) -> Problem:
+    """Return what is to be minimised.
+
+    Raises:
+        InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
+    """
+    models: list[Model] = [SteadyReadings(recording, scenario) for recording in taken]
+    signals = [_signal(recording, name, values) for recording in taken for name, values in recording.outputs.items()]
+    low, high = np.array(list(settings.parameters.values()), dtype=float).T
+    count = sum(len(signal.measured) for signal in signals)
+    if count <= len(low):
+        raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
+    return Problem(scenario, tuple(settings.parameters), low, high, models, signals, {})
+
+
+def _signal(recording: Recording, name: str, values: Array) -> Signal:
+    there = np.flatnonzero(np.isfinite(values))
+    steady = recording.settings.kind == "steady"
+    loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
+    load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
+    instant = np.arange(len(values), dtype=float) if steady else recording.time
+    return Signal(
+        recording.name, name, unit_of(name), values[there], there, instant[there], load[there], ordered=not steady
+    )
+
+
+class _Work:
+    """What is done, piece by piece; whatever is finished when it is stopped counts."""
+
+    def __init__(self, problem: Problem, ledger: Ledger, loss: str, progress: Progress | None) -> None:
+        self.problem, self.ledger, self.loss = problem, ledger, loss
+        self.tell = progress or (lambda words, done, total: None)
+        self.fits: list[Fit] = []
+        self.sides: dict[tuple[int, int], Side] = {}
+        self.spread: Array | None = None
+        self.comparison: Comparison | None = None
+
+    @property
+    def best(self) -> Fit:
+        return min(self.fits, key=lambda each: each.objective)
+
+    def search(self, starts: Sequence[Array]) -> None:
+        """Search from all starts."""
+        for k, start in enumerate(starts):
+            self.tell("searching", k, len(starts))
+            work = partial(fit, self.problem, start, loss=self.loss)
+            self.fits.append(self.ledger.fit(f"start {k}", self.problem, work))
+        _check_felt(self.problem, [*starts, *(each.z for each in self.fits)])
+
+    def follow(self) -> None:
+        """Follow all profiles; from a lower minimum, if one turns up on the way, all over again."""
+        best, self.spread = self.best, covariance(self.problem, self.best)
+        ends = [(k, way) for k in range(len(self.problem.keys)) for way in (-1, 1)]
+        for place, (k, way) in enumerate(ends):
+            self.tell("following the likelihood", place, len(ends))
+            work = partial(profile, self.problem, best, k, way, self.spread)
+            side = self.ledger.side(f"side {k} {way} {len(self.fits)}", work)
+            if side.better is not None:
+                self.fits.append(fit(self.problem, side.better.z, loss=self.loss))
+                self.sides.clear()
+                return self.follow()
+            self.sides[k, way] = side
+        return None
+
+    def compare(self, settings: IdentifySettings) -> None:
+        """Fit other laws, if there are any."""
+        if settings.compare:
+            self.tell("comparing laws", 0, 1)
+            work = partial(compare_laws, self.problem, settings, self.best)
+            self.comparison = self.ledger.comparison(work)
+
+
+def _work(problem: Problem, settings: IdentifySettings, starts: Sequence[Array], work: _Work) -> xr.Dataset:
+    unfinished = ""
+    try:
+        work.search(starts)
+        work.follow()
+        work.compare(settings)
+    except Stopped:
+        unfinished = "interrupted: the best so far, and the intervals that are finished"
+        problem.stop = lambda: False
+        if not work.fits:
+            reached = problem.best[1] if len(problem.best[1]) else problem.start
+            work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
+    return outcome(problem, work.fits, work.sides, work.spread, work.comparison, unfinished)
+
+
+def _starts(problem: Problem, count: int, seed: int) -> list[Array]:
+    """Return where to search from: the scenario's own numbers, and a Latin hypercube."""
+    low, high = problem.box
+    rng = np.random.default_rng(seed)
+    further = max(count - 1, 0)
+    cells = np.array([rng.permutation(further) for _ in low]).T + rng.uniform(size=(further, len(low)))
+    return [problem.start, *(low + (high - low) * cells / max(further, 1))]
+
+
+def _check_felt(problem: Problem, places: Sequence[Array]) -> None:
+    felt = np.zeros(len(problem.keys), dtype=bool)
+    for z in places:
+        for signal, slopes in zip(problem.signals, problem.slopes(z), strict=True):
+            size = max(float(np.max(np.abs(signal.measured))), 1e-300)
+            low, high = problem.box
+            felt |= np.any(np.abs(slopes) * (high - low) > 1e-9 * size, axis=0)
+        if felt.all():
+            return
+    key = problem.keys[int(np.flatnonzero(~felt)[0])]
+    raise InputError(f"identify.parameters.{key}", "no output of any recording feels it; leave it out")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, tuple | np.ndarray) else value

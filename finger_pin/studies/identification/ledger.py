@@ -1,0 +1,101 @@
+"""What an identification has finished, kept in its folder, so that the same call goes on where another was stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from finger_pin.description.bench import IdentifySettings
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.files import replacing
+from finger_pin.studies.identification.comparing import Comparison
+from finger_pin.studies.identification.estimate import Fit, fit
+from finger_pin.studies.identification.intervals import Side
+from finger_pin.studies.identification.problem import Problem
+from finger_pin.studies.identification.recordings import Recording
+from finger_pin.version import __version__
+
+NAME = "identification.json"
+
+
+def digest(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], more: tuple[Any, ...]) -> str:
+    """Return what tells one identification from another: scenario, table, data, options, version."""
+    text = [__version__, scenario.model_dump_json(), settings.model_dump_json(), repr(more)]
+    found = hashlib.sha256("\0".join(text).encode())
+    for recording in taken:
+        for values in (*recording.inputs.values(), *recording.outputs.values(), recording.time, recording.speed):
+            found.update(np.ascontiguousarray(values).tobytes())
+    return found.hexdigest()
+
+
+class Ledger:
+    """Finished pieces of work by name; in memory alone without a folder."""
+
+    def __init__(self, folder: Path | None, asked: str, restart: bool) -> None:
+        """Read what is there of the same identification; that of another one is forgotten."""
+        self._path = None if folder is None else folder / NAME
+        self._asked, self._done = asked, {}
+        if self._path is not None and not restart:
+            try:
+                held = json.loads(self._path.read_text("utf-8"))
+                self._done = held["done"] if held["asked"] == asked else {}
+            except (OSError, ValueError, KeyError, TypeError):
+                self._done = {}
+
+    _done: dict[str, Any]
+
+    def __enter__(self) -> Self:
+        """Make the folder.
+
+        Raises:
+            InputError: If it cannot be made.
+        """
+        if self._path is not None:
+            try:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                reason = f"cannot be written: {error.strerror or error}"
+                raise InputError("output", reason, str(self._path.parent)) from None
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Keep what is done, whatever has happened."""
+        if self._path is not None and self._done:
+            with replacing(self._path) as temporary:
+                Path(temporary).write_text(json.dumps({"asked": self._asked, "done": self._done}), encoding="utf-8")
+
+    def fit(self, name: str, problem: Problem, work: Callable[[], Fit]) -> Fit:
+        """Return a minimum, from where it was found before if it was."""
+        if name in self._done:
+            z: Array = np.array(self._done[name])
+            return fit(problem, z, held=dict(enumerate(z)))
+        found = work()
+        self._done[name] = found.z.tolist()
+        return found
+
+    def side(self, name: str, work: Callable[[], Side]) -> Side:
+        """Return an end of an interval."""
+        if name in self._done:
+            end, path = self._done[name]
+            return Side(math.nan if end is None else float(end), np.array(path))
+        found = work()
+        if found.better is None:
+            self._done[name] = (found.end, found.path.tolist())
+        return found
+
+    def comparison(self, work: Callable[[], Comparison]) -> Comparison:
+        """Return a comparison of laws."""
+        if "comparison" not in self._done:
+            self._done["comparison"] = work().plain()
+        return Comparison.of(self._done["comparison"])

@@ -1,0 +1,204 @@
+"""What comes out of an identification: a Dataset, a scenario that extends the bench, and a page."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomli_w
+
+from finger_pin.description.routing import Array
+from finger_pin.files import replacing
+from finger_pin.simulation.netcdf import save
+from finger_pin.studies.identification.comparing import Comparison
+from finger_pin.studies.identification.estimate import Fit
+from finger_pin.studies.identification.intervals import Side, free_directions
+from finger_pin.studies.identification.problem import Problem, Signal
+from finger_pin.studies.keys import describe, split
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Minima whose objective differs by less than this are the same one.
+_SAME = 0.05
+
+
+def outcome(
+    problem: Problem,
+    fits: Sequence[Fit],
+    sides: Mapping[tuple[int, int], Side],
+    spread: Array | None,
+    comparison: Comparison | None,
+    unfinished: str = "",
+) -> xr.Dataset:
+    """Return the Dataset of an identification; what is not finished is not a number."""
+    import xarray as xr
+
+    best = min(fits, key=lambda each: each.objective)
+    count = len(problem.keys)
+    ends = np.full((2, count), np.nan)
+    for (k, way), side in sides.items():
+        z = best.z.copy()
+        z[k] = side.end if math.isfinite(side.end) else z[k]
+        ends[(way + 1) // 2, k] = problem.values(z)[k] if math.isfinite(side.end) else side.end
+    units = [describe(key)["units"] for key in problem.keys]
+    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0)) if spread is not None else np.full(count, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = spread / np.outer(deviation, deviation) if spread is not None else np.full((count, count), np.nan)
+    estimate = problem.values(best.z)
+    linear = [problem.values(best.z + way * 1.96 * deviation) for way in (-1.0, 1.0)]
+    profiles = _profiles(problem, best, sides)
+    free = free_directions(problem, best) if spread is not None else []
+    closed = np.isfinite(ends).all(axis=0)
+    closed[[k for _, shown in free for k in shown]] = False
+    variables: dict[str, Any] = {
+        "estimate": ("parameter", estimate, {"long_name": "estimate; units in the variable units"}),
+        "lower": ("parameter", ends[0], {"long_name": "lower end of the 95 % interval; infinite where open"}),
+        "upper": ("parameter", ends[1], {"long_name": "upper end of the 95 % interval; infinite where open"}),
+        "determined": ("parameter", closed, {"long_name": "closed at both ends, by the recordings"}),
+        "units": ("parameter", units, {"long_name": "units of estimate, lower and upper"}),
+        "linear_lower": ("parameter", linear[0], {"long_name": "lower end by the slopes alone"}),
+        "linear_upper": ("parameter", linear[1], {"long_name": "upper end by the slopes alone"}),
+        "least": ("parameter", problem.low, {"long_name": "least value that was allowed"}),
+        "greatest": ("parameter", problem.high, {"long_name": "greatest value that was allowed"}),
+        "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
+        "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
+        "profile_rise": (
+            ("parameter", "point"),
+            profiles[1],
+            {"units": "1", "long_name": "rise of minus twice the likelihood, the others fitted anew; 3.841 at 95 %"},
+        ),
+        **_signals(problem, best),
+        "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
+        "start_estimate": (("start", "parameter"), [problem.values(each.z) for each in fits]),
+    }
+    coordinates: dict[str, Any] = {
+        "parameter": list(problem.keys),
+        "other": list(problem.keys),
+        "signal": [f"{signal.recording}.{signal.name}" for signal in problem.signals],
+    }
+    if comparison is not None:
+        coordinates["law"] = comparison.law
+        for name in ("parameters", "bic", "rms", "held_out"):
+            variables[f"law_{name}"] = ("law", getattr(comparison, name), {"units": "1"})
+    alike = sum(each.objective < best.objective + _SAME for each in fits)
+    attrs = {
+        "scenario": problem.scenario.name,
+        "undetermined": [words for words, _ in free],
+        "starts": f"{alike} of {len(fits)} searches end at the same place",
+        "evaluations": problem.evaluations,
+        "bic": best.objective + count * math.log(max(sum(w * len(e) for e, w in _pairs(best)), 1.0)),
+    }
+    attrs |= {"unfinished": unfinished} if unfinished else {}
+    return xr.Dataset(variables, coordinates, attrs)
+
+
+def _pairs(best: Fit) -> list[tuple[Array, float]]:
+    return list(zip(best.residuals, best.weights.tolist(), strict=True))
+
+
+def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side]) -> tuple[Array, Array]:
+    """Return values and rises along every profile, ascending, filled up with what is not a number."""
+    rows: list[Array] = []
+    for k in range(len(problem.keys)):
+        paths = [side.path for (j, _), side in sides.items() if j == k]
+        points = np.unique(np.concatenate([np.array([[best.z[k], 0.0]]), *paths]), axis=0)
+        values = np.array([problem.values(np.where(np.arange(len(best.z)) == k, z, best.z))[k] for z in points[:, 0]])
+        rows.append(np.stack([values, points[:, 1]]))
+    width = max((row.shape[1] for row in rows), default=1)
+    filled = np.full((2, len(rows), width), np.nan)
+    for k, row in enumerate(rows):
+        filled[:, k, : row.shape[1]] = row
+    return filled[0], filled[1]
+
+
+def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
+    signals = problem.signals
+    whole = {
+        "signal_index": np.repeat(np.arange(len(signals)), [len(s.measured) for s in signals]),
+        "instant": np.concatenate([s.instant for s in signals]),
+        "applied": np.concatenate([s.load for s in signals]),
+        "measured": np.concatenate([s.measured for s in signals]),
+        "residual": np.concatenate(best.residuals),
+    }
+    names = {
+        "signal_index": "which signal",
+        "instant": "time, s; number of a steady reading",
+        "applied": "what pulls, N",
+        "measured": "measured, in the unit of the signal",
+        "residual": "measured less computed, in the unit of the signal",
+    }
+    return {
+        "signal_units": ("signal", [s.unit for s in signals]),
+        "signal_steady": ("signal", [not s.ordered for s in signals]),
+        "noise": ("signal", best.noise, {"long_name": "rms of the residuals, in the unit of the signal"}),
+        "replicate_noise": ("signal", [_replicates(s) for s in signals], {"long_name": "rms of equal readings"}),
+        "signal_samples": ("signal", [len(s.measured) for s in signals]),
+        "signal_correlation": ("signal", best.correlation, {"units": "1", "long_name": "of neighbouring residuals"}),
+        "independent_share": ("signal", best.weights, {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
+        **{name: ("sample", values, {"long_name": names[name]}) for name, values in whole.items()},
+    }
+
+
+def _replicates(signal: Signal) -> float:
+    """Return the rms by which readings of the same load differ from their mean: what no law can explain."""
+    if signal.ordered or not np.isfinite(signal.load).all():
+        return math.nan
+    groups = np.unique(signal.load, return_inverse=True)[1]
+    if groups.max() + 1 == len(groups):
+        return math.nan
+    means = np.bincount(groups, signal.measured) / np.bincount(groups)
+    spread = np.sum((signal.measured - means[groups]) ** 2)
+    return float(np.sqrt(spread / (len(groups) - len(means))))
+
+
+def write_outcome(result: xr.Dataset, folder: Path, bench: str | Path, problem: Problem) -> None:
+    """Write identification.nc and identified.toml.
+
+    Raises:
+        OSError: If they cannot be written.
+    """
+    save(result, folder / "identification.nc")
+    with replacing(folder / "identified.toml") as temporary:
+        Path(temporary).write_text(identified_toml(result, folder, bench, problem), encoding="utf-8")
+
+
+def identified_toml(result: xr.Dataset, folder: Path, bench: str | Path, problem: Problem) -> str:
+    """Return the text of a scenario that extends the bench, with the numbers found and their intervals."""
+    name = str(bench)
+    path = Path(name).expanduser()
+    if path.suffix == ".toml":
+        try:
+            name = Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+        except ValueError:
+            # Another drive.
+            name = str(path.absolute())
+    recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
+    lines = ["# What an identification has found; intervals at 95 %.", tomli_w.dumps({"extends": name}).strip(), ""]
+    for key, value, low, high, unit in zip(
+        problem.keys, *(result[each].values for each in ("estimate", "lower", "upper", "units")), strict=True
+    ):
+        plain, index = split(key)
+        ends = f"{_end(float(low))} to {_end(float(high))}"
+        what = "" if unit == "1" else f" {unit}"
+        where = "" if index is None else f"number [{index}], "
+        lines.append(f"{plain} = {_toml(problem, key, float(value))} # {where}{ends}{what}, from {recordings}")
+    return "\n".join(lines) + "\n"
+
+
+def _end(value: float) -> str:
+    return "not known" if math.isnan(value) else "open" if math.isinf(value) else f"{value:.4g}"
+
+
+def _toml(problem: Problem, key: str, value: float) -> str:
+    plain, index = split(key)
+    if index is None:
+        return repr(value)
+    held: Any = problem.scenario.model_dump(mode="python")
+    for part in plain.split("."):
+        held = held[part]
+    return str([value if k == index else each for k, each in enumerate(held)])

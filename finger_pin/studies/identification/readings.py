@@ -1,0 +1,67 @@
+"""Steady readings: what the closed forms of a scenario's tendons and servos say of every row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from finger_pin.analysis.steady import steady_state
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.studies.identification.recordings import Recording
+
+_OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current")
+
+
+class SteadyReadings:
+    """A recording of steady states beside a scenario.
+
+    Attributes:
+        recording: What was read.
+        load: The pull at the entrance of the canals, shape (m, a), N.
+    """
+
+    def __init__(self, recording: Recording, scenario: Scenario) -> None:
+        """Find the inputs.
+
+        Raises:
+            InputError: If one names nothing that the scenario has, or the tension of a tendon is missing.
+        """
+        self.recording, finger = recording, scenario.finger
+        self._entry = f"identify.recordings.{recording.name}"
+        rows = len(recording.speed)
+        joints, tendons = list(finger.joints), list(finger.actuated_names)
+        self.load, self._position = np.zeros((rows, len(tendons))), np.zeros((rows, len(joints)))
+        if scenario.simulation.initial is not None:
+            for joint, angle in scenario.simulation.initial.position.items():
+                self._position[:, joints.index(joint)] = angle
+        for name, values in recording.inputs.items():
+            variable, _, label = name.partition(".")
+            if variable in ("tendon_command", "spool_tension"):
+                self.load[:, self._place(f"inputs.{name}", label, tendons)] = values
+            elif variable == "joint_position":
+                self._position[:, self._place(f"inputs.{name}", label, joints)] = values
+            else:
+                allowed = "a steady state is given tendon_command, spool_tension and joint_position"
+                raise InputError(f"{self._entry}.inputs.{name}", allowed)
+        places = {"motor_current": list(finger.actuators)}
+        self._outputs = []
+        for name in recording.outputs:
+            variable, _, label = name.partition(".")
+            if variable not in _OUTPUTS:
+                raise InputError(f"{self._entry}.outputs.{name}", f"a steady state has {', '.join(_OUTPUTS)}")
+            self._outputs.append((variable, self._place(f"outputs.{name}", label, places.get(variable, tendons))))
+
+    def compute(self, scenario: Scenario) -> list[Array]:
+        """Return what the scenario says of every output, shape (m,) each."""
+        held = self.recording.settings.at_rest
+        found = steady_state(scenario.finger, self.load, self.recording.speed, self._position, held)
+        by_name = {"tendon_tension": found.tension, "tendon_friction": found.friction, "motor_current": found.current}
+        return [by_name[variable][:, place] for variable, place in self._outputs]
+
+    def _place(self, where: str, label: str, names: Sequence[str]) -> int:
+        if label not in names:
+            raise InputError(f"{self._entry}.{where}", f"there is no {label}; there are {', '.join(names) or 'none'}")
+        return names.index(label)

@@ -1,0 +1,91 @@
+"""An identification: what was measured beside what is computed, what is left over, and how sure every number is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from finger_pin.views.plots.lines import trace
+from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
+
+#: Rise of minus twice the likelihood at the ends of a 95 % interval.
+_LEVEL = 3.841
+
+
+@styled
+def plot_identification(result: xr.Dataset) -> Figure:
+    """Draw every signal as measured and computed with its residuals, a row each, over load or over time.
+
+    Args:
+        result: Dataset of `identify`.
+    """
+    signals = result["signal"].values
+    figure = new_figure(8.6, 2.6 * len(signals) + 0.3, "constrained")
+    grid = figure.subplots(len(signals), 2, squeeze=False, width_ratios=[3, 2])
+    for k, (met, left) in enumerate(grid):
+        of_signal = result["signal_index"].values == k
+        measured, residual, load, instant = (
+            result[name].values[of_signal] for name in ("measured", "residual", "applied", "instant")
+        )
+        steady = bool(result["signal_steady"].values[k])
+        by_load = steady and bool(np.isfinite(load).all())
+        over, label = (load, "load (N)") if by_load else (instant, "reading" if steady else "time (s)")
+        unit = str(result["signal_units"].values[k])
+        if steady:
+            order = np.argsort(over, kind="stable")
+            met.plot(over, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
+            met.plot(over[order], (measured - residual)[order], color=VERMILLION, label="computed")
+            left.plot(over, residual, "o", color=BLUE, markersize=3.5, alpha=0.6)
+        else:
+            trace(met, over, measured, color=BLUE, label="measured")
+            trace(met, over, measured - residual, color=VERMILLION, label="computed", linewidth=1.0)
+            trace(left, over, residual, color=BLUE, linewidth=0.8)
+        left.axhline(0.0, color=GREY, linewidth=0.8)
+        met.set(title=str(signals[k]), xlabel=label, ylabel=f"({unit})" if unit else "")
+        left.set(title=f"left over, rms {result['noise'].values[k]:.3g} {unit}", xlabel=label)
+    grid[0, 0].legend(loc="best")
+    return figure
+
+
+@styled
+def plot_profiles(result: xr.Dataset) -> Figure:
+    """Draw the profile of every parameter: by how much the recordings are met worse where it is held elsewhere.
+
+    Args:
+        result: Dataset of `identify`.
+    """
+    names = result["parameter"].values
+    columns = min(len(names), 3)
+    rows = -(-len(names) // columns)
+    figure = new_figure(2.9 * columns + 0.4, 2.5 * rows + 0.2, "constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for spare in panels[len(names) :]:
+        spare.remove()
+    for k, axes in enumerate(panels[: len(names)]):
+        _profile(axes, result.isel(parameter=k))
+    return figure
+
+
+def _profile(axes: Axes, one: xr.Dataset) -> None:
+    value, rise = one["profile_value"].values, one["profile_rise"].values
+    there = np.isfinite(value) & np.isfinite(rise)
+    value, rise = value[there], np.maximum(rise[there], 0.0)
+    estimate = float(one["estimate"])
+    # The root of the rise is nearly straight on either side.
+    fine = np.linspace(value.min(), value.max(), 81)
+    root = np.interp(fine, value, np.where(value < estimate, -1.0, 1.0) * np.sqrt(rise))
+    axes.plot(fine, root**2, color=BLUE)
+    axes.plot(value, rise, "o", color=BLUE, markersize=3.0)
+    axes.axhline(_LEVEL, color=GREY, linewidth=0.8, linestyle="--")
+    for end in (float(one["lower"]), float(one["upper"])):
+        if math.isfinite(end):
+            axes.axvline(end, color=GREY, linewidth=0.8)
+    axes.plot([estimate], [0.0], "o", color=VERMILLION, markersize=5.0)
+    unit = str(one["units"].values)
+    key = str(one["parameter"].values)
+    axes.set_title(".".join(key.split(".")[-2:]), color=BLACK)
+    axes.set(xlabel="" if unit == "1" else f"({unit})", ylim=(-0.3, max(8.0, 1.2 * _LEVEL)))

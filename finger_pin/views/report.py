@@ -1,0 +1,174 @@
+"""An identification as one page that a person understands, and as a table for a terminal."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from finger_pin.files import replacing
+from finger_pin.views.plots.identification import plot_identification, plot_profiles
+
+_STYLE = """
+body { margin: 0; color: #1d2433; background: #f6f7f9; font: 15px/1.5 system-ui, sans-serif; }
+main { max-width: 62rem; margin: 0 auto; padding: 2rem 1.25rem 4rem; }
+h1 { font-size: 1.6rem; margin: 0; } h2 { font-size: 1.15rem; margin: 0 0 .4rem; }
+section { background: #fff; border: 1px solid #e3e6ec; border-radius: .5rem; padding: 1.1rem;
+  margin-top: 1.1rem; overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; font-size: .9rem; }
+th { text-align: left; color: #5d6678; font-weight: 500; border-bottom: 2px solid #e3e6ec; }
+th, td { padding: .3rem .8rem .3rem 0; } td { border-bottom: 1px solid #e3e6ec; }
+.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.soft { color: #5d6678; } .open { color: #a15c00; }
+img { display: block; max-width: 100%; height: auto; }
+"""
+
+
+def summarize_identification(result: xr.Dataset) -> str:
+    """Return the table of an identification as text."""
+    rows = [("", "estimate", "lower", "upper", "")]
+    rows += _parameters(result)
+    rows.append(("", "", "", "", ""))
+    rows.append(("", "rms", "samples", "of them", ""))
+    for name, noise, count, independent, unit in _signals(result):
+        rows.append((name, noise, count, f"{independent} free", unit))
+    width = max(len(row[0]) for row in rows)
+    lines = [f"  {a.ljust(width)}{b.rjust(13)}{c.rjust(13)}{d.rjust(13)}  {e}".rstrip() for a, b, c, d, e in rows]
+    return "\n".join([*lines, "", *_words(result)])
+
+
+def write_report(result: xr.Dataset, path: str | Path) -> Path:
+    """Write the page, whole or not at all: figures are inside it, nothing is loaded from anywhere."""
+    sections = [
+        (
+            "What was found",
+            _found(result) + _image(plot_profiles(result), "Profiles") + f"<p class='soft'>{_PROFILES}</p>",
+        ),
+        ("What the recordings leave open", "".join(f"<p>{escape(line)}</p>" for line in _words(result))),
+        ("How well every signal is met", _met(result) + _image(plot_identification(result), "Signals")),
+    ]
+    if "law" in result.dims:
+        sections.append(("Which law", _laws(result)))
+    if result.sizes["parameter"] > 1:
+        sections.append(("How the estimates hang together", _correlations(result)))
+    body = "".join(f"<section><h2>{title}</h2>{content}</section>" for title, content in sections)
+    title = f"Identification: {escape(str(result.attrs['scenario']))}"
+    text = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{title}</title><style>{_STYLE}</style></head><body><main><h1>{title}</h1>{body}</main></body></html>"
+    )
+    with replacing(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+_PROFILES = (
+    "Each curve says by how much the recordings are met worse where one number is held and the others are fitted anew. "
+    "Where it crosses the dashed line the 95 % interval ends; where it does not, the interval is open on that side."
+)
+
+
+def _parameters(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
+    found = []
+    for one in (result.isel(parameter=k) for k in range(result.sizes["parameter"])):
+        unit = str(one["units"].values)
+        ends = (_end(float(one["lower"])), _end(float(one["upper"])))
+        found.append(
+            (str(one["parameter"].values), f"{float(one['estimate']):.5g}", *ends, "" if unit == "1" else unit)
+        )
+    return found
+
+
+def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
+    columns = ("signal", "noise", "signal_samples", "independent_share", "signal_units")
+    return [
+        (str(name), f"{noise:.3g}", str(count), f"{share * count:.0f}", str(unit))
+        for name, noise, count, share, unit in zip(*(result[each].values for each in columns), strict=True)
+    ]
+
+
+def _end(value: float) -> str:
+    return "-" if math.isnan(value) else "open" if math.isinf(value) else f"{value:.5g}"
+
+
+def _words(result: xr.Dataset) -> list[str]:
+    """Return in sentences what is open, whether the searches agree, and which law is to be preferred."""
+    undetermined = (
+        [str(each) for each in np.atleast_1d(result.attrs["undetermined"])] if "undetermined" in result.attrs else []
+    )
+    words = [f"Not determined: {each}." for each in undetermined if each]
+    for name, _, low, high, _ in _parameters(result):
+        sides = [side for side, end in (("below", low), ("above", high)) if end == "open"]
+        if sides:
+            words.append(f"{name} is not bounded from {' nor from '.join(sides)} by these recordings.")
+    if not words:
+        words.append("The recordings determine every parameter.")
+    words.append(f"{result.attrs['starts']}.")
+    for name, repeated, noise in zip(
+        *(result[each].values for each in ("signal", "replicate_noise", "noise")), strict=True
+    ):
+        if math.isfinite(repeated):
+            words.append(
+                f"Equal readings of {name} differ by {repeated:.3g} rms, all readings from the law by {noise:.3g}."
+            )
+    if "law" in result.dims:
+        order = np.argsort(result["law_bic"].values)
+        first, *others = (str(result["law"].values[k]) for k in order)
+        bic = result["law_bic"].values[order]
+        rest = ", ".join(f"{name} by {value - bic[0]:.0f}" for name, value in zip(others, bic[1:], strict=True))
+        words.append(f"By BIC the law '{first}' is to be preferred: it is better than {rest} (10 is decisive).")
+    if "unfinished" in result.attrs:
+        words.append(f"{result.attrs['unfinished'].capitalize()}.")
+    return words
+
+
+def _table(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
+    top = "".join(f"<th{' class=number' if k else ''}>{escape(each)}</th>" for k, each in enumerate(head))
+    body = "".join(
+        "<tr>"
+        + "".join(f"<td{' class=number' if k else ''}>{escape(each)}</td>" for k, each in enumerate(row))
+        + "</tr>"
+        for row in rows
+    )
+    return f"<table><tr>{top}</tr>{body}</table>"
+
+
+def _found(result: xr.Dataset) -> str:
+    return _table(["parameter", "estimate", "lower (95 %)", "upper (95 %)", "unit"], list(_parameters(result)))
+
+
+def _met(result: xr.Dataset) -> str:
+    head = ["signal", "rms left over", "samples", "of them independent", "unit"]
+    return _table(head, list(_signals(result)))
+
+
+def _laws(result: xr.Dataset) -> str:
+    columns = ("law", "law_parameters", "law_bic", "law_rms", "law_held_out")
+    rows = [
+        (str(name), str(count), f"{bic:.1f}", f"{rms:.3f}", "-" if math.isnan(out) else f"{out:.3f}")
+        for name, count, bic, rms, out in zip(*(result[each].values for each in columns), strict=True)
+    ]
+    head = ["law", "parameters", "BIC (less is better)", "rms over noise", "rms of what was held out"]
+    return _table(head, rows)
+
+
+def _correlations(result: xr.Dataset) -> str:
+    names = [str(each) for each in result["parameter"].values]
+    values = result["correlation"].values
+    rows = [(name, *(f"{value:.2f}" for value in row)) for name, row in zip(names, values, strict=True)]
+    return _table(["", *(".".join(name.split(".")[-2:]) for name in names)], rows)
+
+
+def _image(figure: Figure, what: str) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", pil_kwargs={"compress_level": 2})
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f'<img alt="{what}" src="data:image/png;base64,{data}" width="{100 * figure.get_figwidth():.0f}">'

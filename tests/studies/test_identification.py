@@ -1,0 +1,152 @@
+"""Identification: numbers that others found in the same data, truths that made-up data hide, clear refusals."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.commands.application import run
+from finger_pin.description.units import in_si
+from finger_pin.studies.identification.ledger import NAME
+from finger_pin.views.report import summarize_identification, write_report
+
+COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
+BOUNDS = {COULOMB: (0.005, 1.0), DRAG: (0.0, 3.0)}
+
+
+def readings(rng, coulomb=0.12, drag=0.4, turn=2.5, noise=0.05, loads=(3.0, 6.0, 9.0, 12.0, 15.0), repeats=6):
+    """Readings by the capstan law and a drag, written out, with noise."""
+    load = np.repeat(loads, repeats)
+    exact = load * np.exp(-coulomb * turn) - drag / (1.0 + np.tanh(coulomb * turn / 2.0))
+    return {"in": load, "out": exact + rng.normal(0.0, noise, load.size)}
+
+
+def steady(**more):
+    """A recording of one canal."""
+    columns = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
+    return {"kind": "steady", "speed": 0.05, **columns, **more}
+
+
+def found(data, parameters=BOUNDS, **more):
+    changed = {"finger.tendons.T1.curvature_offset": 2.5}
+    given = {"recordings": {"pull": steady()}, "data": {"pull": data}, "overrides": changed, "starts": 1, **more}
+    return fp.identify("canal", parameters=parameters, **given)
+
+
+def test_sixty_real_readings_give_the_published_friction_and_reject_the_capstan_alone():
+    """E. Broge's readings: a straight line through them has 0.7496 F - 0.559 N and leaves 0.189 N rms."""
+    result = fp.identify("transmission")
+    (coulomb, drag), turn = result.estimate.values, np.pi
+    data = np.stack([result.applied.values, result.measured.values])
+    slope, offset = np.polyfit(*data, 1)
+    assert np.exp(-coulomb * turn) == pytest.approx(slope, rel=1e-6) and slope == pytest.approx(0.7496, abs=5e-5)
+    assert -drag / (1.0 + np.tanh(coulomb * turn / 2.0)) == pytest.approx(offset, rel=1e-5)
+    assert (coulomb, drag) == (pytest.approx(0.0917, abs=5e-5), pytest.approx(0.639, abs=1e-3))
+    assert result.noise.values == pytest.approx([0.189], abs=5e-4)
+    assert result.replicate_noise.values == pytest.approx([0.174], abs=5e-4)
+    bic = dict(zip(result.law.values, result.law_bic.values, strict=True))
+    assert bic == pytest.approx({"as described": -191.7, "capstan": -136.6, "floor": -173.2}, abs=0.1)
+    held_out = dict(zip(result.law.values, result.law_held_out.values, strict=True))
+    assert held_out["as described"] < min(held_out["capstan"], held_out["floor"])
+    assert result.determined.all() and not result.attrs["undetermined"]
+
+
+def test_intervals_are_those_of_linear_regression_where_the_law_is_a_line():
+    """A line's offset and slope have intervals in closed form; the profile has chi-squared in place of Student's t."""
+    data = readings(np.random.default_rng(3))
+    result = found(data)
+    design = np.stack([data["in"], np.ones(30)], axis=1)
+    slope = np.linalg.lstsq(design, data["out"], rcond=None)[0][0]
+    rest = data["out"] - design @ np.linalg.lstsq(design, data["out"], rcond=None)[0]
+    # The rise 30 log(SSE / SSE*) of a line is 30 log(1 + t^2 / SSE*) with t in units of the slope's own scale.
+    scale = np.sqrt(np.linalg.inv(design.T @ design)[0, 0] * (rest @ rest) * np.expm1(3.841 / 30))
+    ends = -np.log(slope + np.array([scale, -scale])) / 2.5
+    np.testing.assert_allclose([result.lower[0], result.upper[0]], ends, rtol=2e-3)
+
+
+def test_95_percent_intervals_hold_the_truth_that_often():
+    rng, held = np.random.default_rng(11), []
+    for _ in range(40):
+        truth = {"coulomb": rng.uniform(0.05, 0.3), "drag": rng.uniform(0.2, 1.0)}
+        result = found(readings(rng, **truth))
+        held.append((result.lower.values <= [*truth.values()]) & ([*truth.values()] <= result.upper.values))
+    # Of 80, each with 95 %: fewer than 68 or all of them happen once in a thousand times or so.
+    assert 68 <= np.sum(held) <= 79
+
+
+def test_what_cannot_be_told_apart_is_said_and_left_open():
+    turn = "finger.tendons.T1.curvature_offset"
+    data = readings(np.random.default_rng(5), drag=0.0)
+    result = found(data, {COULOMB: (0.02, 1.0), turn: (0.5, 10.0)})
+    assert result.attrs["undetermined"] == [f"of {COULOMB} and {turn} only the product is determined"]
+    assert not result.determined.any() and np.isinf(result.upper[1])
+    assert "only the product" in summarize_identification(result)
+    np.testing.assert_allclose(np.prod(result.estimate), 0.3, rtol=0.1)
+
+
+def test_columns_have_units_scales_and_offsets():
+    data = readings(np.random.default_rng(7))
+    plain = found(data)
+    grams = {"in": data["in"] / 9.80665e-3, "out": 2.0 * (data["out"] - 0.3)}
+    columns = {
+        "inputs": {"tendon_command.T1": {"column": "in", "unit": "gf"}},
+        "outputs": {"tendon_tension.T1": {"column": "out", "scale": 0.5, "offset": 0.3}},
+    }
+    other = found(grams, recordings={"pull": steady(**columns)})
+    np.testing.assert_allclose(other.estimate, plain.estimate, rtol=1e-5)
+    assert in_si("x", "deg", "rad") * 180.0 == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"recordings": {"pull": steady(outputs={"tendon_tension.T1": "uot"})}}, "did you mean out?"),
+        (
+            {"recordings": {"pull": steady(outputs={"tendon_tension.T1": {"column": "out", "unit": "mm"}})}},
+            "is a unit of what is in m, and this is in N",
+        ),
+        ({"recordings": {"pull": steady(outputs={"tendon_tension.T9": "out"})}}, "there is no T9; there are T1"),
+        ({"recordings": {"pull": steady(speed=0.0)}}, "friction has the sign of sliding"),
+        ({"data": {"pull": {"in": [3.0, 6.0], "out": [2.0, 4.0]}}}, "2 readings for 2 parameters"),
+        ({"parameters": {COULOMB: (0.005, 20.0)}}, "must be at most 10"),
+        ({"parameters": {"finger.tendon_friction.colomb": (0.1, 1.0)}}, "finger.tendon_friction.coulomb"),
+        ({"parameters": {**BOUNDS, "finger.joint_friction.viscous": (1e-5, 1e-3)}}, "no output of any recording feels"),
+        ({"parameters": {COULOMB: (1.0, 0.1)}}, "the least value must be below the greatest"),
+    ],
+)
+def test_wrong_benches_are_refused_in_one_line(change, said):
+    given = {"data": readings(np.random.default_rng(1)), **change}
+    data = given.pop("data")
+    with pytest.raises(fp.InputError) as refused:
+        found(data["pull"] if "pull" in data else data, **given)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path):
+    data, asked = readings(np.random.default_rng(2)), []
+    whole = found(data, starts=3)
+
+    def stop():
+        asked.append(0)
+        return len(asked) == 60
+
+    part = found(data, starts=3, output=tmp_path, stop=stop)
+    assert "unfinished" in part.attrs and (tmp_path / NAME).exists() and len(asked) == 60
+    again = found(data, starts=3, output=tmp_path)
+    assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]
+    np.testing.assert_allclose(again.estimate, whole.estimate, rtol=1e-5)
+    np.testing.assert_allclose(again.upper, whole.upper, rtol=1e-3)
+
+
+def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_path, capsys):
+    folder = tmp_path / "out"
+    assert run("identify", ["transmission", "--output", str(folder), "--starts", "1"]) == 0
+    assert "better than floor by 18, capstan by 55" in capsys.readouterr().out
+    found = fp.load_scenario(folder / "identified.toml")
+    assert found.finger.tendon_friction.drag == pytest.approx(0.639, abs=1e-3)
+    assert found.finger.tendons["T1"].curvature_offset == pytest.approx(np.pi)
+    page = (folder / "identification.html").read_text("utf-8")
+    for word in ("0.091734", "data:image/png", "By BIC", "95 %"):
+        assert word in page
+    assert fp.load_result(folder / "identification.nc").units.values.tolist() == ["1", "N"]
+    assert write_report(fp.load_result(folder / "identification.nc"), tmp_path / "again.html").exists()
+    assert run("identify", ["no_such_bench"]) == 2
