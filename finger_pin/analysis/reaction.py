@@ -7,7 +7,6 @@ joint's bearings. See `pin_wrench` for the mechanics and its assumptions.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,9 +16,8 @@ import numpy as np
 from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.description.hand import one_finger
+from finger_pin.description.loading import scenario_of
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import Groove
@@ -145,7 +143,9 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     Raises:
         InputError: If something is missing in the result, or a joint carries no link.
     """
-    _, finger = _scenario(result)
+    description = scenario_of(result.attrs).finger
+    one_finger(description)
+    finger = Finger(description)
     position, velocity, acceleration = (_values(result, name) for name in _MOTION)
     strands, force = _strands(result, finger), _values(result, "fingertip_force")
     found, other = (
@@ -200,13 +200,3 @@ def _strands(result: xr.Dataset, finger: Finger) -> Array:
         strands[:, routing.actuated :: 2] = proximal.reshape(len(tension), -1)
         strands[:, routing.actuated + 1 :: 2] = tension[:, routing.actuated :]
     return strands
-
-
-def _scenario(result: xr.Dataset) -> tuple[Scenario, Finger]:
-    try:
-        table = tomllib.loads(result.attrs["scenario"])
-    except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
-        raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
-    scenario = validate(Scenario, table, ())
-    one_finger(scenario.finger)
-    return scenario, Finger(scenario.finger)

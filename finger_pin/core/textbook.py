@@ -131,6 +131,7 @@ def integrate(
     """
     began = time.perf_counter()
     system, monitor = _System(rhs), _Monitor(watch, stop)
+    options: dict[str, Any] = {} if method == "LSODA" else {"jac": _Jacobian(system, atol / rtol)}
 
     def solve(end: float, monitor: _Monitor) -> Any:
         # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
@@ -145,6 +146,7 @@ def integrate(
                 max_step=longest,
                 dense_output=True,
                 events=monitor,
+                **options,
             )
 
     reason = ""
@@ -182,6 +184,25 @@ def integrate(
         failure=reason,
         interrupted=solution.status == 1,
     )
+
+
+class _Jacobian:
+    """The Jacobian by forward differences.
+
+    Those of scipy try a ten times larger difference at every call where a number changes nothing, such as the place of
+    an object that nothing touches, until it overflows.
+    """
+
+    def __init__(self, rhs: Callable[[float, Array], Array], scale: Array) -> None:
+        self._rhs, self._scale = rhs, scale
+
+    def __call__(self, instant: float, x: Array) -> Array:
+        at = self._rhs(instant, x)
+        steps = np.sqrt(np.finfo(float).eps) * np.maximum(np.abs(x), self._scale)
+        moved = x + np.diag(steps)
+        # What is added exactly, rounding included.
+        columns = [(self._rhs(instant, row) - at) / (row[i] - x[i]) for i, row in enumerate(moved)]
+        return np.transpose(columns)
 
 
 class _System:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from finger_pin.description.loading import scenario_of
 from finger_pin.description.routing import Array
 
 SETTLED = 1.0
@@ -88,7 +88,8 @@ def compare(name: str, result: xr.Dataset, coupling: Array) -> Comparison:
         coupling: H_c of its finger, shape (t, n), m.
     """
     part = result.sel(time=slice(SETTLED, None))
-    passive = np.array([tendon["kind"] == "passive" for tendon in _tendons(result)])
+    tendons = scenario_of(result.attrs).finger.tendons
+    passive = np.array([tendons[str(name)].kind == "passive" for name in result["tendon"].values])
     error = np.rad2deg(part["tracking_error"].transpose("time", "joint").values)
     rows = coupling[passive]
     enforced = error @ (np.linalg.pinv(rows) @ rows).T
@@ -144,8 +145,3 @@ def to_csv(rows: list[Comparison], joints: list[str], passive: list[str]) -> str
         ]
         writer.writerow([row.name, *(f"{number:.6g}" for number in numbers)])
     return text.getvalue()
-
-
-def _tendons(result: xr.Dataset) -> list[dict[str, Any]]:
-    table = tomllib.loads(result.attrs["scenario"])["finger"]["tendons"]
-    return [table[str(name)] for name in result["tendon"].values]

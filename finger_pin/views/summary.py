@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import textwrap
-import tomllib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger_pin.description.loading import scenario_of
 from finger_pin.views.account import account
 from finger_pin.views.trees import is_tree
 
@@ -151,12 +151,12 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
     """Return for how long every tendon on a spool has hung slack, s; by tendon, as the samples have it."""
     tension = result["spool_tension"]
     time = np.asarray(result["time"])
-    pulled = tomllib.loads(result.attrs["scenario"])["finger"]["actuators"].values()
+    pulled = scenario_of(result.attrs).finger.actuators.values()
     steps = np.gradient(time) if len(time) > 1 else np.zeros(len(time))
     return {
         name: float(np.sum(steps * (np.asarray(tension.sel(tendon=name)) <= 0.0)))
         for actuator in pulled
-        for name in actuator["tendons"]
+        for name in actuator.tendons
     }
 
 

@@ -116,3 +116,13 @@ def test_an_error_of_the_right_hand_side_itself_is_not_taken_for_a_numerical_fai
 
     with pytest.raises(ValueError, match="wrong shape"):
         run(broken, method=method)
+
+
+def test_a_number_that_changes_nothing_does_not_end_a_run_that_asks_for_many_jacobians():
+    """Van der Pol's oscillator with a third number: the place, say, of something that nothing touches."""
+
+    def rhs(_, x):
+        return np.array([x[1], 50.0 * (1.0 - x[0] ** 2) * x[1] - x[0], 0.0 * x[2] ** 2])
+
+    found = integrate(rhs, np.array([2.0, 0.0, 0.0]), 600.0, method="Radau", rtol=1e-3, atol=np.full(3, 1e-3))
+    assert not found.failure and found.statistics.jacobians > 200

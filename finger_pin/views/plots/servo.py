@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import tomllib
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.description.loading import scenario_of
+from finger_pin.description.parameters import Crossing
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
@@ -42,15 +44,15 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     """
     if "motor" not in result.dims:
         raise InputError("result", "is of a finger without servos")
-    described = tomllib.loads(result.attrs["scenario"])["finger"]
-    actuators = described["actuators"]
-    tendons = [name for actuator in actuators.values() for name in actuator["tendons"]]
+    described = scenario_of(result.attrs).finger
+    actuators = described.actuators
+    tendons = [name for actuator in actuators.values() for name in actuator.tendons]
     height = max(6.6, 1.7 * len(tendons))
     figure, (left, middle, right) = sheet([(4.3, height), (4.8, height), (4.9, height)], width, titles)
     loops: list[Axes] = list(left.subplots(len(actuators), 1, squeeze=False)[:, 0])
     title(loops[0], "(a) joints against spools")
     for axes, (name, actuator) in zip(loops, actuators.items(), strict=True):
-        _loop(axes, result, name, [described["tendons"][each]["crossings"] for each in actuator["tendons"]])
+        _loop(axes, result, name, [described.tendons[each].crossings for each in actuator.tendons])
     loops[-1].set_xlabel("angle of the spool (°)")
     shown = {line.get_label(): line for axes in loops for line in axes.get_lines()}
     legend(left, list(shown.values()))
@@ -70,10 +72,10 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     return figure
 
 
-def _loop(axes: Axes, result: xr.Dataset, motor: str, crossed: list[dict[str, dict[str, float]]]) -> None:
+def _loop(axes: Axes, result: xr.Dataset, motor: str, crossed: Sequence[Mapping[str, Crossing]]) -> None:
     spool = np.rad2deg(result["motor_position"].sel(motor=motor).values)
     for index, joint in enumerate(names(result, "joint")):
-        if any(tendon.get(joint, {}).get("radius", 0.0) != 0.0 for tendon in crossed):
+        if any(joint in tendon and tendon[joint].radius != 0.0 for tendon in crossed):
             angle = np.rad2deg(result["joint_position"].sel(joint=joint).values)
             axes.plot(spool, angle, label=joint, linewidth=thin(), **series(index))
     axes.set_ylabel(f"{motor}: joints (°)")
