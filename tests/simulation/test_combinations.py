@@ -18,7 +18,8 @@ from finger_pin.views.summary import summarize
 from finger_pin.views.viewer.animation import write_animation
 
 SERVO = {"motor": "XL330-M288", "spool_radius": 0.005}
-FAR, NEAR = ({"shape": "sphere", "radius": 0.008, "position": [0.3, 0.3, z]} for z in (-0.4, -0.3))
+FAR, NEAR, BESIDE = ({"shape": "sphere", "radius": 0.008, "position": [0.3, 0.3, z]} for z in (-0.4, -0.3, 0.0))
+SWING = {"amplitude": 0.003, "frequency": 5.0}
 COMPENSATED = {"sampling": {"period": 2e-3}, "tendon_friction_feedforward": {}, "passive_tension_loop": {}}
 #: Entries of a scenario by what they add; those of a finger stand under `finger`, wherever it is.
 FEATURES: dict[str, dict[str, Any]] = {
@@ -27,8 +28,8 @@ FEATURES: dict[str, dict[str, Any]] = {
     "servo": {"finger": {"actuators": {"M3": {**SERVO, "tendons": ["T3"], "drive": "tension"}}}},
     "position drive": {"finger": {"actuators": {"M1": {**SERVO, "tendons": ["T1"], "drive": "position"}}}},
     "contact": {"environment": {"objects": {"marble": {**FAR, "mass": 0.005}, "ball": NEAR}}},
-    "moved object": {"environment": {"objects": {"rod": {**NEAR, "position": [0.3, -0.3, 0.0], "path": {"z": {"amplitude": 0.01, "frequency": 5.0}}}}}},
-    "moving palm": {"hand": {"palm": {"path": {"z": {"amplitude": 0.003, "frequency": 5.0}}}}},
+    "moved object": {"environment": {"objects": {"rod": {**BESIDE, "path": {"z": SWING}}}}},
+    "moving palm": {"hand": {"palm": {"path": {"z": SWING}}}},
     "springs": {"finger": {"joints": {"medial": {"spring": {"stiffness": 0.01, "damping": 1e-4}}}}},
     "open loop": {"controller": {"kind": "tensions", "minimum_tension": 2.0}},
     "sampled": {"controller": {"sampling": {"period": 2e-3}}},
@@ -91,6 +92,7 @@ class Held:
     """A controller and a reference of one's own."""
 
     def __init__(self, finger: fp.FingerDescription) -> None:
+        """Hold all joints at an angle, under equal tensions."""
         self.joints = len(finger.joints)
         self.pulled = sum(tendon.kind == "actuated" for tendon in finger.tendons.values())
 
