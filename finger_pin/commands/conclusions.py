@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from finger_pin.commands.console import count_bar, noted, print_text, talks
-from finger_pin.commands.options import Output, Quiet, ScenarioName
+from finger_pin.commands.options import Format, Output, Quiet, ScenarioName
 
 if TYPE_CHECKING:
     from finger_pin.description.scenario import Scenario
@@ -40,6 +40,7 @@ def conclusions(
         ),
     ] = None,
     output: Output = Path("results/conclusions"),
+    format: Format = None,
     quiet: Quiet = False,
 ) -> None:
     """Put the paper's three conclusions to the test: figures, and a table of what was claimed, measured and found."""
@@ -61,7 +62,7 @@ def conclusions(
             found = each.measure(loaded, progress=progress)
             findings += each.judge(found)
             # At once, so that an interruption loses nothing that is finished.
-            save_figure(each.draw(found), output / each.figure)
+            save_figure(each.draw(found), output / each.figure, format)
             write_findings(findings, output / "conclusions.csv")
     if not quiet:
         print_text(f"{findings_table(findings)}\nFigures and table are in {output}")
@@ -74,13 +75,13 @@ def experiments(chosen: str) -> list[Experiment]:
 
     table = {
         "a": Experiment(
-            e.transmission, e.transmission_findings, p.plot_transmission, "transmission.png", e.TRANSMISSION_RUNS
+            e.transmission, e.transmission_findings, p.plot_transmission, "transmission", e.TRANSMISSION_RUNS
         ),
         "b": Experiment(
             e.friction_influence,
             e.influence_findings,
             p.plot_friction_influence,
-            "friction_influence.png",
+            "friction_influence",
             e.INFLUENCE_RUNS,
             e.check_influence,
         ),
@@ -88,7 +89,7 @@ def experiments(chosen: str) -> list[Experiment]:
             e.passive_delivery,
             e.delivery_findings,
             p.plot_passive_delivery,
-            "passive_delivery.png",
+            "passive_delivery",
             e.DELIVERY_RUNS,
             e.check_delivery,
         ),

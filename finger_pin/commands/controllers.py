@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger_pin.commands.console import count_bar, noted, print_text, talks
-from finger_pin.commands.options import Output
+from finger_pin.commands.options import Format, Output
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +22,7 @@ CAPTION = "error: rms; by T5: of it, the passive tendon's stretch; peak, mean: c
 DRAWN = ("paper", "all friction", "all friction, f5d 4 N, loop")
 
 
-def controllers(output: Output = Path("results/controllers")) -> None:
+def controllers(output: Output = Path("results/controllers"), format: Format = None) -> None:
     """Compare controllers on fig6: tracking, tension and losses, as a table, a CSV file and a figure."""
     shown = talks(quiet=False)
     from rich.console import Console
@@ -46,7 +46,7 @@ def controllers(output: Output = Path("results/controllers")) -> None:
                 Path(temporary).write_text(to_csv(rows, joints, ["T5"]), encoding="utf-8")
             if name in DRAWN:
                 drawn[name] = result
-        save_figure(plot_controllers(drawn, rows), output / "controllers.png")
+        save_figure(plot_controllers(drawn, rows), output / "controllers", format)
     Console(width=max(Console().width, WIDTH)).print(table(rows))
     print_text(f"{note(rows)}\nTable and figure are in {output}")
 

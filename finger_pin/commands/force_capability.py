@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from finger_pin.commands.console import print_text, talks
-from finger_pin.commands.options import Output, number, numbers
+from finger_pin.commands.options import Format, Output, number, numbers
 
 
 def force_capability(
@@ -22,6 +22,7 @@ def force_capability(
     ] = "20",
     force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tensions are printed, N.")] = "0,0,1",
     output: Output = Path("results/force_capability"),
+    format: Format = None,
     view: Annotated[bool, typer.Option("--view", help="Show the forces at the fingertip in the viewer.")] = False,
 ) -> None:
     """Report and draw the forces that a fingertip can exert at a posture, and the tension that one force needs."""
@@ -54,7 +55,7 @@ def force_capability(
         "sensitivity": plot_radius_sensitivity(built, angles, wish),
     }
     for name, figure in figures.items():
-        save_figure(figure, output / f"{name}.png")
+        save_figure(figure, output / name, format)
     lines = [f"Largest tension for a force of {np.linalg.norm(wish):g} N, N"]
     lines += [f"  friction {friction.value:10} {found.largest:8.3f}" for friction, found in needed.items()]
     if limit == "servos":

@@ -10,6 +10,7 @@ import typer
 from finger_pin.commands.console import Unsuccessful
 from finger_pin.commands.options import (
     Figures,
+    Format,
     Quiet,
     Restart,
     ScenarioName,
@@ -61,6 +62,7 @@ def optimise(
     scheduler: Scheduler = None,
     restart: Restart = False,
     figures: Figures = True,
+    format: Format = None,
     quiet: Quiet = False,
 ) -> None:
     """Search for designs that no other one is better than: small, large and bounded metrics over chosen numbers.
@@ -103,7 +105,7 @@ def optimise(
             stop=stop,
         )
 
-    result = conduct("search", run, summary, "pareto", folder, figures=figures, quiet=quiet)
+    result = conduct("search", run, summary, "pareto", folder, figures=figures, format=format, quiet=quiet)
     if not result["feasible"].any():
         raise Unsuccessful("no design keeps all constraints")
 

@@ -6,7 +6,7 @@ import hashlib
 import re
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -25,6 +25,9 @@ Settings = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help=
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Where results go.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
 Figures = Annotated[bool, typer.Option(help="Draw the figures.")]
+Format = Annotated[
+    Literal["png", "pdf", "svg"] | None, typer.Option(help="Format of the figures; default png.", show_default=False)
+]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Processes; default one per core.")]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster of a scheduler, such as tcp://host:8786.")

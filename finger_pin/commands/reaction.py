@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from finger_pin.commands.console import count_bar, noted, print_text, talks
-from finger_pin.commands.options import Output, Quiet, ScenarioName, Settings, numbers, overrides
+from finger_pin.commands.options import Format, Output, Quiet, ScenarioName, Settings, numbers, overrides
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -38,6 +38,7 @@ def reaction(
     settings: Settings = [],  # noqa: B006
     forces: Annotated[str, typer.Option(metavar="N,N,...", help="At the fingertip; empty for none.")] = "0.5,1,2",
     output: Output = Path("results/reaction"),
+    format: Format = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure how good the joint reaction (17) is along a scenario: against weight, inertia and tendons' real paths."""
@@ -70,7 +71,7 @@ def reaction(
     rows = [row for label, study in studies.items() for row in table_rows(label, study.differences(), motions[label])]
     write_csv(rows, output / "reaction.csv")
     more = {label: study for label, study in studies.items() if label != AS_IT_IS}
-    save_figure(plot_reaction(studies[AS_IT_IS], more), output / "reaction.png")
+    save_figure(plot_reaction(studies[AS_IT_IS], more), output / "reaction", format)
     if not quiet:
         show(rows)
         print_text(f"Table and figure are in {output}")

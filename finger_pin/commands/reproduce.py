@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger_pin.commands.console import print_text, progress_bar, talks
-from finger_pin.commands.options import Output
+from finger_pin.commands.options import Format, Output
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +18,7 @@ EXPECTED_ERRORS = {"abduction": "near 0.5", "proximal": "near 0.8", "medial": "n
 EXPECTED_TENSIONS = {"T3": "up to about 9", "T5": "1 to 7, never slack"}
 
 
-def reproduce(output: Output = Path("results/paper")) -> None:
+def reproduce(output: Output = Path("results/paper"), format: Format = None) -> None:
     """Simulate the scenario fig6 and draw the paper's figures, with the losses and the energy account."""
     shown = talks(quiet=False)
     from finger_pin.description.loading import load_scenario
@@ -27,12 +27,12 @@ def reproduce(output: Output = Path("results/paper")) -> None:
 
     scenario = load_scenario("fig6")
     paths = [
-        save_figure(plot_workspace(scenario.finger), output / "fig2.png"),
-        save_figure(plot_friction_law(), output / "fig3.png"),
+        save_figure(plot_workspace(scenario.finger), output / "fig2", format),
+        save_figure(plot_friction_law(), output / "fig3", format),
     ]
     with progress_bar(scenario.simulation.duration) if shown else nullcontext() as progress:
         result = simulate(scenario, progress=progress)
-    paths += draw_all(result, output)
+    paths += draw_all(result, output, format=format)
     print_text("\n".join([*comparison(result), "", *map(str, paths)]))
 
 

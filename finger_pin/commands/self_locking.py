@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger_pin.commands.console import print_text, talks
-from finger_pin.commands.options import Output, ScenarioName
+from finger_pin.commands.options import Format, Output, ScenarioName
 
 if TYPE_CHECKING:
     from finger_pin.description.scenario import Scenario
@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 SHARES = (0.5, 0.8, 0.9, 1.1, 1.4)
 
 
-def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results/self_locking")) -> None:
+def self_locking(
+    scenario: ScenarioName = "fig6", output: Output = Path("results/self_locking"), format: Format = None
+) -> None:
     """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it."""
     talks(quiet=False)
     import numpy as np
@@ -44,7 +46,7 @@ def self_locking(scenario: ScenarioName = "fig6", output: Output = Path("results
             }
         figures["runs"] = plot_runaway(runs)
     for title, figure in figures.items():
-        save_figure(figure, output / f"{title}.png")
+        save_figure(figure, output / title, format)
     print_text(f"{text}\n\nFigures are in {output}")
 
 

@@ -11,7 +11,7 @@ import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
 from finger_pin.commands.imports import without
-from finger_pin.commands.options import Figures, Quiet, ScenarioName, Settings, folder_name, overrides
+from finger_pin.commands.options import Figures, Format, Quiet, ScenarioName, Settings, folder_name, overrides
 from finger_pin.commands.writing import NotDrawn, Writing
 from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
 
@@ -34,6 +34,7 @@ def simulate(
     view: Annotated[bool, typer.Option(help="Open the viewer and play the result.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Watch while it computes, at most in real time.")] = False,
     figures: Figures = True,
+    format: Format = None,
     check: Annotated[
         bool, typer.Option("--check", help="Repeat the run at a tighter tolerance, and report where the two part.")
     ] = False,
@@ -54,7 +55,7 @@ def simulate(
         # Both this process and the one that writes need it.
         import numpy  # noqa: F401
 
-        writing = stack.enter_context(Writing(figures))
+        writing = stack.enter_context(Writing(figures, format))
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder

@@ -23,6 +23,7 @@ def conduct(
     output: Path,
     *,
     figures: bool,
+    format: str | None,
     quiet: bool,
     unfinished: Callable[[xr.Dataset], bool] = lambda result: True,
 ) -> xr.Dataset:
@@ -35,6 +36,7 @@ def conduct(
         figure: Name of the file, and after ``plot_`` of what draws it.
         output: Folder of the study.
         figures: Whether to draw.
+        format: Of the figure.
         quiet: Whether to print nothing.
         unfinished: Whether a result that was interrupted lacks something.
 
@@ -48,7 +50,7 @@ def conduct(
         if figures and not interrupts.requested:
             from finger_pin.views import plots
 
-            plots.save_figure(getattr(plots, f"plot_{figure}")(result), output / "figures" / f"{figure}.png")
+            plots.save_figure(getattr(plots, f"plot_{figure}")(result), output / "figures" / figure, format)
         if not quiet:
             print_text(f"{summary(result)}\n\nResults are in {output}")
         if interrupts.requested and unfinished(result):

@@ -10,6 +10,7 @@ import typer
 from finger_pin.commands.console import Unsuccessful, print_text
 from finger_pin.commands.options import (
     Figures,
+    Format,
     Quiet,
     Restart,
     ScenarioName,
@@ -56,6 +57,7 @@ def sweep(
     restart: Restart = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Repeat runs that failed before.")] = False,
     figures: Figures = True,
+    format: Format = None,
     quiet: Quiet = False,
     listed: Annotated[bool, typer.Option("--list", help="List metrics, and exit.")] = False,
 ) -> None:
@@ -104,7 +106,9 @@ def sweep(
             # The summary says why runs failed.
             return error.result
 
-    result = conduct("sweep", run, summary, "sweep", folder, figures=figures, quiet=quiet, unfinished=misses)
+    result = conduct(
+        "sweep", run, summary, "sweep", folder, figures=figures, format=format, quiet=quiet, unfinished=misses
+    )
     if (result["status"] == "failed").all():
         raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
 

@@ -44,9 +44,9 @@ class Writing:
         process: The process.
     """
 
-    def __init__(self, figures: bool) -> None:
-        """Prepare to draw figures, or to write the data alone."""
-        self._figures = figures
+    def __init__(self, figures: bool, format: str | None = None) -> None:
+        """Prepare to draw figures in a format, or to write the data alone."""
+        self._figures, self._format = figures, format
         self._trouble: Trouble = ""
 
     def __enter__(self) -> Self:
@@ -56,7 +56,7 @@ class Writing:
 
     def _begin(self, *given: Any) -> None:
         self._pipe, theirs = _CONTEXT.Pipe()
-        self.process = _CONTEXT.Process(target=_serve, args=(theirs, self._pipe, self._figures, *given))
+        self.process = _CONTEXT.Process(target=_serve, args=(theirs, self._pipe, self._figures, self._format, *given))
         self.process.start()
         theirs.close()
 
@@ -120,7 +120,7 @@ class Writing:
             return "the process that draws was killed", ""
 
 
-def _serve(pipe: Connection, other: Connection, figures: bool, given: Any = None) -> None:
+def _serve(pipe: Connection, other: Connection, figures: bool, format: str | None, given: Any = None) -> None:
     """Write and draw the result that is given or comes through a pipe; answer twice, what went wrong and a summary."""
     # Its copy of the other end would keep the pipe open when the process that started it is no more.
     other.close()
@@ -145,7 +145,7 @@ def _serve(pipe: Connection, other: Connection, figures: bool, given: Any = None
         recorded, folder, drawn = given or pipe.recv()
         result = as_dataset(recorded)
         names = list(saving.figures_of(result)) if figures and drawn else []
-        draw = partial(saving.draw_all, result, folder.stage / "figures") if names else None
+        draw = partial(saving.draw_all, result, folder.stage / "figures", format=format) if names else None
         begun = [_Copy(draw, name) for name in names] if _COPIED else []
         folder.write(result)
         pipe.send(("", summarize(result)))

@@ -14,7 +14,7 @@ ALL = {"scenario.toml", "trajectory.nc", "animation.html"}
 class Quick:
     """In place of the process that writes and draws."""
 
-    def __init__(self, figures):
+    def __init__(self, figures, format=None):
         """Prepare to draw figures or not."""
         self.figures = figures
 

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 from harness import ALL, SCRIPT
 from test_files import contents
@@ -64,6 +65,13 @@ def test_without_figures_those_of_an_earlier_run_are_gone_and_the_animation_is_n
     assert "figures/fig6.png" in contents(here / "out")
     assert run("s.toml", "--output", "out", "--no-figures")[0] == 0
     assert set(contents(here / "out")) == ALL
+
+
+def test_figures_come_in_the_format_that_was_asked_for(run, here):
+    assert run("s.toml", "--output", "out", "--format", "svg")[0] == 0
+    assert {Path(name).suffix for name in contents(here / "out") if name.startswith("figures/")} == {".svg"}
+    code, _, lines = run("s.toml", "--output", "other", "--format", "gif")
+    assert code == 2 and "'png', 'pdf', 'svg'" in lines[0] and not (here / "other").exists()
 
 
 def test_a_finger_that_locks_itself_is_told_in_one_line_of_the_summary_and_nowhere_else(run, quick):

@@ -66,20 +66,24 @@ def draw_all(
     for name in wanted:
         if name not in figures:
             raise InputError("names", f"the figures of this result are {', '.join(figures)}", name)
-    end = format or settings["savefig.format"]
-    return [
-        save_figure(figures[name](result, width=width, titles=titles), Path(folder) / f"{name}.{end}")
-        for name in wanted
-    ]
+    drawn = ((name, figures[name](result, width=width, titles=titles)) for name in wanted)
+    return [save_figure(figure, Path(folder) / name, format) for name, figure in drawn]
 
 
-def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write a figure in the format that its name ends with, whole or not at all, and return its path.
+def save_figure(figure: Figure, path: str | Path, format: str | None = None) -> Path:
+    """Write a figure, whole or not at all, and return its path.
+
+    Args:
+        figure: The figure.
+        path: Of the file, whose ending is its format; without one it gets the format's.
+        format: `png`, `pdf` or `svg`; default that of matplotlib's setting ``savefig.format``, PNG unless changed.
 
     Raises:
         InputError: If there is no such format.
     """
     target = Path(path)
+    if not target.suffix:
+        target = target.with_name(f"{target.name}.{format or settings['savefig.format']}")
     end = target.suffix.removeprefix(".").lower()
     if end not in FORMATS:
         raise InputError("format", f"must be {', '.join(FORMATS)}", end)
