@@ -24,7 +24,8 @@ from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
 
 # Keys that put another finger or hand in place of what there is.
-_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")
+_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?|hand\.fingers\.[^.]+")
+_PLACE = re.compile(r"hand\.fingers\.[^.]+")
 # Tables by joint or tendon, and which of the two.
 _BY_NAME = {
     ("reference", "joints"): "joint",
@@ -57,7 +58,7 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
     first = (".kind", ".motor")
     for early in (True, False):
         _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
-        for finger in [each.get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
+        for finger in [as_table(each).get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
             with_motors(as_table(finger), Path())
 
 
@@ -128,6 +129,9 @@ def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
             near = nearest(first, allowed)
             hint = f"; did you mean {'.'.join([near, *rest])}?" if near else ""
             raise InputError(key, f"unknown key; keys begin with {', '.join(sorted(allowed))}{hint}")
+        if _PLACE.fullmatch(key) and isinstance(value, str):
+            # Another finger at the same place.
+            key = f"{key}.finger"
         if _OTHER_FINGER.fullmatch(key):
             value = _absolute(value)
         if key.endswith("finger") and isinstance(value, dict) and "base" in value:

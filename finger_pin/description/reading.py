@@ -175,8 +175,14 @@ def resolve_hand(hand: Any, folder: Path, seen: tuple[Path, ...] = ()) -> Any:
 
 
 def _on_top(base: Table, hand: Table, folder: Path) -> Table:
-    """Return the table of a hand with another on top, whose fingers may be other ones altogether."""
-    for name, placed in as_table(as_table(hand).get("fingers")).items():
+    """Return the table of a hand with another on top, whose fingers may be other ones altogether.
+
+    What is the name or path of a finger, and no table, is that finger where its place is the base's.
+    """
+    fingers = as_table(as_table(hand).get("fingers"))
+    for name, placed in fingers.items():
+        if isinstance(placed, str):
+            placed = fingers[name] = {"finger": placed}
         finger = as_table(placed).get("finger")
         if isinstance(finger, str) or "base" in as_table(finger):
             with _named(f"hand.fingers.{name}."):

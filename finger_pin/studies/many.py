@@ -43,7 +43,9 @@ def simulate_many(
 
     Returns:
         The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN from
-        where it stopped; ``failure`` says why, and is empty for the others. ``scenario`` holds every run's TOML.
+        where it stopped; ``failure`` says why, and is empty for the others. What only some runs have, such as motors
+        or contacts, is NaN in the others, and its attribute ``comment`` names them. ``scenario`` holds every run's
+        TOML.
 
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
@@ -71,7 +73,8 @@ def simulate_many(
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
     margins = stacked["self_locking_margin"].values
-    advice = locking_advice(float(np.nanmin(margins)))
+    # Tensions in open loop, and controllers of one's own, have no margin.
+    advice = locking_advice(float(np.nanmin(margins, initial=np.inf)))
     if advice:
         close = sum(bool(locking_advice(float(margin))) for margin in margins)
         message = f"{close} of {len(runs)} runs come close to self-locking; in the closest {advice}"
@@ -116,22 +119,44 @@ def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost]) -> xr
     found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
     longest = max(found.values(), key=lambda result: result.sizes["time"])
     times = runs[0].sample_times()
+    labels = _labels(found.values())
     stacked: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}
-    for name, variable in longest.data_vars.items():
-        values = np.full((len(runs), len(times), *variable.shape[1:]), np.nan)
-        for row, result in found.items():
-            values[row, : result.sizes["time"]] = result[name].values
-        stacked[str(name)] = (("run", *map(str, variable.dims)), values, dict(variable.attrs))
+    for name in dict.fromkeys(str(name) for result in found.values() for name in result.data_vars):
+        having = {row: result[name] for row, result in found.items() if name in result}
+        first = next(iter(having.values()))
+        dims = tuple(map(str, first.dims))
+        sizes = [len(labels[dim]) if dim in labels else first.sizes[dim] for dim in dims[1:]]
+        values = np.full((len(runs), len(times), *sizes), np.nan)
+        for row, variable in having.items():
+            places = [
+                [labels[dim].index(label) for label in variable[dim].values] if dim in labels else range(size)
+                for dim, size in zip(dims[1:], sizes, strict=True)
+            ]
+            values[np.ix_([row], range(variable.sizes["time"]), *places)] = variable.values
+        attributes = dict(first.attrs)
+        missing = [row for row in found if row not in having]
+        if missing:
+            attributes["comment"] = f"NaN in runs that have none: {', '.join(map(str, missing))}"
+        stacked[name] = (("run", *dims), values, attributes)
     for name in _PER_RUN:
-        numbers = [result.attrs[name] if isinstance(result, xr.Dataset) else np.nan for result in results]
+        numbers = [result.attrs.get(name, np.nan) if isinstance(result, xr.Dataset) else np.nan for result in results]
         stacked[name] = (("run",), np.array(numbers), {"long_name": name})
     failures = [result.reason if isinstance(result, Lost) else result.attrs["failure"] for result in results]
     stacked["failure"] = (("run",), np.array(failures), {"long_name": "failure"})
     stacked["scenario"] = (("run",), np.array([to_toml(run) for run in runs]), {"long_name": "resolved scenario, TOML"})
     shared = {key: value for key, value in longest.attrs.items() if key.startswith("version_")}
-    coordinates = {name: coordinate for name, coordinate in longest.coords.items() if name != "time"}
     return xr.Dataset(
         stacked,
-        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.arange(len(runs)), **coordinates},
+        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.arange(len(runs)), **labels},
         attrs=shared,
     )
+
+
+def _labels(results: Iterable[xr.Dataset]) -> dict[str, list[str]]:
+    """Return the names along every dimension that has some, those of all results."""
+    found: dict[str, dict[str, None]] = {}
+    for result in results:
+        for name in result.coords:
+            if name != "time":
+                found.setdefault(str(name), {}).update(dict.fromkeys(result[name].values.tolist()))
+    return {name: list(labels) for name, labels in found.items()}

@@ -147,7 +147,21 @@ def test_motors_of_a_finger_move_with_it_bit_by_bit_as_alone():
         assert float(abs(found.energy_residual).max()) < 1e-6
 
 
+def test_a_finger_on_a_hand_is_named_in_place_of_a_table(tmp_path):
+    text = '[hand]\n{}\n[hand.fingers]\nthumb = "planar"\n[controller]\ngain = 1.0\n'
+    (tmp_path / "own.toml").write_text(text.format('name = "own"'))
+    (tmp_path / "based.toml").write_text(text.format('base = "ub_hand"'))
+    alone = fp.load_scenario(tmp_path / "own.toml").hand.fingers
+    planar, usual = fp.load_finger("planar"), fp.load_hand("ub_hand").fingers["thumb"]
+    assert list(alone) == ["thumb"] and alone["thumb"].finger == planar and alone["thumb"].position == (0.0, 0.0, 0.0)
+    overridden = fp.load_scenario("hand", {"hand.fingers.thumb": "planar", "reference.joints": {}})
+    for scenario in (fp.load_scenario(tmp_path / "based.toml"), overridden):
+        placed = scenario.hand.fingers["thumb"]
+        assert placed.finger == planar and placed.position == usual.position and placed.scale == usual.scale
+
+
 WRONG = {
+    "hand.fingers.thumb": (3, "must be a table"),
     "hand.fingers.thumb.position": ([0.0, 0.0], "must be a list of 3 numbers"),
     "hand.fingers.index.position": ([0.0, 0.0, 50.0], "is it in millimetres?"),
     "hand.fingers.ring.orientation": ([0.0, 0.0, 90.0], "is it in degrees?"),

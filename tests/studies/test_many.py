@@ -82,6 +82,32 @@ def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatc
     assert np.isfinite(caught.value.result.joint_position.values[:, :5]).all()
 
 
+def test_what_only_some_runs_have_is_nan_in_the_others_and_said() -> None:
+    names = ("fig6", "servo", "press")
+    runs = [fp.load_scenario(name, {"simulation.duration": 5e-3, "simulation.sample_rate": 1e3}) for name in names]
+    ball = {"ball": {"shape": "sphere", "radius": 0.01, "mass": 0.01, "position": [0.0, 0.2, 0.0]}}
+    more = runs[2].model_dump(exclude_none=True)
+    more["environment"]["objects"] |= ball
+    more["controller"] = {"kind": "tensions", "minimum_tension": 2.0}
+    runs.append(fp.Scenario.model_validate(more))
+    stacked = fp.simulate_many(runs, workers=1)
+    for index, run in enumerate(runs):
+        alone = fp.simulate(run)
+        for name in stacked.data_vars:
+            if "time" in stacked[name].dims and name in alone:
+                own = (
+                    stacked[name]
+                    .isel(run=index)
+                    .sel({dim: alone[dim] for dim in alone[name].dims if dim in alone.coords})
+                )
+                np.testing.assert_array_equal(own.values, alone[name].values, err_msg=str(name))
+            elif "time" in stacked[name].dims:
+                assert np.isnan(stacked[name].values[index]).all()
+                assert str(index) in stacked[name].attrs["comment"]
+    assert stacked.sizes["motor"] == 4 and len(stacked.contact) > len(fp.simulate(runs[2]).contact)
+    assert np.isnan(stacked.self_locking_margin.values[3]) and set(stacked.failure.values) == {""}
+
+
 def test_only_the_chosen_variables_are_kept() -> None:
     stacked = fp.simulate_many(scenarios(1.0, 1.2), workers=1, variables=["tracking_error"])
     assert "tracking_error" in stacked
