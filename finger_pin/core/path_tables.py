@@ -188,7 +188,7 @@ def _levers(
 ) -> Array:
     """Return how far a unit of some coordinates moves points of a contact's first body, or of that of its frame."""
     found = np.zeros(len(chains.parents))
-    first = max(float(np.linalg.norm(end.point)) for end in piece.ends)
+    first = max(float(np.linalg.norm(end.point)) for end in piece.ends) + piece.breadth
     for body, far in (
         (carriers[0], first),
         (carriers[2], float(np.linalg.norm(piece.frame.translation)) + piece.reach),

@@ -66,6 +66,7 @@ class Piece:
         joint: Of the body that carries the frame, 0 for the base.
         frame: Placement of the frame in that joint's.
         reach: Where the middle of both points is further from the frame's origin, a gap is open and not asked, m.
+        breadth: How far from the points the first body's part reaches across, m.
     """
 
     shape: Shape
@@ -74,6 +75,7 @@ class Piece:
     joint: int = 0
     frame: pin.SE3 = field(default_factory=pin.SE3.Identity)
     reach: float = np.inf
+    breadth: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

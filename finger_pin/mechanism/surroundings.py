@@ -13,12 +13,13 @@ from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
-from finger_pin.mechanism.contacts import add_free_objects, check_start, contact_rows, finger_solids, object_solids
+from finger_pin.mechanism.contacts import check_start, contact_rows
 from finger_pin.mechanism.evaluation import Touching
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6

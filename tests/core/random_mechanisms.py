@@ -74,7 +74,7 @@ def random_contacts(rng, joints, width):
     for _ in range(count):
         holder, frame = int(rng.integers(0, joints + 1)), int(rng.integers(0, joints + 1))
         ends = Place(holder, rng.normal(size=3)), Place(holder, rng.normal(size=3))
-        numbers = np.array([0.3, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
+        numbers = np.array([0.3, 0.0, 1.0, *prism_parameters("sphere", [rng.uniform(2.0, 6.0)])])
         piece = Piece(PRISM, numbers, ends, frame, random_placement(rng))
         paths += [(Leg(piece, column),) for column in range(3)]
     # Stiffness, damping, exponent; static and kinetic friction; stiffness and lag of bristles, Stribeck speed, floor.

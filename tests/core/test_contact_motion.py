@@ -10,9 +10,10 @@ from finger_pin.core.control import held_control
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
-from finger_pin.mechanism.contacts import add_free_objects, contact_rows, object_solids
+from finger_pin.mechanism.contacts import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.solids import add_free_objects, object_solids
 
 G = 9.81
 SCALES = {"pose": 1e-2, "velocity": 1.0, "bend": 1e-5}

@@ -1,4 +1,4 @@
-"""Random pairs of bodies that may touch, and gaps of many pairs at once."""
+"""Random pairs of a body's part and another body, and gaps of many pairs at once."""
 
 import coal
 import numba
@@ -8,6 +8,10 @@ from finger_pin.core.law_code import inlined
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 
 _value, _slopes = inlined(PRISM.value).made, inlined(PRISM.slopes).made
+#: Kinds of parts: whether they have a disc, and a length.
+PARTS = {"point": (0.0, 0.0), "segment": (0.0, 1.0), "disc": (1.0, 0.0), "cylinder": (1.0, 1.0)}
+#: Distances of what lies along a face are too low by this much of a part's length and of its disc's diameter.
+EPSILON = 1e-5 / 4.0
 
 
 @numba.njit(_nrt=False)
@@ -25,35 +29,48 @@ def gaps(y, p):
     return found, slopes[:, :72].reshape(-1, 12, 6), slopes[:, 72:]
 
 
-def random_sizes(rng, shape):
-    """Return sizes of a shape, as `prism_parameters` takes them, m."""
-    return rng.uniform(0.005, 0.04, {"half_space": 0, "sphere": 1, "box": 3}.get(shape, 2))
+def random_pairs(rng, shape, part, count, fillet=0.0):
+    """Return y, p and sizes of a shape at the origin for parts around it; most near, some touching."""
+    sizes = rng.uniform(0.005, 0.04, (count, {"half_space": 0, "sphere": 1, "box": 3}.get(shape, 2)))
+    centre, axis = 0.04 * rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
+    half = rng.uniform(0.002, 0.03, (count, 1)) * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    disc, along = PARTS[part]
+    numbers = np.column_stack([rng.uniform(0.002, 0.01, count), disc * rng.uniform(0.003, 0.03, count)])
+    p = np.array([[*n, along, *prism_parameters(shape, each, fillet)] for n, each in zip(numbers, sizes, strict=True)])
+    ends = (centre, centre) if part == "point" else (centre - half, centre + half)
+    return np.hstack(ends), p, sizes
 
 
-def random_pairs(rng, shape, count, long):
-    """Return y, p and sizes of W for capsules or spheres around a shape at the origin; most near, some touching."""
-    sizes = np.array([random_sizes(rng, shape) for _ in range(count)])
-    centre, half = 0.04 * rng.normal(size=(count, 3)), 0.02 * long * rng.normal(size=(count, 3))
-    radius = rng.uniform(0.002, 0.01, count)
-    p = np.array([[r, *prism_parameters(shape, each)] for r, each in zip(radius, sizes, strict=True)])
-    return np.hstack([centre - half, centre + half]), p, sizes
+def twists(rng, y):
+    """Return rates of y by random motions of the part, of about 1 m/s and 50 rad/s."""
+    turn, speed = 50.0 * rng.normal(size=(len(y), 3)), rng.normal(size=(len(y), 3))
+    return np.hstack([speed + np.cross(turn, y[:, :3]), speed + np.cross(turn, y[:, 3:])])
 
 
-def coal_shape(shape, sizes):
-    """Return coal's shape."""
+def coal_shape(shape, sizes, fillet=0.0):
+    """Return coal's shape, without the fillet."""
     if shape == "half_space":
         return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-    kinds = {"sphere": coal.Sphere, "box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule}
-    return kinds[shape](*sizes)
+    if shape == "box":
+        return coal.Box(*(sizes - 2.0 * fillet))
+    if shape == "cylinder":
+        return coal.Cylinder(sizes[0] - fillet, sizes[1] - 2.0 * fillet)
+    return {"sphere": coal.Sphere, "capsule": coal.Capsule}[shape](*sizes)
 
 
-def coal_distance(shape, sizes, ends, radius, placement):
-    """Return coal's signed distance, with everything moved by a placement."""
-    length = np.linalg.norm(ends[3:] - ends[:3])
-    along = (ends[3:] - ends[:3]) / length if length else np.array([0.0, 0.0, 1.0])
+def coal_distance(shape, sizes, y, p, placement, fillet=0.0):
+    """Return coal's signed distance of a pair, with everything moved by a placement."""
+    radius, disc, far = p[0], p[1], np.linalg.norm(y[3:] - y[:3])
+    along = (y[3:] - y[:3]) / far if far else np.array([0.0, 0.0, 1.0])
     helper = np.eye(3)[np.argmin(np.abs(along))]
     first = np.cross(helper, along) / np.linalg.norm(np.cross(helper, along))
-    pose = coal.Transform3s(np.column_stack([first, np.cross(along, first), along]), (ends[:3] + ends[3:]) / 2.0)
-    body = coal.Capsule(radius, length) if length else coal.Sphere(radius)
+    length, centre = (far, 0.5 * (y[:3] + y[3:])) if p[2] else (0.0, y[:3])
+    pose = coal.Transform3s(np.column_stack([first, np.cross(along, first), along]), centre)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
-    return coal.distance(body, placement * pose, coal_shape(shape, sizes), placement, request, result)
+    request.gjk_tolerance = 1e-10
+    # A disc is a cylinder of no height; its rounding is taken off.
+    body = coal.Cylinder(disc, max(length, 1e-9)) if disc else coal.Capsule(radius, length)
+    if not disc and not length:
+        body = coal.Sphere(radius)
+    other = coal_shape(shape, sizes, fillet)
+    return coal.distance(body, placement * pose, other, placement, request, result) - fillet - (radius if disc else 0.0)

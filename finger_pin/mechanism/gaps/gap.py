@@ -1,4 +1,4 @@
-"""What a gap is: how far a capsule or a sphere of one body is from the shape of another."""
+"""What a gap is: how far a part of one body is from the shape of another."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from typing import Any, ClassVar
 
 @dataclass(frozen=True)
 class Gap:
-    """The distance between body A, a segment with a radius, and the shape of body W, in the frame of that shape.
+    """The distance between a part of body A, seen as two points, and the shape of body W, in the frame of that shape.
+
+    A positive distance is the true one or a lower bound of it, and it changes by no more than the points of both bodies
+    move against each other: it is Lipschitz 1 in the motion of their material. Detection in time rests on both.
 
     Attributes:
         name: For messages.
-        parameters: Names of its numbers, the radius of A first; ``p`` holds them in this order.
-        value: (y, p, out). y has both ends of A's segment, twice the same point for a sphere, shape (6,), m. Fills
-            out[0] with the signed distance, negative for penetration, m; out[1:4] with the unit normal from W towards
-            A; out[4:7] with the contact point, midway between the surfaces, m; out[7:10] and out[10:13] with two
-            tangents, right-handed with the normal.
+        parameters: Names of its numbers; ``p`` holds them in this order.
+        value: (y, p, out). y has both points of A's part, such as the ends of a capsule's axis, twice the same for a
+            sphere, shape (6,), m. Fills out[0] with the signed distance, negative for penetration, m; out[1:4] with the
+            unit normal from W towards A; out[4:7] with the contact point, midway between the surfaces, m; out[7:10] and
+            out[10:13] with two tangents, right-handed with the normal.
         slopes: (y, p, out). Fills out[:72] with d(out[1:13])/dy, 12 x 6 row by row, and out[72:78] with
-            d(distance)/dy.
+            d(distance)/dy, for motions that keep the points' distance.
     """
 
     name: str

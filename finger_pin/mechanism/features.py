@@ -1,0 +1,132 @@
+"""Where two bodies touch: the parts of one that meet the whole other one, either way round.
+
+A part is a convex piece of a body (a corner, an edge, a rim), and its contact is its distance from the other body: a
+distance of two convex bodies. So it depends smoothly on how both are placed and changes by no more than the material
+moves; its force does no work of its own, and its bristles stay with the material. Face on face, what meets are the
+corners of either body on the other and the edges of both; edge on edge, the pair of edges that is nearest; of a rolling
+cylinder, the lowest points of its rims.
+
+Corners and edges of boxes and rims of cylinders are rounded by `fillet` where they meet boxes and cylinders; against
+all else they are sharp. So there is one way out of a shallow contact even where two edges lie on each other.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.gaps import prism_parameters
+from finger_pin.mechanism.solids import Solid
+
+# Fillets are this share of a body's least half-width, but at most so large, m.
+_SHARE, _LARGEST = 0.1, 1e-3
+# A face's pressure, if even, has its moment about the face's axis at two thirds of the radius.
+_STUD = 2.0 / 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a body: a segment or a point, widened by a disc across it, and rounded.
+
+    Attributes:
+        ends: P_0 and P_1 in the body's frame, shape (2, 3), m.
+        radius: Of its rounding, m.
+        disc: Radius of the disc across P_1 - P_0, m; zero for none.
+        along: 1 if it goes from P_0 to P_1, 0 if it is at P_0 alone.
+    """
+
+    ends: Array
+    radius: float
+    disc: float = 0.0
+    along: float = 1.0
+
+
+def fillet(solid: Solid) -> float:
+    """Return the radius with which a box's edges or a cylinder's rims are rounded, m; none of others."""
+    if solid.shape not in ("box", "cylinder"):
+        return 0.0
+    halves = (solid.sizes[0], 0.5 * solid.sizes[1]) if solid.shape == "cylinder" else 0.5 * np.array(solid.sizes)
+    return min(_SHARE * float(min(halves)), _LARGEST)
+
+
+def contacts_of(one: Solid, other: Solid) -> Iterator[tuple[Solid, Part, Solid, tuple[float, ...]]]:
+    """Yield all contacts of two solids: the body whose part touches, the part, the other body and its prism.
+
+    A sphere or a capsule, the first one if both are, touches with its axis.
+    """
+    for a, w in ((one, other), (other, one)):
+        if w.shape == "half_space":
+            prism = prism_parameters(w.shape, ())
+            yield from ((a, part, w, prism) for part in _on_plane(a))
+            return
+    for a, w in ((one, other), (other, one)):
+        if a.shape in ("sphere", "capsule"):
+            prism = prism_parameters(w.shape, w.sizes)
+            yield from ((a, part, w, prism) for part in _round(a, w.shape in ("box", "cylinder")))
+            return
+    for a, w in ((one, other), (other, one)):
+        rounding, prism = fillet(a), prism_parameters(w.shape, w.sizes, fillet(w))
+        parts = _corners(a, rounding) if a.shape == "box" else _rims(a, rounding)
+        parts += _edges(a, rounding) if a.shape == "box" else []
+        if a.shape == w.shape == "cylinder" and a is one:
+            parts += [_whole(a, rounding)]
+        yield from ((a, part, w, prism) for part in parts)
+
+
+def _on_plane(solid: Solid) -> list[Part]:
+    if solid.shape == "box":
+        return _corners(solid, 0.0)
+    if solid.shape == "cylinder":
+        return _rims(solid, 0.0)
+    ends = _axis(solid)[1 if solid.shape == "sphere" or solid.joined else 0 :]
+    return [Part(np.stack([end, end]), solid.sizes[0]) for end in ends]
+
+
+def _round(solid: Solid, faces: bool) -> list[Part]:
+    """Return a sphere's or a capsule's axis, in two halves where it may lie on a face."""
+    ends, radius = _axis(solid), solid.sizes[0]
+    if solid.shape == "sphere" or not faces:
+        return [Part(ends, radius)]
+    middle = ends.mean(axis=0)
+    return [Part(np.stack([middle, end]), radius) for end in ends]
+
+
+def _axis(solid: Solid) -> Array:
+    half = 0.5 * (*solid.sizes, 0.0)[1]
+    return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
+
+
+def _corners(solid: Solid, rounding: float) -> list[Part]:
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * (0.5 * np.array(solid.sizes) - rounding)
+    return [Part(np.stack([corner, corner]), rounding) for corner in corners]
+
+
+def _edges(solid: Solid, rounding: float) -> list[Part]:
+    half = 0.5 * np.array(solid.sizes) - rounding
+    found = []
+    for axis in range(3):
+        for signs in itertools.product((-1.0, 1.0), repeat=2):
+            middle, along = np.insert(np.array(signs), axis, 0.0) * half, half * np.eye(3)[axis]
+            found.append(Part(np.stack([middle - along, middle + along]), rounding))
+    return found
+
+
+def _rims(solid: Solid, rounding: float) -> list[Part]:
+    """Return both rims of a cylinder, and three studs of each face, which keep it from spinning where it stands."""
+    radius, half = solid.sizes[0], 0.5 * solid.sizes[1] - rounding
+    found = []
+    for side in (-half, half):
+        found.append(Part(np.array([[0.0, 0.0, side], [0.0, 0.0, -side]]), rounding, radius - rounding, 0.0))
+        for turn in 2.0 * np.pi * np.arange(3) / 3.0:
+            stud = np.array([_STUD * radius * np.cos(turn), _STUD * radius * np.sin(turn), side])
+            found.append(Part(np.stack([stud, stud]), rounding))
+    return found
+
+
+def _whole(solid: Solid, rounding: float) -> Part:
+    radius, half = solid.sizes[0] - rounding, 0.5 * solid.sizes[1] - rounding
+    return Part(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), rounding, radius)

@@ -1,0 +1,152 @@
+"""Bodies as contacts see them: links, objects, and shapes of a tree's bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pinocchio as pin
+
+from finger_pin.description.objects import Object, Surface
+from finger_pin.description.parameters import Link
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.rigid_body import RigidBody
+
+# A link's own z axis runs along it, which is the x axis of its joint.
+_ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A body as contacts see it.
+
+    Attributes:
+        name: Of the link or the object.
+        group: Solids of one group never touch, such as the links of a finger.
+        joint: Index of the joint of the Pinocchio model that carries it, 0 for the base.
+        place: Of its shape in the frame of that joint.
+        shape: ``half_space``, ``sphere``, ``box``, ``cylinder`` or ``capsule``.
+        sizes: As `prism_parameters` takes them, m.
+        home: Centre of a ball, base frame, shape (3,), m, that it never leaves.
+        range: Radius of that ball, m; infinite for what is free.
+        joined: Whether it is a capsule whose near end lies in another one, which stands for it on a plane.
+        led: Whether nothing moves it but a path, if that: it is fixed, or moved.
+        surface: Its surface; None for links and where it is left out, which touch with that of what they touch.
+    """
+
+    name: str
+    group: str
+    joint: int
+    place: pin.SE3
+    shape: str
+    sizes: tuple[float, ...]
+    home: Array = field(default_factory=lambda: np.zeros(3))
+    range: float = np.inf
+    joined: bool = False
+    led: bool = False
+    surface: Surface | None = None
+
+    @property
+    def reach(self) -> float:
+        """No point is farther from the origin of its shape, m; infinite for a half-space."""
+        if self.shape == "half_space":
+            return np.inf
+        if self.shape == "box":
+            return 0.5 * float(np.linalg.norm(self.sizes))
+        radius, length = (*self.sizes, 0.0)[:2]
+        return float(np.hypot(radius, 0.5 * length)) if self.shape == "cylinder" else radius + 0.5 * length
+
+    def never_meets(self, other: Solid) -> bool:
+        """Return whether it stays away from another solid, whatever both do."""
+        for one, two in ((self, other), (other, self)):
+            if two.shape == "half_space":
+                # One that is moved may come from anywhere.
+                away = two.place.rotation[:, 2] @ (one.home - two.place.translation)
+                return two.joint == 0 and bool(away > one.range)
+        return float(np.linalg.norm(self.home - other.home)) > self.range + other.range
+
+    def kept_near(self, body: RigidBody) -> Solid:
+        """Return it with the ball about the first joint that carries it, in which joints that turn keep it."""
+        first, *others = [each for each in body.model.supports[self.joint] if each]
+        radius = float(np.linalg.norm(self.place.translation)) + self.reach
+        radius += sum(float(np.linalg.norm(body.model.jointPlacements[each].translation)) for each in others)
+        slides = any("JointModelP" in body.model.joints[each].shortname() for each in (first, *others))
+        home = np.array(body.model.jointPlacements[first].translation)
+        return replace(self, home=home, range=np.inf if slides else radius)
+
+
+def link_solid(name: str, group: str, joint: int, link: Link, last: bool) -> Solid:
+    """Return a link as a capsule as wide as it is, from its joint to the next; the last one ends in the pad.
+
+    Args:
+        name: Of its joint.
+        group: Of the finger.
+        joint: Index of its joint in the Pinocchio model.
+        link: Its sizes.
+        last: Whether it is the last link.
+    """
+    radius = 0.5 * link.width
+    length = max(link.length - radius, 0.0) if last else link.length
+    place = pin.SE3(_ALONG_LINK, np.array([0.5 * length, 0.0, link.offset]))
+    return Solid(name, group, joint, place, "capsule", (radius, length), joined=True)
+
+
+def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
+    """Return the links of a finger or a hand, given by the names of their joints, from the base to each tip."""
+    fingers = {name: name.rpartition(".")[0] for name in links}
+    last = {finger: name for name, finger in fingers.items()}
+    return [
+        link_solid(
+            name, f"{fingers[name]}.", int(body.model.getJointId(name)), link, name == last[fingers[name]]
+        ).kept_near(body)
+        for name, link in links.items()
+    ]
+
+
+def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:
+    """Return objects; those that move are carried by the joints that `add_free_objects` has made."""
+    return [
+        object_solid(name, each, int(body.model.getJointId(f"{name}_attitude")) if each.moves else 0)
+        for name, each in objects.items()
+    ]
+
+
+def object_solid(name: str, described: Object, joint: int) -> Solid:
+    """Return an object; one that a joint carries has its frame, one that is fixed its own place."""
+    place = pin.SE3.Identity()
+    if not joint:
+        place = pin.SE3(pin.Quaternion(described.quaternion).matrix(), np.array(described.position))
+    solid = Solid(
+        name,
+        name,
+        joint,
+        place,
+        described.shape,
+        described.sizes,
+        np.array(place.translation),
+        led=described.mass is None,
+        surface=described.surface,
+    )
+    return solid if joint else replace(solid, range=solid.reach)
+
+
+def add_free_objects(body: RigidBody, objects: Mapping[str, Object]) -> RigidBody:
+    """Return a rigid body with those of some objects that are free or moved as further bodies, after its joints.
+
+    Each is a translation joint with the name of the object, at the origin of the base, and a spherical one, whose name
+    ends in ``_attitude``, that carries it.
+    """
+    model = pin.Model(body.model)
+    for name, each in objects.items():
+        if each.moves:
+            place = pin.SE3.Identity()
+            moved = model.addJoint(0, pin.JointModelTranslation(), place, name)
+            turned = model.addJoint(moved, pin.JointModelSpherical(), place, f"{name}_attitude")
+            # Of one that is moved any will do.
+            moments = np.ones(3) if each.mass is None else each.inertia
+            model.inertias[turned] = pin.Inertia(each.mass or 1.0, np.zeros(3), np.diag(moments))
+    extended = RigidBody(model, [model.frames[tip].name for tip in body.tips])
+    count = body.model.njoints
+    extended.proximal_axes[:count], extended.carriers[:count] = body.proximal_axes, body.carriers
+    return extended
