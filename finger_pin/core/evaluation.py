@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,6 +61,10 @@ class CompiledMechanism:
         self._charts = Charts.of(mechanism)
         self._tables = build_tables(mechanism)
         self._models: dict[tuple[bool, int], BoundModel] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds models of its own."""
+        return CompiledMechanism, (self.mechanism,)
 
     def _model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
         """Return a thread's model that minds forces at the tips or not.

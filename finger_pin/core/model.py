@@ -6,7 +6,7 @@ optimised again there.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -86,6 +86,14 @@ class BoundModel:
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
         self._block = bound(self.model, MODEL)
         self.address = int(self._block.ctypes.data)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled: a copy's address would be that of this one.
+
+        Raises:
+            TypeError: Always.
+        """
+        raise TypeError("a bound model holds addresses: what owns it is copied, and binds another")
 
 
 @Unit

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,6 +172,19 @@ class Part:
             bound.atol,
             bound.memory,
         )
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled by its attributes, many of which are addresses.
+
+        Raises:
+            TypeError: Always.
+        """
+        raise TypeError("an island under way holds addresses: its stepper is copied, and binds another")
+
+    @property
+    def moment(self) -> tuple[Array, ...]:
+        """All that steps have changed and later ones depend on; arrays of its own, which may be filled."""
+        return self.x, self.attitude, self.memory, self.control.tension, self.tables.tip_force, self.tables.bodies
 
     def copy(self) -> Part:
         """Return an independent part that goes on bit by bit alike."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +59,7 @@ class Stepper:
             time: When, s.
         """
         self.mechanism, self._charts = mechanism, Charts.of(mechanism)
+        self._made_of = (mechanism, control, x, tableau, rtol, atol, force, time)
         tables = build_tables(mechanism)
         tables.tip_force[:] = 0.0 if force is None else force
         tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
@@ -188,9 +188,28 @@ class Stepper:
 
     def copy(self) -> Stepper:
         """Return an independent stepper that goes on bit by bit alike."""
-        twin = copy.copy(self)
+        twin = object.__new__(Stepper)
+        twin.__dict__ |= self.__dict__
         twin.parts = [part.copy() for part in self.parts]
         return twin
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds islands of its own."""
+        return (
+            Stepper,
+            self._made_of,
+            [(part.tables.loaded, part.drives, part.knots, part.moment) for part in self.parts],
+        )
+
+    def __setstate__(self, state: list[Any]) -> None:
+        """Go on from where another one stood that was made alike."""
+        for index, (loaded, drives, knots, moment) in enumerate(state):
+            if loaded != self.parts[index].tables.loaded:
+                self.parts[index] = self.parts[index].with_loads(loaded)
+            part = self.parts[index]
+            part.drives, part.knots = drives, knots
+            for own, other in zip(part.moment, moment, strict=True):
+                own[...] = other
 
     def failure(self, status: int, names: tuple[str, ...]) -> str:
         """Say what a status means, with a name for every number of the state; empty if nothing failed."""
