@@ -6,6 +6,8 @@ It reads descriptions, fingers, scenarios and results, and nothing of the simula
 from __future__ import annotations
 
 from finger_pin.analysis.closure import ClosureRange, closure_over_range, locking_over_range, posed
+from finger_pin.analysis.equilibrium import Equilibrium, equilibrium
+from finger_pin.analysis.inverse_kinematics import TipPosture, inverse_kinematics
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
 from finger_pin.analysis.locking_margin import (
@@ -25,6 +27,7 @@ from finger_pin.analysis.tip_statics import Friction
 __all__ = [
     "ClosureRange",
     "CriticalFriction",
+    "Equilibrium",
     "ForcePolytope",
     "Friction",
     "JointReactions",
@@ -34,11 +37,14 @@ __all__ = [
     "SelfLockingMap",
     "SelfLockingMargin",
     "SteadyState",
+    "TipPosture",
     "closure_over_range",
     "critical_friction",
+    "equilibrium",
     "fingertip_loads",
     "force_polytope",
     "gear_shares",
+    "inverse_kinematics",
     "joint_reactions",
     "largest_force",
     "locking_advice",

@@ -92,6 +92,20 @@ class Encoder(Description):
         return self
 
 
+class Winding(Description):
+    """How a winding warms up: C T' = R i^2 - (T - T_a) / R_th, with C = time_constant / R_th."""
+
+    thermal_resistance: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
+        ..., unit="K/W", source="maker's sheet", doc="R_th, from the winding to what surrounds the motor."
+    )
+    time_constant: Annotated[float, real(0.0, 1e6, above=True)] = quantity(
+        ..., unit="s", source="maker's sheet", doc="R_th C, in which it comes within 37 % of where it ends."
+    )
+    ambient: Annotated[float, real(-100.0, 300.0)] = quantity(
+        25.0, unit="degC", source="maker's sheet", doc="T_a, where it begins."
+    )
+
+
 class Motor(Description):
     """A motor with its gearbox, either by its constants or by its data sheet."""
 
@@ -114,6 +128,7 @@ class Motor(Description):
     )
     friction: GearFriction = Field(GearFriction(), description="Of the gearbox.")
     encoder: Encoder | None = Field(None, description="For a position drive.")
+    winding: Winding | None = Field(None, description="For the metric winding_temperature.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -23,6 +23,13 @@ from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
+from finger_pin.studies.response import (
+    fingertip_hysteresis,
+    grip_margin,
+    rows,
+    settling_time,
+    winding_temperature,
+)
 
 #: Greatest tension for the metric of the fingertip force, N.
 FORCE_TENSION = 20.0
@@ -93,12 +100,12 @@ def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
 
 def tracking_rms(run: Run) -> float:
     """Return the root of the mean over time and joints of (theta^d - theta)^2, rad."""
-    return float(np.sqrt(_time_mean(run.result, np.mean(_rows(run.result, "tracking_error", "joint") ** 2, axis=1))))
+    return float(np.sqrt(_time_mean(run.result, np.mean(rows(run.result, "tracking_error", "joint") ** 2, axis=1))))
 
 
 def tracking_peak(run: Run) -> float:
     """Return the largest |theta^d - theta| of any joint, rad."""
-    return float(np.max(np.abs(_rows(run.result, "tracking_error", "joint"))))
+    return float(np.max(np.abs(rows(run.result, "tracking_error", "joint"))))
 
 
 def tension_peak(run: Run) -> float:
@@ -108,7 +115,7 @@ def tension_peak(run: Run) -> float:
 
 def tension_mean(run: Run) -> float:
     """Return the mean over time and tendons of the delivered tension f, N; of passive tendons f5_4."""
-    return _time_mean(run.result, np.mean(_rows(run.result, "tendon_tension", "tendon"), axis=1))
+    return _time_mean(run.result, np.mean(rows(run.result, "tendon_tension", "tendon"), axis=1))
 
 
 def losses(run: Run) -> float:
@@ -130,9 +137,9 @@ def losses_joints(run: Run) -> float:
 
 def slack_time(run: Run) -> float:
     """Return how long at least one tendon, or one half of a passive one, has no tension at one of its ends, s."""
-    delivered = [np.min(_rows(run.result, "tendon_tension", "tendon"), axis=1)]
+    delivered = [np.min(rows(run.result, "tendon_tension", "tendon"), axis=1)]
     if "spool_tension" in run.result:
-        delivered.append(_rows(run.result, "spool_tension", "tendon").min(axis=1))
+        delivered.append(rows(run.result, "spool_tension", "tendon").min(axis=1))
     if "passive_tension_proximal" in run.result:
         delivered.append(_proximal(run.result).min(axis=1))
     slack = (np.min(delivered, axis=0) <= 0.0).astype(float)
@@ -172,10 +179,6 @@ def _fingertip_force(scenario: Scenario) -> float:
     return float(np.min(offsets)) if offsets.size else 0.0
 
 
-def _rows(result: xr.Dataset, name: str, dimension: str) -> Array:
-    return np.asarray(result[name].transpose("time", dimension).values)
-
-
 def _proximal(result: xr.Dataset) -> Array:
     values = np.asarray(result["passive_tension_proximal"].transpose("time", ...).values)
     return values.reshape(len(values), -1)
@@ -183,10 +186,10 @@ def _proximal(result: xr.Dataset) -> Array:
 
 def _ends(result: xr.Dataset) -> list[Array]:
     """Return the tensions at both ends of all tendons; what is planned for passive ones is none."""
-    delivered = _rows(result, "tendon_tension", "tendon")
+    delivered = rows(result, "tendon_tension", "tendon")
     if "spool_tension" in result:
-        return [delivered, _rows(result, "spool_tension", "tendon")]
-    command = _rows(result, "tendon_command", "tendon")
+        return [delivered, rows(result, "spool_tension", "tendon")]
+    command = rows(result, "tendon_command", "tendon")
     if "passive_tension_proximal" not in result:
         return [delivered, command]
     proximal = _proximal(result)
@@ -215,6 +218,10 @@ METRICS = {
         Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
         Metric("slack_time", "s", "time with a slack tendon", slack_time),
         Metric("heat", "J", "heat in the windings of the motors", heat),
+        Metric("winding_temperature", "degC", "highest temperature of a winding", winding_temperature),
+        Metric("fingertip_hysteresis", "m", "fingertip on the way out and back, apart at most", fingertip_hysteresis),
+        Metric("settling_time", "s", "time until all joints stay near their end", settling_time),
+        Metric("grip_margin", "1", "friction that contacts have left at the end, share", grip_margin),
         Metric("current_peak", "A", "largest current of any motor", current_peak),
         Metric("self_locking_margin", "1", "critical over actual joint friction", locking_margin),
         Metric(

@@ -6,6 +6,7 @@ import xarray as xr
 
 import finger_pin as fp
 from finger_pin.analysis import largest_force
+from finger_pin.description.actuators import Winding
 from finger_pin.studies.metrics import FORCE_TENSION, METRICS, Metric, Run, choose
 
 # Uneven times: means over samples would be others.
@@ -113,3 +114,58 @@ def test_a_design_beyond_self_locking_is_measured_without_a_warning():
         fp.simulate(scenario)
     assert METRICS["self_locking_margin"].measure(Run(scenario)) < 1.0
     assert METRICS["tension_peak"].measure(Run(scenario)) > 0.0
+
+
+def test_the_hysteresis_of_a_fingertip_is_the_chord_between_its_two_ways():
+    """One joint turns by 0.05 rad less than it is told to, either way: 2 L sin(0.05) at the end of three links."""
+    run, time, behind = Run(fp.load_scenario("fig6")), np.linspace(0.0, 4.0, 4001), 0.05
+    proximal = np.array([0.0, 1.0, 0.0, 0.0])
+    wanted = (0.7 - 0.3 * np.cos(np.pi * time))[:, None] * proximal
+    reached = wanted - behind * np.sign(np.sin(np.pi * time))[:, None] * proximal
+    data = {"joint_reference": (("time", "joint"), wanted), "joint_position": (("time", "joint"), reached)}
+    run.result = xr.Dataset(data, {"time": time, "joint": list(run.scenario.finger.joints)})
+    length = 45.0e-3 + 29.9e-3 + 21.8e-3
+    assert METRICS["fingertip_hysteresis"].measure(run) == pytest.approx(2.0 * length * np.sin(behind), rel=0.02)
+    run.result["joint_position"] = run.result["joint_reference"]
+    assert METRICS["fingertip_hysteresis"].measure(run) == 0.0
+
+
+def test_the_settling_time_of_a_first_order_response_is_four_time_constants():
+    """1 - exp(-t / T) is within 2 % of its end from t = T ln 50 on."""
+    run = Run(fp.load_scenario("fig6"))
+    time = np.linspace(0.0, 10.0, 100_001)
+    moved = np.stack([1.0 - np.exp(-time / 0.5), 0.0 * time], axis=1)
+    run.result = xr.Dataset({"joint_position": (("time", "joint"), moved)}, {"time": time})
+    assert METRICS["settling_time"].measure(run) == pytest.approx(0.5 * np.log(50.0), abs=2e-4)
+    run.result = run.result * 0.0
+    assert METRICS["settling_time"].measure(run) == 0.0
+
+
+def test_a_winding_warms_up_as_its_closed_form_and_a_motor_without_its_numbers_is_told():
+    scenario = fp.load_scenario("servo")
+    motor = scenario.finger.actuators["M1"].motor
+    warm = motor.model_copy(update={"winding": Winding(thermal_resistance=8.0, time_constant=20.0, ambient=30.0)})
+    actuators = {name: each.model_copy(update={"motor": warm}) for name, each in scenario.finger.actuators.items()}
+    finger = scenario.finger.model_copy(update={"actuators": actuators})
+    run, time = Run(scenario.model_copy(update={"finger": finger})), np.array([0.0, 0.1, 5.0, 30.0])
+    current = np.array([[0.5], [0.5], [0.5], [0.5]]) * np.array([1.0, 0.2, 0.0, 0.0])
+    run.result = xr.Dataset({"motor_current": (("time", "motor"), current)}, {"time": time, "motor": list(actuators)})
+    expected = 30.0 + 8.0 * motor.constants[1] * 0.25 * (1.0 - np.exp(-30.0 / 20.0))
+    assert METRICS["winding_temperature"].measure(run) == pytest.approx(expected, rel=1e-12)
+    # Heat that grows evenly: the integral of exp(-(t - s) / T) s ds.
+    run.result["motor_current"] = run.result.motor_current * 0.0 + np.sqrt(time)[:, None]
+    grown = 8.0 * motor.constants[1] * (30.0 - 20.0 * (1.0 - np.exp(-30.0 / 20.0)))
+    assert METRICS["winding_temperature"].measure(run) == pytest.approx(30.0 + grown, rel=1e-12)
+    with pytest.raises(fp.InputError, match=r"needs motor\.winding"):
+        METRICS["winding_temperature"].measure(Run(scenario))
+
+
+def test_the_grip_margin_is_the_friction_that_is_left_at_the_end():
+    run, time = Run(fp.load_scenario("fig6")), np.linspace(0.0, 1.0, 11)
+    closed = np.array([1.0, 1.0, 0.0])
+    signals = {"normal_force": closed, "level": 0.8 * closed, "friction": [0.2, 0.6, 0.0]}
+    data = {f"contact_{name}": (("time", "contact"), np.tile(each, (11, 1))) for name, each in signals.items()}
+    run.result = xr.Dataset(data, {"time": time})
+    # It slid while it closed.
+    run.result["contact_friction"][0] = run.result["contact_level"][0]
+    assert METRICS["grip_margin"].measure(run) == pytest.approx(0.25)

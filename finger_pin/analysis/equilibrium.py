@@ -1,0 +1,109 @@
+"""Where a finger comes to rest under given tensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+from finger_pin.analysis.finding import Finding
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import finite_vector
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+
+# The descent: its length, s2, and the acceleration, in parts of the first, at which it has arrived.
+_LONGEST, _ARRIVED = 1e4, 1e-6
+# Largest acceleration that is rest, in parts of the joints' and masses' scales over a square second.
+_REST = 1e-4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Finding):
+    """A posture in which a finger is at rest, and stays.
+
+    Attributes:
+        position: theta, shape (n,), rad.
+        passive_position: p_5 of the passive tendons, shape (p,), m.
+        torque: Of the tendons, shape (n,), N m; what weight, limiters, springs and the fingertip hold up.
+        state: The packed state, to start a simulation or a loop from (``initial``, ``Simulator(..., state)``).
+    """
+
+    position: Array
+    passive_position: Array
+    torque: Array
+    state: Array
+
+
+def equilibrium(
+    finger: Finger,
+    tension: Sequence[float] | Array,
+    *,
+    position: Sequence[float] | Array | None = None,
+    force: Sequence[float] | Array = (0.0, 0.0, 0.0),
+) -> Equilibrium:
+    """Return the state at rest under given tensions, that which a finger without friction comes to.
+
+    With friction there are many states at rest around it; this is the one in which no bristle is bent: tau = G, and
+    the state's derivative is zero with friction and without. It lies where the potential energy falls to from a
+    posture, along theta'' at theta' = 0, so that it is stable.
+
+    Args:
+        finger: One finger, with ideal sources of tension.
+        tension: f^a, shape (a,), N.
+        position: theta to begin at, shape (n,), rad; by default the angles of the ranges nearest to zero.
+        force: F at the fingertip, shape (3,), N, base frame.
+
+    Raises:
+        InputError: If a size is wrong, a tension is negative, the finger has servos, objects or rows with states of
+            their own, or it comes to no rest.
+    """
+    layout = finger.layout
+    if finger.description.hand is not None or layout.motors or layout.objects or layout.contacts or layout.further:
+        raise InputError("finger", "must be one finger with ideal sources of tension, without objects")
+    command = np.array(finite_vector("tension", tension, finger.routing.actuated))
+    if np.any(command < 0.0):
+        raise InputError("tension", "must not be negative", command.tolist())
+    pushed = np.array(finite_vector("force", force, 3))
+    joints = len(finger.routing.joints)
+    limits = np.array([joint.range for joint in finger.description.joints.values()], dtype=float)
+    start = np.clip(0.0, *limits.T) if position is None else np.array(finite_vector("position", position, joints))
+    rest = finger.rest_state(start)
+
+    def placed(places: Array) -> Array:
+        x = rest.copy()
+        state = layout.unpack(x)
+        state.position[:], state.passive_position[:] = places[:joints], places[joints:]
+        return x
+
+    def acceleration(places: Array) -> Array:
+        rates = layout.unpack(finger.rhs(0.0, placed(places), command, pushed))
+        return np.concatenate([rates.velocity, rates.passive_velocity])
+
+    state = layout.unpack(rest)
+    places = np.concatenate([state.position, state.passive_position])
+    scale = np.concatenate([np.ones(joints), np.full(len(places) - joints, 1e-3)])
+    begun = float(np.max(np.abs(acceleration(places) / scale)))
+    if begun > _REST:
+
+        def arrived(_: float, y: Array) -> float:
+            return float(np.max(np.abs(acceleration(scale * y) / scale))) - _ARRIVED * begun
+
+        arrived.terminal = True  # type: ignore[attr-defined]
+        down = solve_ivp(
+            lambda _, y: acceleration(scale * y) / scale, (0.0, _LONGEST), places / scale, "Radau", events=arrived,
+            rtol=1e-6, atol=1e-9,
+        )  # fmt: skip
+        # Damped, so that it stays where the finger may rest anywhere.
+        polished = least_squares(lambda y: acceleration(scale * y) / scale, down.y[:, -1], method="lm", xtol=1e-15)
+        nearer = min((down.y[:, -1], polished.x), key=lambda y: np.max(np.abs(acceleration(scale * y) / scale)))
+        places = scale * nearer
+    left = float(np.max(np.abs(acceleration(places) / scale)))
+    if not left < max(_REST, 1e-9 * begun):
+        raise InputError("tension", "the finger comes to no rest under it", command.tolist())
+    x = placed(places)
+    torque = finger.evaluate(x, command, pushed).tendon_torque
+    return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)

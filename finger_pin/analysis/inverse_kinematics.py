@@ -1,0 +1,98 @@
+"""The posture whose fingertip is at a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from finger_pin.analysis.finding import Finding
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.hand import one_finger
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import finite_vector
+from finger_pin.mechanism.finger import Finger
+
+# A fingertip this close, m, is there.
+_THERE = 1e-6
+# Weight of a posture near the wanted one against the distance, m/rad: it decides between postures that all reach.
+_NEAR = 1e-9
+# Shares of the joints' ranges from which a search begins, and most of their combinations.
+_STARTS, _MOST = (0.1, 0.5, 0.9), 27
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TipPosture(Finding):
+    """The posture whose fingertip is nearest to a point.
+
+    Attributes:
+        position: theta, shape (n,), rad.
+        tip: Where the fingertip is, shape (3,), m, base frame.
+        distance: From the point, m.
+    """
+
+    position: Array
+    tip: Array
+    distance: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether the fingertip is at the point, to a micrometre."""
+        return self.distance < _THERE
+
+
+def inverse_kinematics(
+    finger: Finger, point: Sequence[float] | Array, *, near: Sequence[float] | Array | None = None
+) -> TipPosture:
+    """Return the posture, within the joints' ranges, whose fingertip is nearest to a point.
+
+    Joints that passive tendons drive follow the others as (4) has it, H_c theta = 0 in their rows: tendons that carry
+    nothing. Of several postures that reach the point it is one near the wanted posture.
+
+    Args:
+        finger: One finger.
+        point: Of the fingertip, shape (3,), m, base frame.
+        near: theta that is preferred, shape (n,), rad; by default the angles of the ranges nearest to zero.
+
+    Raises:
+        InputError: If the point or the preferred posture has a wrong size, or it is a hand.
+    """
+    one_finger(finger.description)
+    target = np.array(finite_vector("point", point, 3))
+    limits = np.array([joint.range for joint in finger.description.joints.values()], dtype=float)
+    low, high = np.clip(limits, -np.pi, np.pi).T
+    wanted = np.clip(0.0, low, high) if near is None else np.array(finite_vector("near", near, len(low)))
+    routing = finger.routing
+    coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
+    free = [joint for joint in range(len(low)) if joint not in coupling.followers]
+    followers, moved = list(coupling.followers), coupling.matrix[:, free]
+    body = finger.rigid_body
+
+    def misses(angles: Array) -> Array:
+        theta = moved @ angles
+        # A driven joint has a range as well: what is beyond it counts as if the tip were as far away, m/rad.
+        beyond = np.maximum(0.0, low - theta)[followers] + np.maximum(0.0, theta - high)[followers]
+        return np.concatenate([body.tip_position(theta) - target, beyond, _NEAR * (theta - wanted)])
+
+    def slopes(angles: Array) -> Array:
+        theta = moved @ angles
+        side = (theta > high).astype(float) - (theta < low)
+        return np.concatenate([body.jacobian(theta) @ moved, (side[:, None] * moved)[followers], _NEAR * moved])
+
+    span = high[free] - low[free]
+    starts = [np.clip(wanted[free], low[free], high[free])]
+    starts += [low[free] + np.array(shares) * span for shares in list(product(_STARTS, repeat=len(free)))[:_MOST]]
+    found: list[tuple[float, Array]] = []
+    for start in starts:
+        # Strictly inside, as bounded least squares want it.
+        inside = np.clip(start, low[free] + 1e-6 * span, high[free] - 1e-6 * span)
+        best = least_squares(misses, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        found.append((float(best.cost), moved @ best.x))
+        if np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE:
+            break
+    theta = min(found, key=lambda each: each[0])[1]
+    tip = np.asarray(body.tip_position(theta))
+    return TipPosture(theta, tip, float(np.linalg.norm(tip - target)))

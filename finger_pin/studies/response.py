@@ -1,0 +1,121 @@
+"""Metrics of how a finger responds: hysteresis, settling, heat in windings, and how sure a grip is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+
+if TYPE_CHECKING:
+    from finger_pin.studies.metrics import Run
+
+#: Parts of its travel in which the ways of a fingertip are compared.
+HYSTERESIS_BINS = 20
+#: Share of its travel from its end that a joint is settled within.
+SETTLED = 0.02
+#: Share of a run, at its end, that a grip is judged by.
+GRIP_TIME = 0.1
+
+
+def rows(result: xr.Dataset, name: str, dimension: str) -> Array:
+    """Return a variable of a result by time and one more dimension."""
+    return np.asarray(result[name].transpose("time", dimension).values)
+
+
+def winding_temperature(run: Run) -> float:
+    """Return the highest temperature of any winding, degC: C T' = R i^2 - (T - T_a) / R_th, from T_a on.
+
+    Between samples the heat is linear in time, for which the equation is solved in closed form.
+
+    Raises:
+        InputError: If no motor says how its winding warms up.
+    """
+    highest = []
+    for name, actuator in run.scenario.finger.actuators.items():
+        winding = actuator.motor.winding
+        if winding is None:
+            continue
+        _, resistance, _ = actuator.motor.constants
+        time = run.result["time"].values
+        level = winding.thermal_resistance * resistance * run.result["motor_current"].sel(motor=name).values ** 2
+        steps = np.diff(time) / winding.time_constant
+        kept, above = np.exp(-steps), 0.0
+        # Of the integral of exp(-(h - s)) times 1 and s / h over a step of h time constants.
+        whole = -np.expm1(-steps)
+        late = np.where(steps > 1e-4, 1.0 - whole / np.maximum(steps, 1e-300), 0.5 * steps)
+        gained = level[:-1] * (whole - late) + level[1:] * late
+        peak = 0.0
+        for share, more in zip(kept, gained, strict=True):
+            above = share * above + more
+            peak = max(peak, above)
+        highest.append(winding.ambient + peak)
+    if not highest:
+        raise InputError("finger.actuators", "the metric winding_temperature needs motor.winding of a motor")
+    return float(max(highest))
+
+
+def fingertip_hysteresis(run: Run) -> float:
+    """Return how far apart the fingertip is on the way out and on the way back where its reference is the same, m.
+
+    Way and place are those of the fingertip of the reference along the direction in which it moves most; the ways are
+    compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less that of the reference. Of a hand the
+    largest of its fingers; 0 where the reference does not move to and fro.
+    """
+    return max(_hysteresis(run.result, name, part) for name, part in run.scenario.parts().items())
+
+
+def _hysteresis(result: xr.Dataset, name: str, scenario: Scenario) -> float:
+    finger = Finger(scenario.finger)
+    hand = any("." in str(each) for each in result["joint"].values)
+    joints = [f"{name}.{joint}" if hand else joint for joint in finger.routing.joints]
+    wanted, tip = (
+        finger.motion(angles, np.zeros_like(angles)).tip.reshape(-1, 3)
+        for angles in (rows(result.sel(joint=joints), each, "joint") for each in ("joint_reference", "joint_position"))
+    )
+    centred = wanted - wanted.mean(axis=0)
+    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    travel = float(np.ptp(along))
+    if travel < 1e-9:
+        return 0.0
+    place = np.minimum((HYSTERESIS_BINS * (along - along.min()) / travel).astype(int), HYSTERESIS_BINS - 1)
+    out = np.gradient(along) > 0.0
+    error, apart = tip - wanted, 0.0
+    for part in range(HYSTERESIS_BINS):
+        there, back = (error[(place == part) & way] for way in (out, ~out))
+        if len(there) and len(back):
+            apart = max(apart, float(np.linalg.norm(there.mean(axis=0) - back.mean(axis=0))))
+    return apart
+
+
+def settling_time(run: Run) -> float:
+    """Return the time from which every joint stays within 2 % of its travel of where it ends, s."""
+    position = rows(run.result, "joint_position", "joint")
+    away = np.abs(position - position[-1])
+    # A joint that rounding alone moves is where it ends.
+    outside = np.any(away > np.maximum(SETTLED * away.max(axis=0), 1e-9), axis=1)
+    time = run.result["time"].values
+    return float(time[np.flatnonzero(outside)[-1] + 1] - time[0]) if outside.any() else 0.0
+
+
+def grip_margin(run: Run) -> float:
+    """Return what is left of the friction that contacts could have, as a share, over the last tenth of the run.
+
+    1 - f^t / (what friction can be at that normal force), the least of all contacts that are closed and all times: 1
+    where nothing rubs, 0 where something slides, and where nothing is touched.
+    """
+    result = run.result
+    if "contact_friction" not in result:
+        return 0.0
+    time = result["time"].values
+    last = time >= time[-1] - GRIP_TIME * (time[-1] - time[0])
+    level, friction, normal = (
+        rows(result, f"contact_{name}", "contact")[last] for name in ("level", "friction", "normal_force")
+    )
+    closed = (normal > 0.0) & (level > 0.0)
+    return float(np.clip(np.min(1.0 - friction[closed] / level[closed]), 0.0, 1.0)) if closed.any() else 0.0

@@ -1,0 +1,75 @@
+"""Postures that are looked for: that of a fingertip at a point, and that in which a finger rests."""
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+import finger_pin as fp
+from finger_pin.analysis import equilibrium, inverse_kinematics
+
+A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
+
+
+def equation_1(theta):
+    """Fingertip of the paper's finger, written out."""
+    t1, t2, t23, t234 = theta[0], theta[1], theta[1] + theta[2], theta[1] + theta[2] + theta[3]
+    reach = A1 + A2 * np.cos(t2) + A3 * np.cos(t23) + A4 * np.cos(t234)
+    return np.array([np.cos(t1) * reach, np.sin(t1) * reach, A2 * np.sin(t2) + A3 * np.sin(t23) + A4 * np.sin(t234)])
+
+
+def test_the_fingertip_is_put_to_points_of_equation_1_with_the_passive_tendon_slack():
+    random, finger = np.random.default_rng(3), fp.Finger("ub")
+    for _ in range(20):
+        t1, t2, t3 = random.uniform([-0.17, 0.05, 0.05], [0.17, 1.5, 1.5])
+        found = inverse_kinematics(finger, equation_1([t1, t2, t3, 0.7 * t3]))
+        assert found.reached
+        np.testing.assert_allclose(equation_1(found.position), equation_1([t1, t2, t3, 0.7 * t3]), atol=1e-8)
+        assert found.position[3] == pytest.approx(0.7 * found.position[2], abs=1e-12)
+
+
+def test_of_two_postures_of_a_planar_finger_the_one_near_the_wanted_is_found_and_what_is_out_of_reach_is_told():
+    finger = fp.Finger("planar")
+    l1, l2 = (joint.link.length for joint in finger.description.joints.values())
+    # The law of cosines: elbow bent by +-arccos.
+    radius, bend = 0.8 * (l1 + l2), np.arccos((0.64 * (l1 + l2) ** 2 - l1**2 - l2**2) / (2.0 * l1 * l2))
+    found = inverse_kinematics(finger, [radius * np.cos(0.9), radius * np.sin(0.9), 0.0], near=[0.4, 0.9])
+    assert found.position[1] == pytest.approx(bend, abs=1e-6)
+    assert found.position[0] == pytest.approx(0.9 - np.arctan2(l2 * np.sin(bend), l1 + l2 * np.cos(bend)), abs=1e-6)
+    away = inverse_kinematics(finger, [2.0 * (l1 + l2) * np.cos(0.5), 2.0 * (l1 + l2) * np.sin(0.5), 0.0])
+    assert not away.reached and away.distance == pytest.approx(l1 + l2, rel=1e-6)
+    np.testing.assert_allclose(away.position, [0.5, 0.0], atol=1e-4)
+    with pytest.raises(fp.InputError, match="point"):
+        inverse_kinematics(finger, [0.1, 0.1])
+
+
+def test_a_finger_rests_where_its_weight_balances_the_tensions_and_stays_there():
+    """Two links in a vertical plane, weight towards y: the torques of their weights, written out."""
+    up = fp.Finger(fp.load_finger("planar", {"finger.gravity": [0.0, 9.81, 0.0]}))
+    (m1, l1), (m2, l2) = ((joint.link.mass, joint.link.length) for joint in up.description.joints.values())
+    theta = np.array([0.5, 0.4])
+    second = m2 * 9.81 * 0.5 * l2 * np.cos(theta.sum())
+    weight = np.array([(0.5 * m1 + m2) * 9.81 * l1 * np.cos(theta[0]) + second, second])
+    # Flexors and the extensor, radii in the file; least squares with tensions that pull.
+    tension = nnls(np.array([[6e-3, 2e-3, -8e-3], [0.0, 5.5e-3, -5.5e-3]]), -weight)[0]
+    found = equilibrium(up, tension, position=[0.9, 1.1])
+    np.testing.assert_allclose(found.position, theta, atol=1e-7)
+    np.testing.assert_allclose(found.torque, -weight, atol=1e-9)
+    sim = fp.Simulator(up, position=found.position)
+    sim.x = found.state
+    for _ in range(50):
+        state = sim.step(tension, 1e-3)
+    np.testing.assert_allclose(state.position, theta, atol=1e-7)
+
+
+def test_a_finger_with_a_passive_tendon_rests_and_what_cannot_is_told():
+    finger = fp.Finger("ub")
+    found = equilibrium(finger, [1.0, 1.0, 1.2, 0.3], position=[0.0, 0.8, 0.8, 0.5], force=[0.0, 0.02, 0.0])
+    rate = finger.rhs(0.0, found.state, np.array([1.0, 1.0, 1.2, 0.3]), np.array([0.0, 0.02, 0.0]))
+    assert np.abs(rate).max() < 1e-5
+    # Where nothing pulls either way it stays where it was.
+    free = fp.Finger(fp.load_finger("ub", {"finger.gravity": [0.0, 0.0, 0.0]}))
+    np.testing.assert_allclose(equilibrium(free, np.zeros(4), position=[0.05, 0.5, 0.5, 0.35]).position[0], 0.05)
+    with pytest.raises(fp.InputError, match="negative"):
+        equilibrium(finger, [1.0, -1.0, 1.0, 1.0])
+    with pytest.raises(fp.InputError, match="ideal sources"):
+        equilibrium(fp.Finger(fp.load_scenario("servo").finger), np.ones(4))
