@@ -45,9 +45,9 @@ COMMAND = re.compile(r"(python (-m|scripts/)|finger-pin )")
 EXPRESSION = re.compile(r"fp\.[\w.]+\(.*\)")
 
 
-def not_painted(figure, path):
+def not_painted(figure, path, format=None):
     assert figure.axes
-    target = Path(path)
+    target = Path(path) if Path(path).suffix else Path(f"{path}.{format or 'png'}")
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text("painted")
     return target
