@@ -16,6 +16,7 @@ import typer
 from finger_pin.commands import (
     conclusions,
     controllers,
+    export,
     force_capability,
     identify,
     optimise,
@@ -43,6 +44,7 @@ COMMANDS = (
     reaction.reaction,
     self_locking.self_locking,
     force_capability.force_capability,
+    export.export,
     reproduce.reproduce,
     validate.validate,
 )

@@ -1,7 +1,9 @@
-"""A result as a netCDF file."""
+"""A result as a file: netCDF, which holds all of it, or CSV, which holds its signals."""
 
 from __future__ import annotations
 
+import csv
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,11 +14,18 @@ if TYPE_CHECKING:
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a result to a netCDF4 file, whole or not at all.
+    """Write a result to a file, whole or not at all: netCDF4, or its signals as CSV where the name ends with .csv.
+
+    A column of CSV is a signal of one joint, tendon or the like, such as ``joint_position[distal] (rad)``; a row is a
+    sample. Numbers are written so that reading them gives the same floats.
 
     Raises:
         OSError: If it cannot be written, such as on a full disk.
     """
+    if Path(path).suffix == ".csv":
+        with replacing(path) as temporary:
+            _write_csv(dataset, temporary)
+        return
     with replacing(path) as temporary:
         try:
             dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
@@ -25,6 +34,23 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
             with open(temporary, "ab") as file:
                 file.write(bytes(dataset.nbytes + 2**20))
             raise OSError(f"{Path(path).name}: {error}") from error
+
+
+def _write_csv(dataset: xr.Dataset, path: str | Path) -> None:
+    columns = {"time (s)": dataset["time"].values}
+    for name, signal in dataset.items():
+        if "time" not in signal.dims:
+            continue
+        others = [dimension for dimension in signal.dims if dimension != "time"]
+        labels = product(*(dataset[each].values if each in dataset else range(signal.sizes[each]) for each in others))
+        values = signal.transpose("time", *others).values.reshape(signal.sizes["time"], -1)
+        for label, column in zip(labels, values.T, strict=True):
+            which = f"[{' '.join(map(str, label))}]" if label else ""
+            columns[f"{name}{which} ({signal.attrs.get('units', '1')})"] = column
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
 
 
 def load_result(path: str | Path) -> xr.Dataset:

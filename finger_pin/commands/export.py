@@ -1,0 +1,99 @@
+"""The command export: fingers and results as files that other programs read."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from finger_pin.commands.console import print_text
+from finger_pin.commands.options import Settings, overrides, wrong
+
+if TYPE_CHECKING:
+    from finger_pin.description.hand import HandDescription
+    from finger_pin.description.parameters import FingerDescription
+    from finger_pin.description.scenario import Scenario
+
+#: What a file's name may end with.
+ENDINGS = (".urdf", ".xml", ".toml", ".csv")
+
+
+def export(
+    source: Annotated[
+        str,
+        typer.Argument(metavar="SOURCE", help="A finger, hand or scenario: name or .toml; or results: folder or .nc."),
+    ] = "ub",
+    target: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="FILE", help="Ends with .urdf, .xml (MJCF), .toml or .csv (results); default <name>.urdf."
+        ),
+    ] = None,
+    settings: Settings = [],  # noqa: B006
+) -> None:
+    """Write a finger as URDF, MJCF or TOML, or the signals of a result as CSV."""
+    from finger_pin.files import replacing
+
+    results = Path(source).is_dir() or source.endswith(".nc")
+    if target is None:
+        target = Path(f"{Path(source).stem}{'.csv' if results else '.urdf'}")
+    if target.suffix not in ENDINGS:
+        raise wrong("FILE", f"{target}: must end with {', '.join(ENDINGS)}")
+    if results != (target.suffix == ".csv"):
+        what = (
+            "signals are written as .csv"
+            if results
+            else "has no signals; simulate it, and give the folder of its results"
+        )
+        raise wrong("SOURCE", f"{source}: {what}")
+    text = "" if results else written(described(source, settings), target.suffix)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if results:
+        from finger_pin.simulation.netcdf import load_result, save
+
+        save(load_result(source), target)
+    else:
+        with replacing(target) as temporary:
+            Path(temporary).write_text(text, encoding="utf-8", newline="\n")
+    print_text(f"wrote {target}")
+
+
+def described(source: str, settings: list[str]) -> FingerDescription | HandDescription | Scenario:
+    """Return the finger, hand or scenario of a name, or of what stands in a file."""
+    from finger_pin.description.loading import list_fingers, list_hands, load_finger, load_hand, load_scenario
+
+    changed, tables = overrides(settings), {"joints", "tendons", "base", "fingers"}
+    if source.endswith(".toml") and Path(source).is_file():
+        with open(source, "rb") as file:
+            try:
+                tables &= tomllib.load(file).keys()
+            except (tomllib.TOMLDecodeError, UnicodeDecodeError):
+                # Reading it as a scenario says what is wrong with it.
+                tables = set()
+        finger, hand = bool(tables) and "fingers" not in tables, "fingers" in tables
+    else:
+        finger, hand = source in list_fingers(), source in list_hands()
+    if hand:
+        return load_hand(source, changed)
+    return load_finger(source, changed) if finger else load_scenario(source, changed)
+
+
+def written(described: FingerDescription | HandDescription | Scenario, ending: str) -> str:
+    """Return a description as the text of a file."""
+    from finger_pin.description.hand import HandDescription, one_finger
+    from finger_pin.description.loading import to_toml
+    from finger_pin.description.scenario import Scenario
+    from finger_pin.mechanism.mjcf import to_mjcf
+    from finger_pin.mechanism.urdf import to_urdf
+
+    if ending == ".toml":
+        return to_toml(described)
+    if isinstance(described, Scenario):
+        described = described.hand or described.finger
+    if ending == ".xml":
+        return to_mjcf(described)
+    finger = described.joined() if isinstance(described, HandDescription) else described
+    one_finger(finger)
+    return to_urdf(finger)
