@@ -87,6 +87,21 @@ class Interrupted(FingerPinError):
         super().__init__(f"interrupted at t = {time:.6g} s")
 
 
+class InterruptedByKeyboard(KeyboardInterrupt):
+    """Ctrl-C ended a simulation before its end; no `except Exception` takes it for an error.
+
+    Attributes:
+        time: Simulated time reached, s.
+        result: Everything up to ``time``, or None if nothing was computed.
+    """
+
+    def __init__(self, time: float, result: xr.Dataset | None = None) -> None:
+        """Keep what was computed."""
+        self.time = time
+        self.result = result
+        super().__init__(f"interrupted at t = {time:.6g} s; the exception's result holds what was computed")
+
+
 class StudyError(FingerPinError):
     """Every run of a study failed.
 

@@ -18,6 +18,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import Motions, record, variables
 from finger_pin.simulation.running import Setup, run
@@ -108,10 +109,14 @@ class Prepared:
             InputError: Naming the entry that is wrong.
             IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
             Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
+            InterruptedByKeyboard: After Ctrl-C, a KeyboardInterrupt; its ``result`` likewise.
         """
         scenario = self.scenario(values)
         setup = Setup.of(scenario, _started(scenario, initial))
         self._check(setup.loop)
+        return interruptible(lambda asked: self._run(scenario, setup, asked), stop)
+
+    def _run(self, scenario: Scenario, setup: Setup, stop: Stop) -> Recording:
         trajectory = setup.integrate(stop=stop)
         motions = Motions(setup.loop, trajectory, scenario.sample_times())
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -141,7 +146,8 @@ class Prepared:
         """
         scenario = self.scenario(values)
         own = own_parts(None, None, None, initial)
-        return run(scenario, _started(scenario, initial), own, progress=progress, stop=stop).dataset()
+        started = _started(scenario, initial)
+        return interruptible(lambda asked: run(scenario, started, own, progress=progress, stop=asked), stop).dataset()
 
     def _check(self, loop: ClosedLoop) -> None:
         """Raise unless the result of a loop has everything that is recorded."""

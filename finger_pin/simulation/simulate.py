@@ -17,6 +17,7 @@ from finger_pin.core.textbook import Stop
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.running import run
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -74,6 +75,7 @@ def simulate(
             result cannot fit into memory.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
         Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
+        InterruptedByKeyboard: After Ctrl-C, a KeyboardInterrupt; its ``result`` likewise.
 
     Warns:
         SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;
@@ -89,4 +91,6 @@ def simulate(
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
     own = own_parts(controller, reference, fingertip_force, initial, finger)
-    return run(scenario, loop, own, control_period, progress, observe, stop).dataset()
+    return interruptible(
+        lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop
+    ).dataset()

@@ -1,5 +1,6 @@
 """simulate(): repeatable, interruptible, and with a user's own blocks."""
 
+import signal
 from dataclasses import dataclass
 
 import numpy as np
@@ -225,3 +226,22 @@ def test_names_and_paths_will_do_for_a_scenario_and_a_finger(tmp_path):
     assert fp.Finger("ub").description == fp.load_finger("ub")
     with pytest.raises(fp.InputError, match="no such finger"):
         fp.Finger("no_such_hand")
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_ctrl_c_in_python_keeps_what_was_computed(late):
+    """Before the end, and when all steps are done."""
+    prepared, presses = fp.prepare(short(0.3)), []
+
+    def once(time):
+        if not presses and time > (0.29 if late else 0.01):
+            presses.append(time)
+            signal.raise_signal(signal.SIGINT)
+
+    for run in (lambda: fp.simulate(prepared.scenario(), progress=once), lambda: prepared.simulate(progress=once)):
+        presses.clear()
+        with pytest.raises(KeyboardInterrupt) as caught:
+            run()
+        assert presses and float(caught.value.result.time[-1]) == pytest.approx(caught.value.time, abs=1e-3)
+        assert (caught.value.time > 0.29) == late
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
