@@ -14,7 +14,7 @@ from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import Samples, choose_controller, choose_reference
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
-from finger_pin.control.position_drive import GivenVoltages, PositionDrives
+from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
@@ -86,7 +86,7 @@ class ClosedLoop:
     dynamics: Dynamics
     varying_force: Signal | None = None
     start: Array | None = None
-    drives: PositionDrives | GivenVoltages | None = None
+    drives: DriveSignals | None = None
     parts: tuple[ClosedLoop, ...] = ()
     palm: PalmPath | None = None
     guides: Guides | None = None

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,29 @@ from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.reference import Reference, ReferenceSignals
 from finger_pin.control.signal import Signal
 from finger_pin.core.drives import Drives
+from finger_pin.description.actuators import Actuator
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 
-@dataclass(frozen=True, eq=False)
+class DriveSignals(Protocol):
+    """What motors in position drive are given over time.
+
+    Attributes:
+        channels: The inputs that are voltages, shape (m,).
+    """
+
+    channels: NDArray[np.int64]
+
+    def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
+        """Return what is asked for."""
+
+    def voltages(self, time: Array | float) -> Array:
+        """Return the voltages at one time, shape (m,), or at times (k,), shape (k, m), V."""
+
+
+@dataclass(eq=False)
 class GivenVoltages:
     """Voltages that a caller sets, as `Simulator.step` does: nothing is planned for their tendons.
 
@@ -64,13 +82,7 @@ class PositionDrives:
         Raises:
             InputError: If a goal is beyond what its encoder can be told, or drives differ in their period.
         """
-        chosen = [each for each in finger.description.actuators.items() if each[1].drive == "position"]
-        loops = [actuator.position_loop for _, actuator in chosen]
-        period = loops[0].period
-        for (name, _), loop in zip(chosen, loops, strict=True):
-            if loop.period != period:
-                entry = f"finger.actuators.{name}.position_loop.period"
-                raise InputError(entry, f"must be that of the others, {period:g} s", loop.period)
+        period = loop_period(finger)
         self._controller, actuators = controller, finger.actuators
         self._positioned = np.isin(np.arange(finger.routing.actuated), actuators.positioned)
         self.channels = actuators.voltages
@@ -79,26 +91,13 @@ class PositionDrives:
         planned = controller.command(times, wanted, wanted.position, wanted.velocity).tension
         drawn = finger.excursion(wanted.position)
         goals = actuators.angle(wanted.position, planned[:, : finger.routing.actuated], drawn)[:, actuators.holds]
-        encoders = [actuator.motor.encoder for _, actuator in chosen]
-        for (name, _), encoder, goal in zip(chosen, encoders, goals.T, strict=True):
+        for (name, actuator), goal in zip(_positioned(finger), goals.T, strict=True):
+            encoder = actuator.motor.encoder
             least, most = float(goal.min()), float(goal.max())
             if encoder is not None and not encoder.range[0] <= least <= most <= encoder.range[1]:
                 allowed = f"the motion takes the spool from {least:.4g} to {most:.4g} rad"
                 raise InputError(f"finger.actuators.{name}.motor.encoder.range", allowed, list(encoder.range))
-        self.compiled = Drives(
-            motors=np.arange(len(chosen)),
-            places=finger.mechanism.coordinates - len(actuators.names) + np.flatnonzero(actuators.holds),
-            channels=self.channels,
-            period=period,
-            goals=np.ascontiguousarray(goals),
-            resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
-            gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
-            supply=np.array([actuator.motor.voltage for _, actuator in chosen]),
-            taken=np.zeros(1, dtype=np.int64),
-            integral=np.zeros(len(chosen)),
-            last=np.zeros(len(chosen)),
-            voltages=np.zeros(goals.shape),
-        )
+        self.compiled = build_drives(finger, goals)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return what is asked for, with what the goals are made of in place of what errors ask for."""
@@ -113,3 +112,48 @@ class PositionDrives:
         index = np.floor(np.asarray(time) / self.compiled.period * (1.0 + 1e-12)).astype(int)
         held: Array = self.compiled.voltages[np.clip(index, 0, len(self.compiled.voltages) - 1)]
         return held
+
+
+def _positioned(finger: Finger) -> list[tuple[str, Actuator]]:
+    return [each for each in finger.description.actuators.items() if each[1].drive == "position"]
+
+
+def loop_period(finger: Finger) -> float:
+    """Return the sampling period of all motors of a finger in position drive, s.
+
+    Raises:
+        InputError: If drives differ in their period.
+    """
+    chosen = _positioned(finger)
+    period = chosen[0][1].position_loop.period
+    for name, actuator in chosen:
+        if actuator.position_loop.period != period:
+            entry = f"finger.actuators.{name}.position_loop.period"
+            raise InputError(entry, f"must be that of the others, {period:g} s", actuator.position_loop.period)
+    return period
+
+
+def build_drives(finger: Finger, goals: Array) -> Drives:
+    """Return the loops of all motors of a finger in position drive, m of them.
+
+    Args:
+        finger: The finger.
+        goals: theta_m^d at multiples of their period, shape (k, m), rad.
+    """
+    chosen = [actuator for _, actuator in _positioned(finger)]
+    loops, encoders = [each.position_loop for each in chosen], [each.motor.encoder for each in chosen]
+    actuators = finger.actuators
+    return Drives(
+        motors=np.arange(len(chosen)),
+        places=finger.mechanism.coordinates - len(actuators.names) + np.flatnonzero(actuators.holds),
+        channels=actuators.voltages,
+        period=loop_period(finger),
+        goals=np.ascontiguousarray(goals),
+        resolution=np.array([encoder.resolution for encoder in encoders if encoder is not None]),
+        gains=np.ascontiguousarray(np.array([[e.proportional, e.derivative, e.integral] for e in loops]).T),
+        supply=np.array([each.motor.voltage for each in chosen]),
+        taken=np.zeros(1, dtype=np.int64),
+        integral=np.zeros(len(chosen)),
+        last=np.zeros(len(chosen)),
+        voltages=np.zeros(goals.shape),
+    )

@@ -149,13 +149,16 @@ class Part:
             self._blocks += [passed.view(np.uint8), bound(knotted, KNOTTED)]
             self._advance = advance_knotted
 
-    def restart(self, x: Array, attitude: Array) -> None:
-        """Go on from another state at the same time, with no memory of earlier steps."""
+    def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
+        """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
         self.x[:], self.attitude[:] = x, attitude
         self.work.paths.asleep[:] = 0
         place_all(self.tables, self.attitude)
         self.memory[[core.LAST_STEP, core.LAST_ERROR, core.CULPRIT, core.HELD_STEP]] = 0.0
         self.memory[core.STEP] = FIRST_STEP
+        if time is not None:
+            # Steps are counted from here on, for those that creep.
+            self.memory[[core.TIME, core.WINDOW_START, core.WINDOW_END]] = time, 0.0, 0.0
 
     def with_loads(self, loaded: bool) -> Part:
         """Return the same part that minds forces at the tips, or not."""

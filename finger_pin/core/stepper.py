@@ -140,11 +140,11 @@ class Stepper:
             attitude[..., free, :] = own
         return self._charts.to_packed(whole, attitude)
 
-    def restart(self, x: Array) -> None:
-        """Go on from another state at the same time, with no memory of earlier steps."""
+    def restart(self, x: Array, time: float | None = None) -> None:
+        """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         for part, free in zip(self.parts, self._free, strict=True):
-            part.restart(start[self._places(part.island)], attitude[free])
+            part.restart(start[self._places(part.island)], attitude[free], time)
 
     def drive(self, drives: Drives) -> None:
         """Let loops of motors run from now on, in every island those of its rotors; what they do they share."""

@@ -110,18 +110,19 @@ class Motions:
 
     Attributes:
         loop: The system.
+        trajectory: Its solution.
         times: Shape (m,), s, as far as the trajectory goes.
     """
 
     def __init__(self, loop: ClosedLoop, trajectory: Trajectory, times: Array) -> None:
         """Compute nothing yet."""
-        self.loop, self._trajectory = loop, trajectory
+        self.loop, self.trajectory = loop, trajectory
         self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
 
     @cached_property
     def packed(self) -> Array:
         """The packed states, shape (m, size)."""
-        return self._trajectory.interpolate(self.times)
+        return self.trajectory.interpolate(self.times)
 
     @cached_property
     def state(self) -> State:
@@ -171,7 +172,7 @@ class Motions:
     @cached_property
     def account(self) -> Account:
         """The energy account."""
-        return account(self.loop, self._trajectory, self.times, self.signals, self.motion)
+        return account(self.loop, self.trajectory, self.times, self.signals, self.motion)
 
 
 def variables(loop: ClosedLoop) -> dict[str, Variable]:

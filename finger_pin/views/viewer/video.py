@@ -13,16 +13,19 @@ import numpy as np
 import scipy.spatial
 import xarray as xr
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.files import replacing
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.simulation.recorded import Recording
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Motion
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
@@ -37,6 +40,7 @@ _ROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 #: Pixels of a film's width, and of that of a GIF, which is large for its size.
 _WIDTH, _GIF_WIDTH = 1200, 720
 _INCHES = (10.0, 6.0)
+_NO_POINTS = np.zeros((0, 3))
 #: Frames out of which the view is found.
 _FEW = 25
 
@@ -82,6 +86,24 @@ def write_video(
     return target
 
 
+@styled
+def draw_picture(result: xr.Dataset | Recording, stage: Array) -> NDArray[np.uint8]:
+    """Return a picture of the last sample of a result, shape (height, width, 3).
+
+    Args:
+        result: What `simulate` returned, or a part of it that has what is shown.
+        stage: Points that are in view whatever the posture, shape (k, 3), m, base frame.
+    """
+    figure = new_figure(*_INCHES, layout=None)
+    figure.set_dpi(_GIF_WIDTH / _INCHES[0])
+    figure.set_facecolor(_BACKGROUND)
+    motion = Motion.of(result)
+    _Film(figure, motion, stage).show(len(motion.time) - 1)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    return np.array(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+
+
 def _writer(gif: bool, rate: float) -> AbstractMovieWriter:
     if FFMpegWriter.isAvailable():
         return FFMpegWriter(fps=rate)  # type: ignore[arg-type]
@@ -102,8 +124,8 @@ class _Solid:
 class _Film:
     """A motion on a figure, a frame at a time."""
 
-    def __init__(self, figure: Figure, motion: Motion) -> None:
-        """Set the stage: camera, legend, and what stays."""
+    def __init__(self, figure: Figure, motion: Motion, stage: Array = _NO_POINTS) -> None:
+        """Set the stage: camera, legend, and what stays; further points that are in view have shape (k, 3), m."""
         scene = motion.scene
         self.motion = motion
         self.poses = scene.geometry.poses(motion.position, motion.palm)
@@ -131,6 +153,7 @@ class _Film:
         seen = np.concatenate(
             [
                 self.tips.reshape(-1, 2),
+                stage @ self.camera[:2].T,
                 np.zeros((0, 2)) if things is None else things.seen() @ self.camera[:2].T,
                 *(self._outline(solid, frame) for frame in few for solid in own),
             ]

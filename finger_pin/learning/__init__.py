@@ -1,0 +1,16 @@
+"""Environments for learning: any scenario, with friction, slack and servos, and every number open to be drawn.
+
+Importing this room registers ``finger_pin/Reach-v0``, ``finger_pin/Press-v0`` and ``finger_pin/Grasp-v0`` with
+Gymnasium, which comes with the extra ``gymnasium``.
+"""
+
+from finger_pin.learning.distributions import Choice, LogUniform, Normal, Uniform
+from finger_pin.learning.environment import Environment
+from finger_pin.learning.sensors import Sensor
+from finger_pin.learning.tasks import register
+from finger_pin.learning.vector_environment import VectorEnvironment
+
+__all__ = ["Choice", "Environment", "LogUniform", "Normal", "Sensor", "Uniform", "VectorEnvironment"]
+
+
+register()

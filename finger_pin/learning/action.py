@@ -1,0 +1,190 @@
+"""What a policy does to a finger: tensions that are held, or goals of motors in position drive."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger_pin.control.position_drive import build_drives, loop_period
+from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.core.drives import Drives
+from finger_pin.core.stepper import Stepper
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+
+# Tension that an action may ask for by default, and by which it may stretch a tendon on a spool, N.
+_STRONGEST = 20.0
+
+
+class Action:
+    """Actions of an episode, in the place of a scenario's controller.
+
+    Attributes:
+        low: Least action, shape (k,).
+        high: Largest action, shape (k,).
+        given: The last action, shape (k,).
+        channels: Inputs that are voltages of motors in position drive.
+    """
+
+    def __init__(self, kind: str, finger: Finger, duration: float) -> None:
+        """Read a finger.
+
+        Args:
+            kind: One of `task.ACTIONS`.
+            finger: The finger.
+            duration: Of an episode, s.
+
+        Raises:
+            InputError: If the finger has no such actuators.
+        """
+        self._finger, holds = finger, finger.actuators.holds
+        self.channels = finger.actuators.voltages
+        self._drives: Drives | None = None
+        if kind == "tension":
+            if holds.any():
+                names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
+                raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
+            width = finger.mechanism.channels
+            self.low, self.high, self._scale = np.zeros(width), np.full(width, _STRONGEST), np.ones(width)
+        else:
+            if len(finger.actuators.positioned) != finger.mechanism.channels:
+                raise InputError("action", f'"{kind}" needs motors in position drive at all tendons')
+            radius = finger.actuators.spools.max(axis=0)
+            self._scale = 1.0 / radius if kind == "tendon_length" else np.ones(len(radius))
+            least, most = _reach(finger)
+            self.low, self.high = least / self._scale, most / self._scale
+            rows = math.ceil(duration / loop_period(finger)) + 1
+            self._drives = build_drives(finger, np.zeros((rows, len(radius))))
+        self.begin(0.0)
+
+    @property
+    def drives(self) -> Drives | None:
+        """The loops of motors in position drive, with the goals so far; None without."""
+        return self._drives
+
+    def begin(self, delay: float) -> None:
+        """Begin an episode, whose actions arrive after a delay, s."""
+        self._delay, self.given = delay, self.low.copy()
+        self._begins: list[float] = []
+        self._values: list[Array] = []
+        self._waiting: deque[tuple[float, Array]] = deque()
+        if self._drives is not None:
+            for memory in (self._drives.taken, self._drives.integral, self._drives.last, self._drives.voltages):
+                memory[:] = 0
+
+    def take(self, action: Array, time: float) -> None:
+        """Take an action at a time, s; the first one acts at once."""
+        self.given = action
+        arrival = time + self._delay if self._begins or self._waiting else time
+        self._waiting.append((arrival, action * self._scale))
+
+    def advance(self, stepper: Stepper, begin: float, end: float) -> int:
+        """Advance over a control period, with actions as they arrive; return the status of the stepper."""
+        while self._waiting and self._waiting[0][0] < end:
+            arrival, value = self._waiting.popleft()
+            arrival = max(arrival, begin)
+            if arrival > begin and self._begins:
+                status = stepper.advance(arrival)
+                if status:
+                    return status
+            self._hold(stepper, arrival, value)
+        return stepper.advance(end)
+
+    def _hold(self, stepper: Stepper, time: float, value: Array) -> None:
+        self._begins.append(time)
+        self._values.append(value)
+        if self._drives is None:
+            stepper.hold(value)
+        else:
+            self._drives.goals[math.ceil(time / self._drives.period * (1.0 - 1e-12)) :] = value
+
+    def again(self) -> Drives:
+        """Return the loops of an episode with the same goals, to run once more from its start."""
+        drives = self._drives
+        assert drives is not None
+        fresh = {name: np.zeros_like(getattr(drives, name)) for name in ("taken", "integral", "last")}
+        return drives._replace(**fresh, voltages=np.zeros_like(drives.voltages))
+
+    def replayed(self) -> Replayed:
+        """Return what holds the same inputs once more."""
+        return Replayed(self._begins, self._values)
+
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return what is held at the present or an earlier time, or at times (m,); nothing before the first action."""
+        routing = self._finger.routing
+        lead = np.shape(time)
+        tension, inputs = np.zeros((*lead, len(routing.tendons))), None
+        if self._drives is None and self._begins:
+            found = np.array(self._values)[self._places(time)]
+            tension[..., : routing.actuated] = found[..., : routing.actuated]
+            inputs = found[..., routing.actuated :] if found.shape[-1] > routing.actuated else None
+        return ControlSignals(np.zeros((*lead, len(routing.joints))), tension, inputs=inputs)
+
+    def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
+        """Return what is asked for: nothing is planned for motors in position drive."""
+        return control
+
+    def voltages(self, time: Array | float) -> Array:
+        """Return what was held at one time, or at times (m,), by motor, V."""
+        assert self._drives is not None
+        index = np.floor(np.asarray(time) / self._drives.period * (1.0 + 1e-12)).astype(int)
+        held: Array = self._drives.voltages[np.clip(index, 0, len(self._drives.voltages) - 1)]
+        return held
+
+    def _places(self, time: Array | float) -> Array:
+        return np.maximum(np.searchsorted(self._begins, np.asarray(time) * (1.0 + 1e-12), side="right") - 1, 0)
+
+    def limited(self, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:
+        """Return least and largest action, shape (k,) each.
+
+        Raises:
+            InputError: If limits do not fit.
+        """
+        if limits is None:
+            return self.low, self.high
+        try:
+            low, high = (np.broadcast_to(np.asarray(each, dtype=float), self.low.shape) for each in limits)
+        except (TypeError, ValueError):
+            raise InputError("limits", f"must be a pair of numbers, or of {len(self.low)} each", limits) from None
+        if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
+            raise InputError("limits", "must be finite, the least below the largest", [low.tolist(), high.tolist()])
+        pulling = slice(None, self._finger.routing.actuated)
+        if self._drives is None and (low[pulling] < 0.0).any():
+            raise InputError("limits", "tensions must not be negative: a tendon cannot push", low.tolist())
+        return low, high
+
+
+def _reach(finger: Finger) -> tuple[Array, Array]:
+    """Return the least and the largest spool angles that postures need, and some stretch, shape (m,), rad."""
+    limiter, actuators = finger.stroke_limiter, finger.actuators
+    corners = np.array(np.meshgrid(*zip(limiter.lower, limiter.upper, strict=True))).reshape(len(limiter.lower), -1).T
+    drawn = finger.excursion(corners)
+    taut = actuators.angle(corners, None, drawn)
+    stretched = actuators.angle(corners, np.full(drawn.shape, _STRONGEST), drawn)
+    return taut.min(axis=0), stretched.max(axis=0)
+
+
+class Replayed:
+    """Inputs of an episode, held again at the same times."""
+
+    def __init__(self, begins: Sequence[float], values: Sequence[Array]) -> None:
+        """Take times, s, and what is held from each on."""
+        self._begins, self._values, self._next = begins, values, 0
+
+    @property
+    def instant(self) -> float:
+        """When the next inputs begin, s."""
+        return self._begins[self._next] if self._next < len(self._begins) else math.inf
+
+    def act(self, x: Array) -> Array:
+        """Return the next inputs, shape (u,)."""
+        self._next += 1
+        return self._values[self._next - 1]

@@ -1,0 +1,99 @@
+"""What is drawn anew at every reset: numbers of a scenario, of its sensors, of its action."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from finger_pin.exceptions import InputError
+
+
+class Distribution(Protocol):
+    """Anything that draws a number, or a name, from a generator."""
+
+    def draw(self, random: np.random.Generator) -> Any:
+        """Return one draw."""
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Numbers between ``low`` and ``high``, all alike."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        """Check the bounds."""
+        _check_bounds(self)
+
+    def draw(self, random: np.random.Generator) -> float:
+        """Return one draw."""
+        return float(random.uniform(self.low, self.high))
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """Positive numbers between ``low`` and ``high``, whose logarithms are all alike."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        """Check the bounds."""
+        _check_bounds(self)
+        if self.low <= 0.0:
+            raise InputError("LogUniform.low", "must be above 0", self.low)
+
+    def draw(self, random: np.random.Generator) -> float:
+        """Return one draw."""
+        return float(math.exp(random.uniform(math.log(self.low), math.log(self.high))))
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Numbers of a normal distribution, drawn again where they fall outside of ``low`` and ``high``."""
+
+    mean: float
+    deviation: float
+    low: float = -math.inf
+    high: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not (math.isfinite(self.mean) and 0.0 <= self.deviation < math.inf):
+            raise InputError("Normal", "mean must be finite, deviation finite and not negative", [*vars(self).values()])
+        if not self.low <= self.mean <= self.high:
+            raise InputError("Normal.mean", f"must be between low = {self.low:g} and high = {self.high:g}", self.mean)
+
+    def draw(self, random: np.random.Generator) -> float:
+        """Return one draw."""
+        while True:
+            value = float(random.normal(self.mean, self.deviation))
+            if self.low <= value <= self.high:
+                return value
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of some values, numbers or names, all alike."""
+
+    values: Sequence[Any]
+
+    def __post_init__(self) -> None:
+        """Check that there is one."""
+        if isinstance(self.values, str) or not len(self.values):
+            raise InputError("Choice.values", "must be a list of at least one value", self.values)
+
+    def draw(self, random: np.random.Generator) -> Any:
+        """Return one draw."""
+        return self.values[int(random.integers(len(self.values)))]
+
+
+def _check_bounds(owner: Uniform | LogUniform) -> None:
+    if not (math.isfinite(owner.low) and math.isfinite(owner.high) and owner.low <= owner.high):
+        allowed = "low and high must be finite, and low not above high"
+        raise InputError(type(owner).__name__, allowed, [owner.low, owner.high])

@@ -1,0 +1,105 @@
+"""One world as an environment of Gymnasium."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+from numpy.typing import NDArray
+
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.learning.task import Task
+from finger_pin.learning.world import World, build_spaces, read_action
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
+    """A scenario as an environment of Gymnasium: a policy pulls, once per control period.
+
+        environment = fp.learning.Environment("fig6", reward=lambda signals: -abs(signals["joint_velocity"]).sum(-1))
+        observation, _ = environment.reset(seed=1)
+        observation, reward, terminated, truncated, info = environment.step(environment.action_space.sample())
+
+    What `reset` draws is in its ``info["drawn"]``, the privileged variables of a step in ``info["privileged"]``; a
+    motion that cannot go on truncates the episode, and ``info["reason"]`` says why. Observations are 32-bit floats in
+    the units of the result's variables; actions are in N, rad or m.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
+
+    def __init__(self, scenario: Scenario | str | Path, *, render_mode: str | None = None, **task: Any) -> None:
+        """Prepare a scenario for episodes.
+
+        Args:
+            scenario: What is simulated: from `load_scenario`, or the name of one, or the path of a file. Its controller
+                and reference do not act; the reference's start is where episodes begin. Its tolerances are those of
+                the motion.
+            render_mode: ``"rgb_array"`` for pictures, or None.
+            task: The fields of `Task`:
+
+                reward: A function of the signals, which returns one number per world: a mapping of the variables that
+                    are observed or privileged, of what ``draw`` returned, and of ``action``, each with the worlds in
+                    front, shape (worlds, ...).
+                action: ``"tension"``, N; ``"motor_position"``, the goal of motors in position drive, rad; or
+                    ``"tendon_length"``, the length that their spools have drawn in, m.
+                limits: Least and largest action; by default 0 to 20 N, or what the joints' ranges need.
+                observation: Names of variables of the result, or a `Sensor` for each.
+                privileged: Variables that the policy does not see, for rewards, critics and logs.
+                done: A function of the signals: whether the task has ended (terminated).
+                period: Of control, s.
+                delay: From an action to when it arrives at the finger, s.
+                duration: Of an episode, s, after which it is truncated.
+                draw: A function of a generator, of what holds for an episode, such as a goal: arrays by name, which are
+                    observed after the variables.
+                start: ``"reference"``, ``"random"`` within the joints' ranges, or a function of a generator that
+                    returns theta, shape (n,), rad.
+                randomise: Distributions by dotted key of the scenario, drawn at every reset; also ``action.delay``, s,
+                    and ``observation.NAME.offset``, ``.noise``, ``.quantisation`` of a sensor. Or the path of an
+                    identified scenario: its parameters are drawn from their intervals.
+
+        Raises:
+            InputError: Naming the argument, key or variable that is wrong.
+        """
+        if render_mode not in (None, "rgb_array"):
+            raise InputError("render_mode", 'must be "rgb_array" or None', render_mode)
+        self.task, self.render_mode = Task(**task), render_mode
+        self._world = World.of(scenario, self.task)
+        self.observation_space, self._actions = build_spaces(self._world, self.task.limits)
+        self.action_space = self._actions
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """Begin an episode with numbers, start and goal drawn anew; the same seed draws the same."""
+        super().reset(seed=seed)
+        self._world.begin(self.np_random)
+        observation, _ = self._world.observe()
+        return observation, {"drawn": dict(self._world.drawn)}
+
+    def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Act for one control period.
+
+        Raises:
+            InputError: If the action has another shape or is not finite, or the reward is wrong.
+        """
+        world = self._world
+        world.act(read_action(action, self._actions))
+        world.advance()
+        observation, signals = world.observe()
+        reward, done = self.task.judge({name: value[None] for name, value in signals.items()}, 1)
+        info = world.info(signals)
+        return observation, float(reward[0]), bool(done[0]), world.over, info
+
+    def render(self) -> NDArray[Any] | None:
+        """Return a picture of the present posture, shape (height, width, 3), of bytes."""
+        if self.render_mode is None:
+            return None
+        return self._world.picture()
+
+    def result(self, *, sample_rate: float = 1000.0) -> xr.Dataset:
+        """Return the episode so far as `simulate` returns a run: for figures, `fp.view` and `fp.save`."""
+        return self._world.result(sample_rate)

@@ -1,0 +1,102 @@
+"""What is drawn at a reset, by key: numbers of the scenario, of sensors, and the delay of the action."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger_pin.exceptions import InputError
+from finger_pin.learning.distributions import Distribution, Uniform
+from finger_pin.learning.sensors import Sensor
+from finger_pin.learning.task import Task
+
+#: The delay of the action, s.
+DELAY = "action.delay"
+_SENSOR = "observation."
+_OF_SENSOR = ("noise", "quantisation", "offset")
+
+
+class Randomisation:
+    """Distributions, sorted by what they are of.
+
+    Attributes:
+        keys: Dotted keys of the scenario, in the order in which they are drawn.
+    """
+
+    def __init__(self, task: Task) -> None:
+        """Read a task.
+
+        Raises:
+            InputError: If a key of a sensor or of the action is none.
+        """
+        given = task.randomise
+        found = read_identified(given) if isinstance(given, str | os.PathLike) else given
+        self._distributions: Mapping[str, Distribution] = dict(found)
+        for key, distribution in self._distributions.items():
+            if not callable(getattr(distribution, "draw", None)):
+                allowed = "must be Uniform, LogUniform, Normal, Choice, or have draw(random)"
+                raise InputError(f"randomise.{key}", allowed)
+            if key.startswith("action.") and key != DELAY:
+                raise InputError("randomise", f"of the action only {DELAY} can be drawn", key)
+            if key.startswith(_SENSOR):
+                self._check_sensor(key, task)
+        other = (DELAY,)
+        self.keys = tuple(key for key in self._distributions if key not in other and not key.startswith(_SENSOR))
+
+    @staticmethod
+    def _check_sensor(key: str, task: Task) -> None:
+        name, _, number = key.removeprefix(_SENSOR).rpartition(".")
+        if name not in task.sensors or number not in _OF_SENSOR:
+            known = ", ".join(f"{_SENSOR}{each}.{{{','.join(_OF_SENSOR)}}}" for each in task.sensors)
+            raise InputError("randomise", f"no such number of a sensor; there are {known}", key)
+
+    def draw(self, random: np.random.Generator) -> dict[str, Any]:
+        """Return a value for every key."""
+        return {key: each.draw(random) for key, each in self._distributions.items()}
+
+    def sensor(self, name: str, sensor: Sensor, drawn: Mapping[str, Any]) -> Sensor:
+        """Return a sensor with the numbers that were drawn for it."""
+        keys = {number: f"{_SENSOR}{name}.{number}" for number in _OF_SENSOR}
+        own = {number: drawn[key] for number, key in keys.items() if key in drawn}
+        return replace(sensor, **own) if own else sensor
+
+    def delay(self, drawn: Mapping[str, Any], delay: float) -> float:
+        """Return the delay of the action that was drawn, s; that of the task if none was.
+
+        Raises:
+            InputError: If it is negative.
+        """
+        found = float(drawn.get(DELAY, delay))
+        if not 0.0 <= found < np.inf:
+            raise InputError(DELAY, "must be finite and not negative, s", found)
+        return found
+
+
+def read_identified(path: str | os.PathLike[str]) -> dict[str, Distribution]:
+    """Return the parameters of an identified scenario, each even over its 95 % interval.
+
+    Args:
+        path: Of ``identified.toml``, beside which ``identification.nc`` stands.
+
+    Raises:
+        InputError: If there is none, or a parameter is open at one side: it has no interval to draw from.
+    """
+    import xarray as xr
+
+    results = Path(path).with_name("identification.nc")
+    if not results.is_file():
+        raise InputError("randomise", f"has no {results.name} beside it, where the intervals stand", str(path))
+    with xr.open_dataset(results) as found:
+        keys, low, high = (found[name].values for name in ("parameter", "lower", "upper"))
+    distributions: dict[str, Distribution] = {}
+    for key, least, most in zip(keys.tolist(), low.tolist(), high.tolist(), strict=True):
+        if not np.isfinite([least, most]).all():
+            allowed = f"its recordings leave it open, {least:g} to {most:g}: give distributions, one for it among them"
+            raise InputError(f"randomise.{key}", allowed)
+        distributions[str(key)] = Uniform(least, most)
+    return distributions

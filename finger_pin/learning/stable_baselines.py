@@ -1,0 +1,77 @@
+"""Worlds for stable-baselines3, which has a kind of vector environment of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from finger_pin.learning.vector_environment import VectorEnvironment
+
+
+class StableBaselinesEnvironment(VecEnv):
+    """A `VectorEnvironment` as stable-baselines3 takes it: actions from -1 to 1; episodes begin anew at once."""
+
+    def __init__(self, worlds: VectorEnvironment) -> None:
+        """Take worlds."""
+        space = worlds.single_action_space
+        assert isinstance(space, Box)
+        shape = space.shape
+        super().__init__(worlds.num_envs, worlds.single_observation_space, Box(-1.0, 1.0, shape, np.float32))
+        self.worlds, self.render_mode = worlds, None
+        self._middle, self._half = 0.5 * (space.high + space.low), 0.5 * (space.high - space.low)
+        self._actions = np.zeros((worlds.num_envs, *shape))
+
+    def reset(self) -> NDArray[Any]:
+        """Return first observations, with the seeds that `seed` has set."""
+        observations, _ = self.worlds.reset(seed=list(self._seeds))
+        self._reset_seeds()
+        return observations
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Keep actions for `step_wait`."""
+        self._actions = self._middle + self._half * actions
+
+    def step_wait(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], list[dict[str, Any]]]:
+        """Return observations, rewards, whether episodes are over, and their last observations beside."""
+        observations, rewards, ended, over, gathered = self.worlds.step(self._actions)
+        dones = ended | over
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for i, reason in enumerate(gathered.get("reason", [])):
+            if reason:
+                infos[i]["reason"] = reason
+        if dones.any():
+            for i in np.flatnonzero(dones).tolist():
+                cut = bool(over[i] and not ended[i])
+                infos[i] |= {"terminal_observation": observations[i], "TimeLimit.truncated": cut}
+            observations, _ = self.worlds.reset(options={"reset_mask": dones})
+        return observations, rewards.astype(np.float32), dones, infos
+
+    def close(self) -> None:
+        """End the threads."""
+        self.worlds.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Return an attribute of the worlds, once for each."""
+        return [getattr(self.worlds, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of all worlds."""
+        setattr(self.worlds, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of the worlds, and return what it returns once for each."""
+        found = getattr(self.worlds, method_name)(*args, **kwargs)
+        return [found for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Return that no world is wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+    def get_images(self) -> Sequence[NDArray[Any] | None]:
+        """Return no pictures: `Environment` draws them."""
+        return [None] * self.num_envs

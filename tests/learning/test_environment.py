@@ -1,0 +1,195 @@
+"""Environments: what a policy does and sees, against the simulator and what was asked for."""
+
+from itertools import pairwise
+
+import gymnasium
+import numpy as np
+import pytest
+import xarray as xr
+from gymnasium.utils.env_checker import check_env
+
+import finger_pin as fp
+from finger_pin.learning import Environment, LogUniform, Normal, Sensor, Uniform, VectorEnvironment
+
+COARSE = {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
+FIG6 = fp.load_scenario("fig6", COARSE)
+PULLS = [np.array([1.0, 1.0, 4.4, 3.1]) * scale for scale in (1.0, 1.5, 0.7, 2.0)]
+
+
+def nothing(signals):
+    return np.zeros(len(signals["action"]))
+
+
+def tip_height(signals):
+    return signals["fingertip_position"][..., 2]
+
+
+@pytest.mark.filterwarnings("ignore:.*Box (action|observation) space")
+@pytest.mark.parametrize("name", ["Reach", "Press", "Grasp"])
+def test_gymnasium_accepts_what_ships(name):
+    environment = gymnasium.make(f"finger_pin/{name}-v0")
+    check_env(environment.unwrapped, skip_render_check=True)
+
+
+def test_a_step_moves_the_finger_as_the_simulator_does():
+    environment = Environment(FIG6, reward=nothing)
+    environment.reset(seed=0)
+    sim = fp.Simulator(fp.Finger(FIG6.finger), rtol=1e-3, atol_scale=1e-3)
+    sim.x = fp.prepare(FIG6).start
+    for pull in PULLS:
+        observation, *_ = environment.step(pull)
+        state = sim.step(pull, 0.02)
+    np.testing.assert_array_equal(observation, np.float32([*state.position, *state.velocity]))
+
+
+def test_an_action_arrives_after_its_delay():
+    environment = Environment(FIG6, reward=nothing, delay=0.005)
+    environment.reset(seed=0)
+    sim = fp.Simulator(fp.Finger(FIG6.finger), rtol=1e-3, atol_scale=1e-3)
+    sim.x = fp.prepare(FIG6).start
+    observation, *_ = environment.step(PULLS[0])
+    state = sim.step(PULLS[0], 0.02)  # the first acts at once
+    for before, pull in pairwise(PULLS):
+        observation, *_ = environment.step(pull)
+        sim.step(before, 0.005)
+        state = sim.step(pull, 0.015)
+    np.testing.assert_allclose(observation[:4], state.position, atol=1e-6)
+
+
+def test_seeds_alone_decide_what_happens():
+    drawn = {
+        "finger.tendon_friction.coulomb": LogUniform(0.05, 0.3),
+        "observation.joint_position.offset": Uniform(-0.1, 0.1),
+    }
+    task = dict(
+        reward=tip_height,
+        observation={"joint_position": Sensor(noise=0.01), "fingertip_position": Sensor()},
+        start="random",
+        randomise=drawn,
+        duration=0.06,
+    )
+    found = []
+    for threads in (1, 3):
+        worlds = VectorEnvironment(3, FIG6, threads=threads, **task)
+        seen = [worlds.reset(seed=7)[0]]
+        seen += [worlds.step(np.tile(pull, (3, 1)))[0] for pull in [*PULLS, *PULLS]]
+        worlds.close()
+        found.append(np.array(seen))
+    np.testing.assert_array_equal(*found)
+    alone = Environment(FIG6, **task)
+    seen = [alone.reset(seed=8)[0]]
+    for pull in PULLS:
+        # Three periods last an episode; the step after them begins the next.
+        seen.append(alone.step(pull)[0] if len(seen) != 4 else alone.reset()[0])
+    np.testing.assert_array_equal(np.array(seen), found[0][:5, 1])
+
+
+def test_what_is_drawn_acts_like_an_override():
+    key = "finger.tendon_friction.coulomb"
+    drawn = Environment(FIG6, reward=nothing, randomise={key: Uniform(0.3, 0.3)})
+    given = Environment(fp.load_scenario("fig6", {**COARSE, key: 0.3}), reward=nothing)
+    assert drawn.reset(seed=1)[1]["drawn"][key] == pytest.approx(0.3)
+    given.reset(seed=1)
+    for pull in PULLS:
+        np.testing.assert_array_equal(drawn.step(pull)[0], given.step(pull)[0])
+
+
+def test_sensors_round_shift_and_delay():
+    sensors = {"joint_position": Sensor(quantisation=0.01, offset=0.5, delay=0.04)}
+    environment = Environment(FIG6, reward=nothing, observation=sensors, privileged=["joint_position"])
+    seen = [environment.reset(seed=0)[0]]
+    truth = [fp.prepare(FIG6).start[:4]]
+    for pull in PULLS:
+        observation, _, _, _, info = environment.step(pull)
+        seen.append(observation)
+        truth.append(info["privileged"]["joint_position"])
+    expected = np.round((np.array([*truth[:1] * 2, *truth[:-2]]) + 0.5) / 0.01) * 0.01
+    np.testing.assert_allclose(np.array(seen), expected, atol=1e-7)
+
+
+def test_noise_has_the_deviation_that_was_asked_for():
+    environment = Environment(FIG6, reward=nothing, observation={"joint_position": Sensor(noise=0.2)}, duration=1e9)
+    environment.reset(seed=3)
+    truth = fp.prepare(FIG6).start[:4]
+    world = environment._world
+    noise = np.array([world.observe()[0] for _ in range(2000)]) - truth
+    # Of 8,000 samples: four standard errors.
+    assert abs(noise.std() / 0.2 - 1.0) < 4.0 / np.sqrt(2.0 * noise.size)
+
+
+def test_goals_of_spools_are_lengths_over_radius():
+    scenario = fp.load_scenario("servo_position", COARSE)
+    by_angle = Environment(scenario, reward=nothing, action="motor_position", observation=["motor_position"])
+    by_length = Environment(scenario, reward=nothing, action="tendon_length", observation=["motor_position"])
+    goal, _ = by_angle.reset(seed=0)
+    by_length.reset(seed=0)
+    np.testing.assert_allclose(by_length.action_space.high, 0.005 * by_angle.action_space.high, rtol=1e-6)
+    for _ in range(20):
+        reached, *_ = by_angle.step(goal + 0.05)
+        np.testing.assert_allclose(by_length.step(0.005 * (goal + 0.05))[0], reached, atol=2e-5)
+    # All spools wind in against stretch: towards the goal, and with a proportional loop not all the way.
+    assert np.all((reached > goal) & (reached < goal + 0.06))
+
+
+def test_an_episode_is_a_result():
+    environment = Environment(FIG6, reward=nothing)
+    environment.reset(seed=0)
+    for pull in PULLS:
+        observation, *_ = environment.step(pull)
+    result = environment.result()
+    np.testing.assert_array_equal(np.float32(result.joint_position[-1]), observation[:4])
+    np.testing.assert_allclose(result.tendon_command.sel(tendon="T3")[:-1:20], [pull[2] for pull in PULLS], rtol=1e-7)
+    assert abs(result.energy_residual).max() < 1e-5
+
+
+def test_a_motion_that_cannot_go_on_truncates_with_a_reason():
+    environment = Environment(FIG6, reward=nothing, limits=(0.0, 1e9))
+    environment.reset(seed=0)
+    for _ in range(5):
+        observation, reward, terminated, truncated, info = environment.step([1e9, 0.0, 1e9, 0.0])
+        if truncated:
+            break
+    assert truncated and not terminated and "range" in info["reason"]
+    assert environment.observation_space.contains(observation) and np.isfinite(reward)
+    environment.reset(seed=0)
+    assert not environment.step(PULLS[0])[3]
+
+
+def test_intervals_of_an_identification_are_distributions(tmp_path):
+    found = xr.Dataset(
+        {"lower": ("parameter", [0.08]), "upper": ("parameter", [0.12])},
+        {"parameter": ["finger.tendon_friction.coulomb"]},
+    )
+    found.to_netcdf(tmp_path / "identification.nc")
+    environment = Environment(FIG6, reward=nothing, randomise=str(tmp_path / "identified.toml"))
+    values = [environment.reset(seed=seed)[1]["drawn"]["finger.tendon_friction.coulomb"] for seed in range(20)]
+    assert 0.08 <= min(values) < 0.09 and 0.11 < max(values) <= 0.12
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        ({"randomise": {"finger.tendon_friction.coulom": Uniform(0, 1)}}, "coulom"),
+        ({"randomise": {"finger.joints": Uniform(0, 1)}}, "finger.joints"),
+        ({"randomise": {"finger.tendon_friction.coulomb": Normal(-1.0, 0.1)}}, "finger.tendon_friction.coulomb"),
+        ({"randomise": {"observation.joint_angle.noise": Uniform(0, 1)}}, "observation.joint_position"),
+        ({"observation": ["joint_angle"]}, "joint_angle"),
+        ({"action": "motor_position"}, "position drive"),
+        ({"limits": (-1.0, 1.0)}, "negative"),
+        ({"start": lambda random: [0.0]}, "4 finite angles"),
+        ({"observation": {"joint_position": Sensor(delay=0.03)}}, "multiple of the control period"),
+        ({"period": 0.0}, "period"),
+    ],
+)
+def test_a_wrong_task_is_refused_in_one_line(task, words):
+    with pytest.raises(fp.InputError) as caught:
+        Environment(FIG6, **{"reward": nothing, **task})
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_wrong_actions_and_rewards_are_refused():
+    environment = Environment(FIG6, reward=lambda signals: np.full(1, np.nan))
+    environment.reset(seed=0)
+    for action, words in (([1.0, 1.0], "shape"), ([np.nan] * 4, "finite"), (PULLS[0], "reward")):
+        with pytest.raises(fp.InputError, match=words):
+            environment.step(action)
