@@ -16,7 +16,7 @@ from finger_pin.core.compilation import Unit
 from finger_pin.core.control import Control
 from finger_pin.core.inputs import move_base
 from finger_pin.core.linearisation import Linear, build_linear
-from finger_pin.core.rigid_body import base_power, bias_rate
+from finger_pin.core.rigid_body import base_power, bias_rate, move
 from finger_pin.core.tables import Tables
 from finger_pin.core.work import Work
 
@@ -35,10 +35,11 @@ class Model(NamedTuple):
         exert: Address of what it calls for the rows.
         linearise: Address of the function that fills all partial derivatives after it, at a time.
         condense: Address of the function that fills the solution of (g - J) u = r for a g; 0 where it is singular.
-        measure: Address of what `exert` calls for paths through space and contacts; 0 without, as for the next three.
+        measure: Address of what `exert` calls for paths through space and contacts; 0 without, as for the next four.
         turn: Address of what `linearise` calls for them.
         touch: Address of what `condense` calls for contacts.
         press: Address of what it calls for the pin of a row that their forces may pass.
+        look: Address of what places the bodies and measures a piece; 0 if it is out of reach.
         carry: Address of what `evaluate` calls for a base that moves; 0 at rest, as for the next two.
         sway: Address of what `linearise` calls for it.
         power: Address of what fills the power that it supplies.
@@ -58,6 +59,7 @@ class Model(NamedTuple):
     turn: int
     touch: int
     press: int
+    look: int
     carry: int
     sway: int
     power: int
@@ -81,7 +83,7 @@ class BoundModel:
         through_space = len(tables.paths.columns) > 0
         units = [unit.address for unit in (_evaluate, _exert, _linearise, _condense)]
         # Compiled only for mechanisms that need them: paths through space or contacts, and a base that moves.
-        units += [unit.address if through_space else 0 for unit in (_measure, _turn, _touch, _press)]
+        units += [unit.address if through_space else 0 for unit in (_measure, _turn, _touch, _press, _look)]
         units += [unit.address if moved else 0 for unit in (_carry, _sway, _power)]
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
         self._block = bound(self.model, MODEL)
@@ -155,6 +157,14 @@ def _press(address: int, row: float) -> int:
     model = bound_at(address, MODEL)
     contacts.add_pushes(model.tables, model.work, int(row), model.linear)
     return 1
+
+
+@Unit
+def _look(address: int, piece: float) -> int:
+    model = bound_at(address, MODEL)
+    tables, work, width = model.tables, model.work, model.work.torque.size
+    move(tables, model.state[:width], model.state[width : 2 * width], work)
+    return 1 if paths.look(tables.paths, int(piece), work) else 0
 
 
 @Unit

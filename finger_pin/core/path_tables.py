@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.chains import Chains
-from finger_pin.core.rigid_body import PRISMATIC, TRANSLATION
+from finger_pin.core.rigid_body import PRISMATIC, ROTATION, TRANSLATION
 from finger_pin.core.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.pieces import Leg, Piece
@@ -19,6 +19,8 @@ from finger_pin.mechanism.pieces import Leg, Piece
 COLUMNS, WRENCH = 3, 12
 # Farther than anything slides, m.
 _ANYWHERE = 1e3
+# A step is halved so often at most, less two, to look for touches.
+LOOKS = 60
 
 
 class Paths(NamedTuple):
@@ -36,8 +38,11 @@ class Paths(NamedTuple):
         start: Where the coordinates that move a piece begin, shape (E + 1,).
         at: Coordinates, shape (entries,).
         moves: One where a coordinate moves the first, the second, and the frame's body, shape (entries, 3).
-        levers: How far a unit of each of them moves a point of a contact's bodies against the other body at most, shape
-            (entries,), m.
+        levers: How far a unit of each of them moves a point of a gap's bodies against the other body at most, shape
+            (entries,), m; zero where it carries both, or only turns what looks alike.
+        against: A coordinate that moves the other body along the same direction, -1 for none, shape (entries,).
+        cores: How far the core of a gap's first body goes from the middle of its two points, shape (E,), m.
+        extents: How far the core of a gap's second body goes from its frame's origin, shape (E,), m.
         row: First row that uses each, shape (E,).
         carries: One where a body carries another, shape (n, n).
         rows: Rows with paths, shape (R,).
@@ -60,6 +65,9 @@ class Paths(NamedTuple):
     at: Indices
     moves: IndexTable
     levers: Vector
+    against: Indices
+    cores: Vector
+    extents: Vector
     row: Indices
     carries: IndexTable
     rows: Indices
@@ -80,7 +88,14 @@ class PathWork(NamedTuple):
         closed_count: How many, shape (1,).
         asleep: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
             step, as the next.
-        clear: Of every piece asleep, less than its gap, shape (E,), m.
+        clear: No more than the gap of every piece where the step began, shape (E,), m.
+        ahead: Likewise, where it ends.
+        path: How far the bodies of a gap may move against each other in a step, shape (E,), m.
+        far: How far the core of the first body is from the origin of the second's frame at most, where the step began,
+            shape (E,), m.
+        travel: How far each coordinate goes to and fro in a step, shape (N,).
+        control: Bernstein coefficients of its motion, shape (N, 5).
+        looks: Moments of a step, and what was seen there of a gap, shape (LOOKS, 6).
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
         origin: Its origin, shape (E, 3), m.
         ends: Both points, base frame, shape (E, 6), m.
@@ -100,6 +115,12 @@ class PathWork(NamedTuple):
     closed_count: Indices
     asleep: Indices
     clear: Vector
+    ahead: Vector
+    path: Vector
+    far: Vector
+    travel: Vector
+    control: Matrix
+    looks: Matrix
     frame: Layers
     origin: Matrix
     ends: Matrix
@@ -128,7 +149,12 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
-    levers = [_levers(p, row, at, chains) for p, row, (at, _) in zip(pieces, carriers, entries, strict=True)]
+    levers, against = [], []
+    for piece, (at, moves) in zip(pieces, entries, strict=True):
+        found, others = _levers(piece, at, moves, chains)
+        levers.append(found)
+        against.append(others)
+    halves = [0.5 * float(np.linalg.norm(row[3:] - row[:3])) for row in points]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
     for body, parent in enumerate(parents):
@@ -148,6 +174,9 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
         levers=np.concatenate([np.zeros(0), *levers]),
+        against=np.concatenate([np.zeros(0, dtype=np.int64), *against]),
+        cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
+        extents=np.array([piece.extent for piece in pieces], dtype=float),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
         carries=carries,
         rows=rows,
@@ -181,27 +210,43 @@ def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[ND
 
 
 def _levers(
-    piece: Piece,
-    carriers: NDArray[np.int64],
-    coordinates: NDArray[np.int64],
-    chains: Chains,
-) -> Array:
-    """Return how far a unit of some coordinates moves points of a contact's first body, or of that of its frame."""
-    found = np.zeros(len(chains.parents))
+    piece: Piece, coordinates: NDArray[np.int64], moves: NDArray[np.int64], chains: Chains
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return `levers` and `against` of the coordinates that move a gap's bodies."""
+    found, against = np.zeros(len(chains.parents)), np.full(len(chains.parents), -1, dtype=np.int64)
     first = max(float(np.linalg.norm(end.point)) for end in piece.ends) + piece.breadth
-    for body, far in (
-        (carriers[0], first),
-        (carriers[2], float(np.linalg.norm(piece.frame.translation)) + piece.reach),
-    ):
-        at, reach = int(body), far
+    # Of what has no end, how far the first body is counts: `far` is added.
+    second = float(np.linalg.norm(piece.frame.translation)) + (piece.extent if np.isfinite(piece.extent) else 0.0)
+    for joint, reach in ((piece.ends[0].joint, first), (piece.joint, second)):
+        at = chains.last[joint]
         while at >= 0:
             slides = chains.kinds[at] == PRISMATIC
-            found[at] += 1.0 if slides else reach
+            found[at] = 1.0 if slides else reach
             # What slides may be anywhere.
             distance = float(np.linalg.norm(chains.bodies[at, TRANSLATION : TRANSLATION + 3]))
             reach += _ANYWHERE if slides else distance
             at = int(chains.parents[at])
-    return found[coordinates]
+    for at, (one, _, two) in zip(coordinates, moves, strict=True):
+        if one and two:
+            found[at] = 0.0
+    ones, twos = coordinates[moves[:, 0] > moves[:, 2]], coordinates[moves[:, 2] > moves[:, 0]]
+    for one in ones:
+        for two in twos:
+            first_axis, second_axis = _sliding(int(one), chains), _sliding(int(two), chains)
+            if np.any(first_axis) and np.array_equal(first_axis, second_axis):
+                against[one], found[two] = two, 0.0
+    return found[coordinates], against[coordinates]
+
+
+def _sliding(at: int, chains: Chains) -> Array:
+    """Return the axis along which a body slides, in the base frame; zero if something turns it."""
+    rotation = np.eye(3)
+    while at >= 0:
+        if chains.kinds[at] != PRISMATIC:
+            return np.zeros(3)
+        rotation = chains.bodies[at, ROTATION : ROTATION + 9].reshape(3, 3) @ rotation
+        at = int(chains.parents[at])
+    return np.asarray(rotation[:, 2])
 
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
@@ -214,6 +259,12 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         closed_count=np.zeros(1, dtype=np.int64),
         asleep=np.zeros(count, dtype=np.int64),
         clear=np.zeros(pieces),
+        ahead=np.zeros(pieces),
+        path=np.zeros(pieces),
+        far=np.zeros(pieces),
+        travel=np.zeros(width),
+        control=np.zeros((width, 5)),
+        looks=np.zeros((LOOKS, 6)),
         frame=np.zeros((pieces, 3, 3)),
         origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 6)),
@@ -262,6 +313,10 @@ def select_paths(
         at=body(paths.at[at]),
         moves=paths.moves[at],
         levers=paths.levers[at],
+        # What an entry's coordinate is compared with moves the same piece, so it is of the same island.
+        against=body(paths.against[at]),
+        cores=paths.cores[pieces],
+        extents=paths.extents[pieces],
         row=np.searchsorted(rows, paths.row[pieces]),
         carries=np.ascontiguousarray(paths.carries[np.ix_(bodies, bodies)]),
         rows=np.searchsorted(rows, paths.rows[kept]),

@@ -65,11 +65,11 @@ def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
 
 
 @compiled
-def _measure(paths: Any, e: int, work: Any) -> None:
-    """Fill what a piece says, and its wrenches."""
+def look(paths: Any, e: int, work: Any) -> bool:
+    """Fill what a piece says where bodies are placed; return whether it was asked, or is out of reach."""
     own = work.paths
     _frame(paths, e, work)
-    out, y, columns = own.out[e], own.seen[e], paths.columns[e]
+    out, y = own.out[e], own.seen[e]
     beyond = 0.0
     for c in range(3):
         middle = 0.5 * (y[c] + y[3 + c])
@@ -79,6 +79,15 @@ def _measure(paths: Any, e: int, work: Any) -> None:
         out[0] = beyond
     else:
         call_shape(paths.shapes[e, 0], y, paths.parameters[e], out)
+    return not beyond > 0.0
+
+
+@compiled
+def _measure(paths: Any, e: int, work: Any) -> None:
+    """Fill what a piece says, and its wrenches."""
+    own = work.paths
+    look(paths, e, work)
+    out, columns = own.out[e], paths.columns[e]
     own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[SIDE, paths.row[e]] > 0.0 else 0
     rotation, ends, point = own.frame[e], own.ends[e], work.centre
     for m in range(columns):

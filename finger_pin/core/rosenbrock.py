@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound_at, call_at
-from finger_pin.core.broad_phase import settle, wake
+from finger_pin.core.broad_phase import depart, settle
 from finger_pin.core.charts import rechart
 from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.condensation import solve
 from finger_pin.core.control import HELD
 from finger_pin.core.drift import carry
 from finger_pin.core.error_norm import step_error, worst
+from finger_pin.core.flights import NOTHING, UNSEEN, survey
 from finger_pin.core.kinks import hold, passed, price, release, strayed
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau
@@ -113,8 +114,6 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                 r[c] += of_coupling * k[j, c]
         if i == 0 and fresh:
             release(tables, rows)
-        elif tables.touching and i == tableau.nodes.size - 1:
-            wake(tables, model.work.paths, x, state)
         # For a second try too: what pins and tips feel there is read from the memory of the evaluation.
         if i > 0 or fresh or tables.loaded or tables.touching > 0:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
@@ -125,6 +124,8 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
                     if not np.isfinite(rate[c]):
                         return 2
                 hold(tables, rows, kinks)
+                if tables.touching:
+                    depart(tables, model.work.paths)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:
                 return 1
@@ -208,11 +209,18 @@ def advance(address: int, end: float) -> int:
                     share = passed(integration, model, time, h, r)
                     dear = share < 1.0
                     memory[EVALUATIONS] += 4
-            if dear:
+            seen = not tables.touching or dear or not h > 1e-12 * max(1.0, abs(time))
+            touch = NOTHING if seen else survey(integration, model)
+            if touch == UNSEEN:
+                # The same step once more, with what slept.
+                fresh = True
+                continue
+            if dear or touch < NOTHING:
                 memory[REJECTED] += 1
                 memory[CULPRIT] = -1.0
                 whole = max(whole, h)
-                memory[STEP] = h * min(0.9, max(0.1, 1.02 * share))
+                # Of a touch nothing has seen the next step's end is inside, and sees it.
+                memory[STEP] = h * (touch if touch < NOTHING else min(0.9, max(0.1, 1.02 * share)))
                 continue
         if not error <= 1e30:
             factor = 0.1
@@ -245,7 +253,7 @@ def advance(address: int, end: float) -> int:
             )
             memory[DRIFT] += h * mean
             if tables.touching:
-                settle(tables, rows, model.work.paths, x, reached)
+                settle(tables, rows, model.work.paths, reached[2 * width :])
             for c in range(size):
                 x[c] = reached[c]
             memory[TIME] = end if last else time + h

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core.binding import Kind, Layers, Matrix, Vector, bound_at, call_at
-from finger_pin.core.broad_phase import settle, wake
+from finger_pin.core.broad_phase import arrive, glide, settle, wake
 from finger_pin.core.charts import place_bodies
 from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.law_code import FORCE, call_filling
@@ -109,7 +109,8 @@ def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: An
         for r in range(4):
             cosine += first[r] * second[r]
         before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
-    wake(tables, work.paths, before, after)
+    glide(before, after, tables.parents.size, work.paths)
+    wake(tables, work.paths)
     width = work.torque.size
     for k in range(tables.touching):
         # Bent bristles tell of a contact that was closed meanwhile.
@@ -158,6 +159,8 @@ def evaluate_many(address: int, _time: float) -> int:
     before = model.rate
     for k in range(tables.touching):
         work.paths.asleep[k] = 0
+    for e in range(work.paths.path.size):
+        work.paths.path[e] = 0.0
     for m in range(states.shape[0]):
         for i in range(commands.shape[1]):
             control.tension[i] = commands[m, i]
@@ -193,7 +196,8 @@ def evaluate_many(address: int, _time: float) -> int:
             externals[m, j] = work.external[j]
         _book(tables, work, booked[m])
         if sleepy:
-            settle(tables, work.rows, work.paths, before if m > 0 else model.state, model.state)
+            arrive(tables, work.paths)
+            settle(tables, work.rows, work.paths, model.state[2 * work.torque.size :])
             for c in range(states.shape[1]):
                 before[c] = model.state[c]
         last = booked.shape[1] - 1

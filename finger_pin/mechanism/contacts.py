@@ -60,6 +60,7 @@ def _piece(a: Solid, part: Part, w: Solid, prism: tuple[float, ...]) -> Piece:
         w.place,
         half + part.disc + part.radius + w.reach,
         part.disc,
+        w.reach - prism[-1],
     )
 
 

@@ -67,6 +67,8 @@ class Piece:
         frame: Placement of the frame in that joint's.
         reach: Where the middle of both points is further from the frame's origin, a gap is open and not asked, m.
         breadth: How far from the points the first body's part reaches across, m.
+        extent: How far the frame's body reaches from the frame's origin, less the rounding that looks alike however it
+            turns, m; infinite for a half-space.
     """
 
     shape: Shape
@@ -76,6 +78,7 @@ class Piece:
     frame: pin.SE3 = field(default_factory=pin.SE3.Identity)
     reach: float = np.inf
     breadth: float = 0.0
+    extent: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,8 @@ class Gap:
     """The distance between a part of body A, seen as two points, and the shape of body W, in the frame of that shape.
 
     A positive distance is the true one or a lower bound of it, and it changes by no more than the points of both bodies
-    move against each other: it is Lipschitz 1 in the motion of their material. Detection in time rests on both.
+    move against each other: it is Lipschitz 1 in the motion of their material. Both are convex, and the plane across
+    the normal has each on its own side. Detection in time rests on all three.
 
     Attributes:
         name: For messages.

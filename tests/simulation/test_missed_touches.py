@@ -1,0 +1,113 @@
+"""Touches between two stages of a step: none is missed, whatever the tolerance and the method."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+
+SURFACE = "{ stiffness = 1e5, damping = 0.0 }"
+OBJECTS = "[environment.objects."
+#: A ball of 5 mm is dropped 0.1 m onto a shelf of 20 mm, beside a finger at rest.
+SHELF = f"""
+finger = "ub"
+{OBJECTS}shelf]
+shape = "box"
+sides = [0.1, 0.1, 0.02]
+position = [0.3, 0.0, -0.015]
+surface = {SURFACE}
+{OBJECTS}ball]
+shape = "sphere"
+radius = 0.005
+mass = 0.01
+position = [0.3, 0.0, 0.1]
+surface = {SURFACE}
+[simulation]
+duration = 1.0
+"""
+#: The first ball runs into the second, which is as heavy and at rest.
+HEAD_ON = f"""
+extends = "fig6"
+[finger]
+gravity = [0.0, 0.0, 0.0]
+{OBJECTS}first]
+shape = "sphere"
+radius = 0.005
+mass = 0.01
+position = [0.3, 0.0, 0.0]
+velocity = [0.05, 0.0, 0.0]
+surface = {SURFACE}
+{OBJECTS}second]
+shape = "sphere"
+radius = 0.005
+mass = 0.01
+position = [0.35, 0.0, 0.0]
+surface = {SURFACE}
+[simulation]
+duration = 2.0
+"""
+#: A ball comes down on a finger that is held.
+HELD = f"""
+finger = "ub"
+{OBJECTS}ball]
+shape = "sphere"
+radius = 0.003
+mass = 0.001
+position = [0.02, 0.0, 0.3]
+velocity = [0.0, 0.0, -0.1]
+surface = {SURFACE}
+[simulation]
+duration = 0.6
+"""
+#: A small ball lies on a thin plate beside the finger in full motion.
+BESIDE = f"""
+extends = "fig6"
+{OBJECTS}plate]
+shape = "box"
+sides = [0.1, 0.1, 0.001]
+position = [0.3, 0.0, -0.0005]
+surface = {SURFACE}
+{OBJECTS}ball]
+shape = "sphere"
+radius = 0.001
+mass = 1e-4
+position = [0.3, 0.0, 0.02]
+surface = {SURFACE}
+[simulation]
+duration = 2.0
+"""
+
+
+def result_of(folder, text, **settings):
+    path = folder / "case.toml"
+    path.write_text(text)
+    overrides = {f"simulation.{name}": each for name, each in settings.items()}
+    return fp.simulate(fp.load_scenario(path, overrides=overrides))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_a_ball_dropped_on_a_shelf_bounces_back_to_where_it_came_from(tmp_path, tolerance):
+    """The floor is a spring without loss: the ball meets it after sqrt(2 h / g), for pi sqrt(m / k), or little less."""
+    result = result_of(tmp_path, SHELF, rtol=tolerance, atol_scale=tolerance)
+    height = result.object_position.sel(object="ball", axis="z").values
+    fall, stay = np.sqrt(2.0 * 0.1 / 9.81), np.pi * np.sqrt(0.01 / 1e5)
+    period = 2.0 * fall + stay
+    since = np.mod(result.time.values, period)
+    expected = 0.1 - 0.5 * 9.81 * np.minimum(since, period - since) ** 2
+    assert height.min() > -1e-3
+    assert height == pytest.approx(expected, abs=0.01)
+
+
+def test_two_equal_balls_that_meet_head_on_exchange_their_velocities(tmp_path):
+    velocity = result_of(tmp_path, HEAD_ON).object_velocity.sel(axis="x").isel(time=-1)
+    assert velocity.values == pytest.approx([0.0, 0.05], abs=1e-6)
+
+
+def test_a_ball_stays_above_a_finger_that_is_held_under_it(tmp_path):
+    ball = result_of(tmp_path, HELD).object_velocity.sel(object="ball", axis="z")
+    assert float(ball.max()) > 0.0
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_a_small_ball_stays_on_a_thin_plate_beside_a_finger_in_full_motion(tmp_path, tolerance):
+    result = result_of(tmp_path, BESIDE, rtol=tolerance, atol_scale=tolerance)
+    assert 0.0 < float(result.object_position.sel(object="ball", axis="z").min()) < 0.0011
