@@ -18,6 +18,7 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.interrupting import interruptible
+from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.running import run
 from finger_pin.simulation.starting import own_parts, packed_state
 
@@ -61,7 +62,7 @@ def simulate(
             begins at zero again; ``simulation.start_time`` says what the clock of references shows then.
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
             without either it is continuous. Compiled methods only.
-        progress: Called with the simulated time, s, now and then.
+        progress: Called with the simulated time, s, now and then; in a notebook there is a bar by default.
         observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
         stop: Asked now and then; when it returns true the simulation ends there.
 
@@ -91,6 +92,7 @@ def simulate(
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
     own = own_parts(controller, reference, fingertip_force, initial, finger)
+    progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(
         lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop
     ).dataset()

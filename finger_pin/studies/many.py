@@ -15,6 +15,7 @@ from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, ScenarioWarning, SelfLockingWarning, StudyError
+from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.simulate import simulate
 from finger_pin.studies.machine import usable_cores
 from finger_pin.studies.processes import Lost, Pool
@@ -39,7 +40,8 @@ def simulate_many(
             same sample times.
         workers: Number of processes; by default one per core that this process may use.
         variables: Names of the variables to keep; all by default. Fewer need less memory.
-        progress: Called with the numbers of finished and of all runs.
+        progress: Called with the numbers of finished and of all runs;
+            in a notebook there is a bar by default.
 
     Returns:
         The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN from
@@ -63,6 +65,7 @@ def simulate_many(
     count = min(workers or usable_cores(), len(runs))
     run = partial(_run, keep=None if variables is None else tuple(variables))
     results: list[xr.Dataset | Lost] = [Lost("")] * len(runs)
+    progress = progress or notebook_bar("runs")
     with Pool(count) if count > 1 else nullcontext() as pool:
         found = enumerate(map(run, runs)) if pool is None else pool.do(run, runs, lambda: False, helping=True)
         for done, (index, result) in enumerate(found, start=1):
@@ -88,7 +91,7 @@ def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:
         with warnings.catch_warnings():
             # Other processes cannot warn here, and a hundred runs should not warn a hundred times.
             warnings.simplefilter("ignore", ScenarioWarning)
-            result = simulate(scenario)
+            result = simulate(scenario, progress=lambda time: None)
     except IntegrationError as error:
         assert error.result is not None
         failure, result = str(error), error.result

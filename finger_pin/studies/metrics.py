@@ -52,7 +52,8 @@ class Run:
         with warnings.catch_warnings():
             # Studies look at many designs, and at the margin by its metric.
             warnings.simplefilter("ignore", ScenarioWarning)
-            return simulate(self.scenario)
+            # The study has a bar of its own.
+            return simulate(self.scenario, progress=lambda time: None)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Listing
 from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
@@ -99,7 +100,8 @@ def optimise(
             design of the front as a scenario; by default nothing is kept.
         executor: Where runs are done: `LocalProcesses` by default, or a `DaskCluster`.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
-        progress: Called with the numbers of finished, failed and all runs.
+        progress: Called with the numbers of finished, failed and all runs;
+            in a notebook there is a bar by default.
         stop: Asked now and then; when it returns true the search ends there.
 
     Returns:
@@ -131,7 +133,7 @@ def optimise(
             asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
             folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
             store = stack.enter_context(folder).store
-        course = _Course(starting, goals, variables, store, workers, effort, progress, stop)
+        course = _Course(starting, goals, variables, store, workers, effort, progress or notebook_bar("runs"), stop)
         result = _assembled(starting, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")

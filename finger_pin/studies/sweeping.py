@@ -9,6 +9,7 @@ from typing import Any
 
 import xarray as xr
 
+from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
 from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
@@ -52,7 +53,8 @@ def sweep(
         executor: Where runs are done: `LocalProcesses` by default, or a `DaskCluster`.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         retry_failed: Whether to repeat runs that failed before.
-        progress: Called with the numbers of finished, failed and all runs, first with those found.
+        progress: Called with the numbers of finished, failed and all runs, first with those found;
+            in a notebook there is a bar by default.
         stop: Asked now and then; when it returns true the sweep ends there, with ``status`` missing where it has not
             been.
 
@@ -77,7 +79,14 @@ def sweep(
             asked = describe_study(starting, chosen, {"sweep": design.describe()})
             store = stack.enter_context(StudyFolder(output, asked, PRODUCTS, restart=restart)).store
         records = evaluate(
-            starting, design.points(), chosen, store, workers, progress=progress, stop=stop, retry_failed=retry_failed
+            starting,
+            design.points(),
+            chosen,
+            store,
+            workers,
+            progress=progress or notebook_bar("runs"),
+            stop=stop,
+            retry_failed=retry_failed,
         )
         result = assemble(starting.scenario, design, chosen, records)
         if output is not None:

@@ -73,7 +73,7 @@ def test_a_run_whose_process_dies_every_time_is_nan_and_says_why(monkeypatch: py
 def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     real = many.simulate
 
-    def failing(scenario: fp.Scenario) -> None:
+    def failing(scenario: fp.Scenario, progress: object) -> None:
         raise IntegrationError(0.02, "planted", "nothing", real(scenario).isel(time=slice(0, 5)))
 
     monkeypatch.setattr(many, "simulate", failing)
@@ -125,7 +125,7 @@ def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: py
     runs = scenarios(1.0, 2.0)
     real = many.simulate
 
-    def failing(scenario: fp.Scenario) -> object:
+    def failing(scenario: fp.Scenario, progress: object) -> object:
         result = real(scenario)
         if scenario.controller.gain == 2.0:
             raise IntegrationError(0.02, "planted", "nothing", result.isel(time=slice(0, 5)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import json
 import sys
@@ -19,6 +20,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.notebook import in_notebook
 from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Scene
@@ -40,9 +42,9 @@ class Viewing:
         url: Where it is, on the loopback address.
     """
 
-    def __init__(self, server: PageServer) -> None:
-        """Take a running server."""
-        self._server = server
+    def __init__(self, server: PageServer, page: str | None = None) -> None:
+        """Take a running server, and its page if that is whole."""
+        self._server, self._page = server, page
         self.url = server.url
 
     def wait(self) -> None:
@@ -61,7 +63,10 @@ class Viewing:
         return f"<{type(self).__name__} at {self.url}>"
 
     def _repr_html_(self) -> str:
-        # Notebooks show the page itself.
+        # Notebooks show the page itself: where they run on another machine, this one's address leads nowhere.
+        if self._page is not None:
+            page = html.escape(self._page)
+            return f'<iframe srcdoc="{page}" width="100%" height="{_CELL}" style="border: none"></iframe>'
         return f'<iframe src="{self.url}" width="100%" height="{_CELL}" style="border: none"></iframe>'
 
     def __enter__(self) -> Self:
@@ -130,22 +135,18 @@ def view_forces(
 
 
 def _served(page: str, open_browser: bool | None, block: bool | None) -> Viewing:
-    viewing = Viewing(PageServer(page))
+    viewing = Viewing(PageServer(page), page)
     _open(viewing.url, open_browser)
     if block is None:
-        block = not (sys.flags.interactive or "ps1" in vars(sys) or _in_notebook())
+        block = not (sys.flags.interactive or "ps1" in vars(sys) or in_notebook())
     if block:
         print(f"The finger moves at {viewing.url} (Ctrl-C ends this)", flush=True)
         viewing.wait()
     return viewing
 
 
-def _in_notebook() -> bool:
-    return "ipykernel" in sys.modules
-
-
 def _open(url: str, wanted: bool | None) -> None:
-    if not _in_notebook() if wanted is None else wanted:
+    if not in_notebook() if wanted is None else wanted:
         webbrowser.open(url, new=2)
 
 

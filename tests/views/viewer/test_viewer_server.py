@@ -1,6 +1,7 @@
 """Pages in service: on the loopback address only, for as long as they are wanted."""
 
 import base64
+import html
 import http.client
 import json
 import re
@@ -17,6 +18,7 @@ from pages import Clock
 
 import finger_pin as fp
 from finger_pin.views.viewer import LiveView, view, write_animation
+from finger_pin.views.viewer.animation import animation_page
 
 
 def fetch(url, path="/", host=None):
@@ -129,6 +131,8 @@ def test_a_notebook_shows_the_page_in_its_cell_and_opens_no_window(result, monke
     monkeypatch.setattr("webbrowser.open", lambda url, new: opened.append(url))
     monkeypatch.setitem(sys.modules, "ipykernel", sys)
     with view(result) as viewing:
-        assert re.search(r'<iframe [^>]*src="([^"]*)"', viewing._repr_html_())[1] == viewing.url
+        (page,) = re.findall(r'<iframe srcdoc="([^"]*)"', viewing._repr_html_())
+        # All of it stands in the cell: where a hub runs the notebook, an address of its machine leads nowhere.
+        assert html.unescape(page) == animation_page(result) and viewing.url not in viewing._repr_html_()
         assert viewing.url in repr(viewing)
     assert opened == []
