@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -28,27 +30,34 @@ _LARGEST = 100_000_000
 
 def shipped(kind: str) -> dict[str, str]:
     """Return what ships of a kind, such as fingers, with a line about each."""
-    found = {}
-    for entry in sorted(resources.files("finger_pin.description").joinpath(kind).iterdir(), key=lambda item: item.name):
-        if entry.name.endswith(".toml"):
-            found[entry.name.removesuffix(".toml")] = str(tomllib.loads(entry.read_text("utf-8")).get("title", ""))
-    return found
+    return {name: str(tomllib.loads(text).get("title", "")) for name, text in _shipped_texts(kind).items()}
+
+
+@cache
+def _shipped_texts(kind: str) -> dict[str, str]:
+    """Return the TOML of what ships of a kind, by name."""
+    entries = resources.files("finger_pin.description").joinpath(kind).iterdir()
+    texts = {entry.name: entry.read_text("utf-8") for entry in entries if entry.name.endswith(".toml")}
+    return {name.removesuffix(".toml"): texts[name] for name in sorted(texts)}
+
+
+@cache
+def _shipped_table(kind: str, name: str) -> Table:
+    return tomllib.loads(_shipped_texts(kind)[name])
 
 
 def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
     """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
-    if is_path(name):
-        what, path = f"{kind} file {name}", folder / expand(name)
-        data = _read_bytes(what, path)
-    else:
-        what, path = f"{kind} {name}", Path(name)
-        names = shipped(f"{kind}s")
+    if not is_path(name):
+        names = _shipped_texts(f"{kind}s")
         if name not in names:
             allowed = (
                 f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{suggestion(name, names)}"
             )
             raise InputError(kind, allowed, name)
-        data = resources.files("finger_pin.description").joinpath(f"{kind}s/{name}.toml").read_bytes()
+        return copy.deepcopy(_shipped_table(f"{kind}s", name)), Path(name)
+    what, path = f"{kind} file {name}", folder / expand(name)
+    data = _read_bytes(what, path)
     try:
         return tomllib.loads(data.decode("utf-8-sig")), path
     except UnicodeDecodeError:
