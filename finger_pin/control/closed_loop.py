@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.guides import Guides
-from finger_pin.control.hand import HandController, joined_controller
+from finger_pin.control.hand import HandController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.own import Samples, choose_controller, choose_reference
 from finger_pin.control.palm import PalmPath
@@ -19,7 +19,7 @@ from finger_pin.control.proportional import Controller, ControlSignals, Proporti
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
@@ -41,6 +41,11 @@ class Dynamics(Protocol):
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
         """Return all signals at packed states under given tensions, on a base that moves or rests."""
+
+    def exerted(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return the same, if that is sooner without accelerations."""
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -73,8 +78,6 @@ class ClosedLoop:
         varying_force: What varies of F, three signals for each finger, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
         drives: Of motors in position drive; None without any.
-        parts: Of a hand whose controller and reference are the scenario's, the loops of its fingers, each alone on the
-            palm; otherwise none.
         palm: Along which path the palm of a hand moves; None at rest.
         guides: Along which paths objects are moved; None without any.
     """
@@ -87,7 +90,6 @@ class ClosedLoop:
     varying_force: Signal | None = None
     start: Array | None = None
     drives: DriveSignals | None = None
-    parts: tuple[ClosedLoop, ...] = ()
     palm: PalmPath | None = None
     guides: Guides | None = None
 
@@ -115,11 +117,6 @@ class ClosedLoop:
                 or are not finite, or tensions are negative.
         """
         start, scenarios = scenario.simulation.start_time, scenario.parts()
-        parts: tuple[ClosedLoop, ...] = ()
-        if len(scenarios) > 1 and all(each is None for each in (controller, reference, fingertip_force, finger)):
-            parts = tuple(cls.from_scenario(each) for each in scenarios.values())
-            routing = Routing.from_description(scenario.finger)
-            controller = joined_controller([part.controller for part in parts], routing)
         finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
@@ -135,8 +132,6 @@ class ClosedLoop:
             reference=choose_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
-            # Fingers that may touch something are not apart.
-            parts=parts if finger.surroundings is None else (),
             palm=PalmPath.of(scenario.hand, start),
             guides=Guides.of(finger, start),
         )
@@ -168,8 +163,7 @@ class ClosedLoop:
 
     def compiled(self) -> ClosedLoop:
         """Return the same loop, whose finger is evaluated by the compiled core."""
-        parts = tuple(part.compiled() for part in self.parts)
-        return replace(self, dynamics=CompiledFinger(self.finger), parts=parts)
+        return replace(self, dynamics=CompiledFinger(self.finger))
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""
@@ -202,12 +196,13 @@ class ClosedLoop:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)
 
-    def evaluate(self, time: Array | float, x: Array) -> LoopSignals:
-        """Return all signals at one time and state, or at times (m,) and states (m, size)."""
+    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
+        """Return all signals at one time and state, or at times (m,) and states (m, size); maybe no accelerations."""
         reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        return LoopSignals(reference, control, self.dynamics.evaluate(x, *acting))
+        evaluate = self.dynamics.evaluate if accelerated else self.dynamics.exerted
+        return LoopSignals(reference, control, evaluate(x, *acting))
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
         """Return what is desired and planned, and what acts: inputs of the mechanism, F, and how palm or objects move.

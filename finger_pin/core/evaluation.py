@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +15,11 @@ from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RA
 from finger_pin.core.model import BoundModel
 from finger_pin.core.signals import MOTIONS, STATES, Motions, States, evaluate_many, motion_many
 from finger_pin.core.stepper import in_threads
-from finger_pin.core.tables import build_tables
+from finger_pin.core.tables import Tables, build_tables
 from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
 from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.evaluation import Evaluation, Touching
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
@@ -52,6 +54,87 @@ class Room(NamedTuple):
         return Room(packed, rates, self.rows, first, torques, externals, booked, touches)
 
 
+class Models:
+    """Models of the same tables under inputs that are given: memory for threads, and with or without forces at tips."""
+
+    def __init__(
+        self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool, books: int
+    ) -> None:
+        """Keep what they are made of.
+
+        Args:
+            tables: Of a mechanism or an island.
+            laws: Of their groups of rows.
+            channels: Number of inputs.
+            moved: Whether the base moves.
+            books: Number of energies and powers that are booked.
+        """
+        self.tables, self.books = tables, books
+        self._laws, self._channels, self._moved = laws, channels, moved
+        self._known: dict[tuple[bool, int], BoundModel] = {}
+
+    def model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
+        """Return a thread's model that minds forces at the tips or not.
+
+        Each has memory of its own: without loads, nothing writes where loads have left their torques.
+        """
+        if (loaded, thread) not in self._known:
+            tables = self.tables
+            own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
+            work = build_work(own, self._laws, self._channels)
+            control = held_control(self._channels, len(work.torque))
+            self._known[loaded, thread] = BoundModel(own, control, work, self._moved)
+        return self._known[loaded, thread]
+
+
+def book_many(
+    models: Models, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
+) -> tuple[Array, Array]:
+    """Return energies and powers at states of the core, shape (m, books), and J^T F, shape (m, N).
+
+    Args:
+        models: Of the mechanism or island.
+        states: Shape (m, size), of the core.
+        attitudes: Of free bodies, shape (m, f, 4).
+        commands: Inputs, shape (m, u).
+        forces: At the tips, shape (m, t, 3), N.
+        base: How the base moves, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
+    """
+    count, work = len(states), models.model().model.work
+    room = Room(
+        packed=states,
+        rates=np.zeros((0, states.shape[1])),
+        rows=np.zeros((len(work.rows), 0, work.rows.shape[1])),
+        first=0,
+        torques=np.zeros((count, len(work.torque))),
+        externals=np.zeros((count, len(work.torque))),
+        booked=np.zeros((count, models.books)),
+        touches=np.zeros((0, models.tables.touching // CONTACT.arms, 9)),
+    )
+    _fill(models, room, states, attitudes, commands, np.ascontiguousarray(forces), base)
+    return room.booked, room.externals
+
+
+def _fill(
+    models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
+) -> None:
+    bases = _bases(base, len(states), int(models.tables.guided.max(initial=-1)) + 1)
+    loaded, count = bool(np.any(forces)), len(states)
+
+    def fill(model: BoundModel, part: slice) -> None:
+        own = room.part(part)
+        filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
+        given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part], own.touches)
+        call(evaluate_many, States(model.address, *given), STATES)
+
+    if count < _FEW:
+        fill(models.model(loaded), slice(None))
+    else:
+        half = count // 2
+        pair = (models.model(loaded), models.model(loaded, 1))
+        in_threads(lambda each: fill(*each), list(zip(pair, (slice(half), slice(half, None)), strict=True)))
+
+
 class CompiledMechanism:
     """Evaluates a mechanism without Python inside; not to be shared between threads."""
 
@@ -60,38 +143,38 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self._charts = Charts.of(mechanism)
         self._tables = build_tables(mechanism)
-        self._models: dict[tuple[bool, int], BoundModel] = {}
+        laws, books = [table.law for table in mechanism.rows], mechanism.books
+        count = len(books.stored) + len(books.powers)
+        self._models = Models(self._tables, laws, mechanism.channels, mechanism.moved, count)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds models of its own."""
         return CompiledMechanism, (self.mechanism,)
 
-    def _model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
-        """Return a thread's model that minds forces at the tips or not.
+    def evaluate(
+        self,
+        x: Array,
+        command: Array,
+        force: Array | None = None,
+        base: Array | None = None,
+        *,
+        accelerated: bool = True,
+    ) -> Evaluation:
+        """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`.
 
-        Each has memory of its own: without loads, nothing writes where loads have left their torques.
+        Without accelerations, which take most of the time, they and the rate are NaN.
         """
-        if (loaded, thread) not in self._models:
-            mechanism, tables = self.mechanism, self._tables
-            own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
-            work = build_work(own, [table.law for table in mechanism.rows], mechanism.channels)
-            control = held_control(mechanism.channels, mechanism.coordinates)
-            self._models[loaded, thread] = BoundModel(own, control, work, mechanism.moved)
-        return self._models[loaded, thread]
-
-    def evaluate(self, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> Evaluation:
-        """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`."""
-        room = self.room(len(np.atleast_2d(x)))
+        room = self.room(len(np.atleast_2d(x)), accelerated=accelerated)
         self.fill(room, x, command, force, base)
         return self.found(room, slice(None) if np.ndim(x) > 1 else 0)
 
-    def room(self, count: int, *, booked_only: bool = False) -> Room:
+    def room(self, count: int, *, booked_only: bool = False, accelerated: bool = True) -> Room:
         """Return room for what is computed of so many states: all, or energies, powers and J^T F only."""
-        mechanism, work = self.mechanism, self._model().model.work
+        mechanism, work = self.mechanism, self._models.model().model.work
         width, kept = mechanism.coordinates, 0 if booked_only else count
         return Room(
             packed=np.zeros((count, mechanism.size)),
-            rates=np.zeros((kept, self._charts.size)),
+            rates=np.zeros((kept if accelerated else 0, self._charts.size)),
             rows=np.zeros((len(work.rows), kept, work.rows.shape[1])),
             first=0,
             torques=np.zeros((count, width)),
@@ -104,6 +187,8 @@ class CompiledMechanism:
         """Return what fills a room, or what does so at one place."""
         mechanism, rates, rows = self.mechanism, room.rates, room.rows[:, room.first :][:, : len(room.packed)]
         width, joints = mechanism.coordinates, mechanism.body.model.nv
+        if not len(rates):
+            rates = np.full((len(room.packed), self._charts.size), np.nan)
         acceleration, rate = rates[:, width : 2 * width], rates
         if mechanism.positions != width:
             acceleration, (q, v, _) = acceleration.copy(), mechanism.split(room.packed)
@@ -157,21 +242,8 @@ class CompiledMechanism:
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
-        bases = _bases(base, count, int(tables.guided.max(initial=-1)) + 1)
         states, attitudes = self._charts.to_core(room.packed)
-
-        def fill(model: BoundModel, part: slice) -> None:
-            own = room.part(part)
-            filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
-            given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part], own.touches)
-            call(evaluate_many, States(model.address, *given), STATES)
-
-        if count < _FEW:
-            fill(self._model(loaded), slice(None))
-        else:
-            half = count // 2
-            models = (self._model(loaded), self._model(loaded, 1))
-            in_threads(lambda each: fill(*each), list(zip(models, (slice(half), slice(half, None)), strict=True)))
+        _fill(self._models, room, states, attitudes, commands, forces, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n).
@@ -182,7 +254,7 @@ class CompiledMechanism:
         shape = (np.atleast_2d(position).shape[0], len(tables.parents))
         tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
         given = _rows(position, shape), _rows(velocity, shape)
-        motions = Motions(self._model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
+        motions = Motions(self._models.model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
         call(motion_many, motions, MOTIONS)
         at = 0 if np.ndim(position) == 1 else slice(None)
         return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
@@ -210,6 +282,13 @@ class CompiledFinger:
     ) -> FingerSignals:
         """Return all signals of (18) at packed states, shape (size,) or (m, size); see `Finger.evaluate`."""
         found = self.mechanism.evaluate(x, command, fingertip_force, base)
+        return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
+
+    def exerted(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return the same with no accelerations, which are NaN."""
+        found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
 
     def powers(

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
-from finger_pin.core.charts import angular_velocity
+from finger_pin.core.island_motion import IslandMotion
 from finger_pin.core.part import Part, Record, failure
 from finger_pin.core.stepper import Stepper, in_threads
 from finger_pin.core.textbook import Statistics, Stop, Trajectory, Watch
@@ -70,47 +68,10 @@ class _Recorder:
         """Whether no more steps can be kept."""
         return self.taken >= self.most
 
-    def steps(self) -> _Steps:
+    def steps(self) -> IslandMotion:
         """Return the steps that were taken."""
         joined = {name: np.concatenate([getattr(record, name) for record in self.kept]) for name in vars(self.kept[0])}
-        return _Steps(self.part, *self.start, Record(**joined))
-
-
-@dataclass(frozen=True, eq=False)
-class _Steps:
-    """The steps of one island, from a start; angles of free bodies begin anew at each."""
-
-    part: Part
-    begin: float
-    start: Array
-    attitude: Array
-    record: Record
-
-    @property
-    def times(self) -> Array:
-        """Ends of the steps with the start first."""
-        return np.concatenate([[self.begin], self.record.times])
-
-    def interpolate(self, at: Array) -> tuple[Array, Array]:
-        """Return states at times, shape (m, size), and the quaternions from which angles count, shape (m, f, 4)."""
-        times, record = self.times, self.record
-        if len(times) == 1:
-            return np.repeat(self.start[None], len(at), axis=0), np.repeat(self.attitude[None], len(at), axis=0)
-        step = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
-        # Only the steps that are asked for: there may be hundreds of thousands.
-        first = step == 0
-        begins = np.where(first[:, None], self.start, record.states[step - 1])
-        attitudes = np.where(first[:, None, None], self.attitude, record.attitudes[step - 1])
-        width = (len(self.part.tables.parents)) + len(self.part.tables.lumps)
-        for i in self.part.tables.charts:
-            angles, rates, later = slice(i, i + 3), slice(width + i, width + i + 3), ~first
-            begins[later, rates] = angular_velocity(begins[later, angles], begins[later, rates])
-            begins[later, angles] = 0.0
-        s = ((at - times[step]) / (times[step + 1] - times[step]))[:, None]
-        bend = record.dense[step, -1]
-        for row in range(record.dense.shape[1] - 2, -1, -1):
-            bend = record.dense[step, row] + s * bend
-        return (1.0 - s) * begins + s * (record.states[step] + (1.0 - s) * bend), attitudes
+        return IslandMotion(self._stepper.mechanism, self.part, *self.start, Record(**joined))
 
 
 def integrate_compiled(
@@ -182,13 +143,12 @@ def integrate_compiled(
         interrupted=interrupted,
         # Of a controller that acts in between, the linearised flow knows nothing.
         estimated_error=np.nan if held is not None or stepper.driven else stepper.estimated_error,
-        islands=()
-        if alone or any(len(each.attitude) for each in steps)
-        else tuple(_apart(each, stepper) for each in steps),
+        # Inputs that are held in between are not the core's own.
+        islands=() if held is not None or stepper.driven or stepper.held else tuple(steps),
     )
 
 
-def _states(stepper: Stepper, steps: list[_Steps]) -> Callable[[Array], Array]:
+def _states(stepper: Stepper, steps: list[IslandMotion]) -> Callable[[Array], Array]:
     """Return what maps times to packed states, from the steps of all islands."""
 
     def interpolate(at: Array) -> Array:
@@ -198,10 +158,3 @@ def _states(stepper: Stepper, steps: list[_Steps]) -> Callable[[Array], Array]:
         return stepper.joined([state for state, _ in found], [attitude for _, attitude in found])
 
     return interpolate
-
-
-def _apart(steps: _Steps, stepper: Stepper) -> tuple[NDArray[np.int64], Array, Callable[[Array], Array]]:
-    """Return an island's places in the whole, the ends of its steps up to where all have got, and its states."""
-    times = steps.times
-    ends = np.unique(np.append(times[times < stepper.time], stepper.time))
-    return stepper.places(steps.part.island), ends, lambda at: steps.interpolate(at)[0]

@@ -57,6 +57,7 @@ class Part:
 
     Attributes:
         island: What it has of the whole.
+        laws: Of its groups of rows.
         tables: Its tables.
         control: Its inputs.
         tableau: The method.
@@ -85,7 +86,7 @@ class Part:
         memory: Array,
     ) -> None:
         """Bind everything; arrays are taken as they are, not copied."""
-        self.island, self._laws = island, laws
+        self.island, self.laws = island, laws
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
         self.work = build_work(tables, laws, len(control.tension))
         self.model = BoundModel(tables, control, self.work)
@@ -165,7 +166,7 @@ class Part:
         bound = self._bound
         return Part(
             self.island,
-            self._laws,
+            self.laws,
             self.tables._replace(loaded=loaded),
             self.control,
             bound.x,
@@ -195,7 +196,7 @@ class Part:
         tables = self.tables._replace(tip_force=self.tables.tip_force.copy(), bodies=self.tables.bodies.copy())
         return Part(
             self.island,
-            self._laws,
+            self.laws,
             tables,
             self.control._replace(tension=self.control.tension.copy()),
             bound.x.copy(),

@@ -25,9 +25,9 @@ class States(NamedTuple):
         states: Shape (m, size).
         commands: Shape (m, u).
         forces: At the tips, shape (m, t, 3).
-        rates: Filled with the rates, shape (m, size), or (0, size) if only J^T F, energies and powers are wanted.
+        rates: Filled with the rates, shape (m, size), or (0, size) where they are not wanted.
         rows: Filled with the table of rows from the first place on, shape (columns, first + m or more, K), or
-            (columns, 0, K).
+            (columns, 0, K) if only J^T F, energies and powers are wanted.
         first: Where in it the first state stands.
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
@@ -155,7 +155,7 @@ def evaluate_many(address: int, _time: float) -> int:
     model = bound_at(many.model, MODEL)
     tables, control, work = model.tables, model.control, model.work
     # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
-    sleepy = tables.touching > 0 and rates.shape[0] == 0 and bases.shape[0] == 0
+    sleepy = tables.touching > 0 and rows.shape[1] == 0 and bases.shape[0] == 0
     before = model.rate
     for k in range(tables.touching):
         work.paths.asleep[k] = 0
@@ -186,6 +186,7 @@ def evaluate_many(address: int, _time: float) -> int:
         if rates.shape[0] > 0:
             for c in range(states.shape[1]):
                 rates[m, c] = model.rate[c]
+        if rows.shape[1] > 0:
             for c in range(rows.shape[0]):
                 for k in range(rows.shape[2]):
                     rows[c, first + m, k] = work.rows[c, k]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.charts import Charts
-from finger_pin.core.control import Control
+from finger_pin.core.control import HELD, Control
 from finger_pin.core.drives import Drives
 from finger_pin.core.islands import Island, find_islands, select, select_control
 from finger_pin.core.part import FIRST_STEP, Part, failure
@@ -106,6 +107,11 @@ class Stepper:
     def driven(self) -> bool:
         """Whether loops of motors run."""
         return any(part.drives is not None for part in self.parts)
+
+    @property
+    def held(self) -> bool:
+        """Whether inputs are held."""
+        return any(part.control.kind == HELD for part in self.parts)
 
     @property
     def estimated_error(self) -> float:
@@ -218,9 +224,12 @@ class Stepper:
 
 
 def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
-    """Do a task that holds no lock of Python for all items side by side; return what it returns in their order."""
+    """Do a task that holds no lock of Python for all items side by side; return what it returns in their order.
+
+    Only what the main thread does is spread: who runs many at once has no core to spare.
+    """
     workers = min(len(items), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2)
-    if workers < 2:
+    if workers < 2 or threading.current_thread() is not threading.main_thread():
         return [task(item) for item in items]
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(task, items))

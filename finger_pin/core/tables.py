@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.binding import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.core.chains import read_chains
+from finger_pin.core.chains import Chains, read_chains
 from finger_pin.core.law_code import SIGNALS, addresses
 from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.rigid_body import RigidBody
 
 # Columns of the table of groups.
 FIRST, END, FED, PRESSED, KINK = range(5)
@@ -116,6 +117,7 @@ class Tables(NamedTuple):
 
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
+_CHAINS: WeakKeyDictionary[RigidBody, Chains] = WeakKeyDictionary()
 
 
 def build_tables(mechanism: Mechanism) -> Tables:
@@ -137,7 +139,10 @@ def _read(mechanism: Mechanism) -> Tables:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
-    model, chains = body.model, read_chains(body.model)
+    model = body.model
+    if body not in _CHAINS:
+        _CHAINS[body] = read_chains(model)
+    chains = _CHAINS[body]
     parents, last, turns = chains.parents, chains.last, chains.turns
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
     first_body = [*(int(joint.idx_v) for joint in model.joints[1:]), -1]

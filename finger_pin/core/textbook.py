@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 
@@ -32,6 +31,17 @@ class Statistics:
     wall_time: float
 
 
+class Apart(Protocol):
+    """The motion of what moves apart from the rest, with steps of its own."""
+
+    @property
+    def times(self) -> Array:
+        """Ends of its steps with the start first, s."""
+
+    def powers(self, times: Array, force: Array, base: Array | None) -> Array:
+        """Return its powers at times, and that of the forces at its tips, shape (m, powers + 1), W."""
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """A solution that can be evaluated anywhere up to where it got.
@@ -43,8 +53,7 @@ class Trajectory:
         failure: What the integrator reported if it failed, otherwise empty.
         interrupted: Whether it was asked to stop.
         estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
-        islands: Where there are several, for each the indices of its numbers in the packed state, its own breakpoints,
-            and what maps times to its own packed states.
+        islands: Motions of what moves apart, where the core computes all inputs itself; none otherwise.
     """
 
     breakpoints: Array
@@ -53,7 +62,7 @@ class Trajectory:
     failure: str = ""
     interrupted: bool = False
     estimated_error: float = np.nan
-    islands: tuple[tuple[NDArray[np.int64], Array, Callable[[Array], Array]], ...] = ()
+    islands: tuple[Apart, ...] = ()
 
 
 class _Broken(Exception):

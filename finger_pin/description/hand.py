@@ -6,7 +6,7 @@ Names of a hand's joints and tendons begin with that of their finger and a dot: 
 from __future__ import annotations
 
 import math
-from functools import reduce
+from functools import partial, reduce
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -14,6 +14,7 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.friction import JointFriction, TendonFriction
 from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiter
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.validation import (
@@ -30,6 +31,8 @@ from finger_pin.description.validation import (
 )
 from finger_pin.exceptions import InputError
 
+_BUILT: Remembered[FingerDescription] = Remembered()
+_JOINED: Remembered[FingerDescription] = Remembered()
 _MILLIMETRES = " m (is it in millimetres?)"
 _PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
 
@@ -157,10 +160,16 @@ class HandDescription(Description):
 
     def built(self) -> dict[str, FingerDescription]:
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
-        return {name: self._built(name, placed) for name, placed in self.fingers.items()}
+        return {
+            name: _BUILT.of((name, placed, self.gravity), partial(self._built, name, placed))
+            for name, placed in self.fingers.items()
+        }
 
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
+        return _JOINED.of((self,), self._joined)
+
+    def _joined(self) -> FingerDescription:
         parts = self.built()
         tendons = {f"{name}.{own}": tendon for name, part in parts.items() for own, tendon in part.tendons.items()}
         joined = FingerDescription.model_construct(

@@ -7,18 +7,21 @@ then for each passive tendon its proximal and its distal half, since friction ma
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.remembering import Remembered
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Below this share of the largest, an internal tension counts as none.
 _SLACK = 1e-9
+_ROUTINGS: Remembered[Routing] = Remembered()
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,12 @@ class Routing:
     @classmethod
     def from_description(cls, description: FingerDescription) -> Routing:
         """Build the matrices from the crossings of every tendon."""
+        parts = (description.hand and tuple(description.hand.fingers), description.tree, *description.joints)
+        made = partial(cls._from_description, description)
+        return _ROUTINGS.of((*parts, None, *description.tendons, *description.tendons.values()), made)
+
+    @classmethod
+    def _from_description(cls, description: FingerDescription) -> Routing:
         joints, tendons = tuple(description.joints), tuple(description.tendons)
         names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
         column = {name: index for index, name in enumerate(joints)}
@@ -117,6 +126,15 @@ class Routing:
 
         It does not hold where a tendon runs along a path through space: its arms depend on the posture.
         """
+        return self._force_closure
+
+    @cached_property
+    def pseudo_inverse(self) -> Array:
+        """Pseudo-inverse of H_c^T, shape (t, n), 1/m."""
+        return np.asarray(np.linalg.pinv(self.coupling.T))
+
+    @cached_property
+    def _force_closure(self) -> ForceClosure:
         if not np.any(self.coupling, axis=1).all():
             return ForceClosure(
                 np.zeros((len(self.tendons), 0)), np.zeros(len(self.tendons)), self.tendons, posed=False

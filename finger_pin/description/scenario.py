@@ -25,6 +25,7 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.tautness import Tautness
@@ -50,6 +51,7 @@ METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
 MOST_SAMPLES = 5_000_000
 LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
 _Item = TypeVar("_Item")
+_PARTS: Remembered[dict[str, Scenario]] = Remembered()
 
 
 class ReferenceSettings(Description):
@@ -186,6 +188,9 @@ class Scenario(Description):
 
         Of a finger it is the scenario itself, under no name.
         """
+        return dict(_PARTS.of((self,), self._parted))
+
+    def _parted(self) -> dict[str, Scenario]:
         if self.hand is None:
             return {"": self}
         if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):

@@ -226,6 +226,12 @@ class Finger:
         """
         return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force, base))
 
+    def exerted(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return the same; who evaluates sooner without accelerations may leave them out here."""
+        return self.evaluate(x, command, fingertip_force, base)
+
     def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         halves = found.rows["passive_halves"]

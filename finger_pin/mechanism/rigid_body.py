@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -60,7 +62,7 @@ class RigidBody:
         for row, tip in enumerate(self.tips):
             self.supports[row, [each - 1 for each in model.supports[model.frames[tip].parentJoint] if each]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
-        self._data = model.createData()
+        self._own = threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         self.carriers: list[int] = [0]
         for index in range(1, model.njoints):
@@ -70,6 +72,21 @@ class RigidBody:
             shared = parent == 0 or length == 0.0
             self.carriers.append(self.carriers[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
+
+    @property
+    def _data(self) -> pin.Data:
+        """Pinocchio's memory; every thread has its own."""
+        if not hasattr(self._own, "data"):
+            self._own.data = self.model.createData()
+        return self._own.data
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy has: not the memory of threads."""
+        return {name: value for name, value in vars(self).items() if name != "_own"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Become a copy, with memory of its own."""
+        vars(self).update(state, _own=threading.local())
 
     @property
     def mass(self) -> float:
@@ -208,7 +225,7 @@ class RigidBody:
         Returns:
             Moment and force on the base about its origin, in its axes, shape (6,), and torques, shape (n,).
         """
-        model, data = self._afloat
+        model, data = self._afloat, self._afloat_data
         turned = np.r_[3:6, 0:3]
         pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         moving, speeding = np.append(base[:6][turned], v), np.append(base[6:12][turned], a)
@@ -216,7 +233,7 @@ class RigidBody:
         return found[:6][turned], found[6:]
 
     @cached_property
-    def _afloat(self) -> tuple[pin.Model, pin.Data]:
+    def _afloat(self) -> pin.Model:
         """The same joints on a base that floats free of gravity."""
         own, model = self.model, pin.Model()
         base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
@@ -225,7 +242,13 @@ class RigidBody:
             at = model.addJoint(base + parent, own.joints[index], own.jointPlacements[index], own.names[index])
             model.inertias[at] = own.inertias[index]
         model.gravity.linear[:] = 0.0
-        return model, model.createData()
+        return model
+
+    @property
+    def _afloat_data(self) -> pin.Data:
+        if not hasattr(self._own, "afloat"):
+            self._own.afloat = self._afloat.createData()
+        return self._own.afloat
 
     def distal_weights(self) -> Array:
         """Return the weight of everything that each joint carries, base frame, shape (n, 3), N."""
@@ -249,7 +272,7 @@ class RigidBody:
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
         if base is not None:
-            model, data = self._afloat
+            model, data = self._afloat, self._afloat_data
             pose = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
             moving = np.concatenate([base[3:6], base[:3], v])
             kinetic = pin.computeKineticEnergy(model, data, np.append(pose, q), moving)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription, Link
+from finger_pin.description.remembering import Remembered
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 
 BASE_FRAME = "base"
 TIP_FRAME = "fingertip"
+_BODIES: Remembered[RigidBody] = Remembered()
 
 #: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
 #: They are for readers of the URDF that want some; the simulation applies neither.
@@ -76,8 +78,15 @@ def effort_limit(description: FingerDescription, joint: str) -> float:
 
 def build_rigid_body(description: FingerDescription) -> RigidBody:
     """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
-    if description.hand is not None:
-        return build_hand(description.hand)
+    hand, joints = description.hand, description.joints
+    if hand is not None:
+        placed = (hand.gravity, *hand.fingers, *hand.fingers.values())
+        return _BODIES.of(placed, partial(build_hand, hand))
+    links = (description.name, description.gravity, *joints, *(joint.link for joint in joints.values()))
+    return _BODIES.of(links, partial(_build, description))
+
+
+def _build(description: FingerDescription) -> RigidBody:
     model = _read(to_urdf(description, drawn=False)).copy()
     model.gravity.linear[:] = description.gravity
     return RigidBody(model, TIP_FRAME)
@@ -91,9 +100,8 @@ def _read(text: str) -> pin.Model:
 
 def build_hand(hand: HandDescription) -> RigidBody:
     """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
-    parts = {name: build_rigid_body(finger) for name, finger in hand.built().items()}
-    for body in parts.values():
-        body.model.gravity.linear[:] = hand.gravity
+    placed = {"gravity": hand.gravity}
+    parts = {name: build_rigid_body(finger.model_copy(update=placed)) for name, finger in hand.built().items()}
     places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
     return RigidBody.join(parts, places)
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.textbook import Trajectory
+from finger_pin.core.textbook import Apart, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.kinematics import Motion
-from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers
+from finger_pin.simulation.energy import Flows, energies, powers
 
 # Three-point Gauss quadrature on [0, 1]. All nodes are inside the step: a controller that is sampled changes its
 # tensions at the ends of steps, where a node would see those of the next one.
@@ -31,8 +32,8 @@ _CHUNK = 4096
 _CLOSED, _NOTHING = 1e-5, 1e-12
 _HALVINGS, _MOST_SUSPECTED = 8, 20_000
 
-# A loop, the ends of its steps, and its states at any time.
-_Part = tuple[ClosedLoop, Array, Callable[[Array], Array]]
+# The ends of steps, and what maps times to powers there.
+_Part = tuple[Array, Callable[[Array], Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,24 +72,19 @@ def account(
     booked = powers(signals.finger)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
-    parts = _apart(loop, trajectory)
-    # A finger without motors, say, has fewer powers than the hand.
-    columns = [
-        [booked.names.index(name) for name in (*part.finger.mechanism.books.powers, FINGERTIP)] for part, _, _ in parts
-    ]
-    found = [Works(part, times).add(ends, states).values for part, ends, states in parts]
-    done = np.zeros((len(times), len(booked.names)))
-    for own, places in zip(found, columns, strict=True):
-        done[:, places] += own
+    parts, done = _parts(loop, trajectory), np.zeros((len(times), len(booked.names)))
+    found = [_works(part, times, done.shape[1]) for part in parts]
+    done += np.sum(found, axis=0)
     works = Flows(done, booked.names, booked.supplies)
     gained = total - total[0]
     residual = gained - works.net
     allowed = max(_CLOSED * float(np.sum(np.max(np.abs(done), axis=0, initial=0.0))), _NOTHING)
     if allowed < float(np.max(np.abs(residual))) < np.inf:
-        for part, own, places in zip(parts, found, columns, strict=True):
-            finer = _halved(part, _suspected(part[1], times, residual), 1e-3 * allowed)
+        for (ends, power), own in zip(parts, found, strict=True):
+            finer = _halved((ends, power), _suspected(ends, times, residual), 1e-3 * allowed)
             if len(finer):
-                done[:, places] += Works(part[0], times).add(np.union1d(part[1], finer), part[2]).values - own
+                done += _works((np.union1d(ends, finer), power), times, done.shape[1]) - own
+        works = Flows(done, booked.names, booked.supplies)
         residual = gained - works.net
     return Account(stored=stored, powers=booked, works=works, residual=residual)
 
@@ -104,11 +100,11 @@ def _suspected(ends: Array, times: Array, residual: Array) -> NDArray[np.int64]:
 
 def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
     """Return where to halve steps, and halves of them, until no work of one is wrong by more than is allowed, J."""
-    loop, ends, states = part
-    begin, length, found = ends[steps], np.diff(ends)[steps], []
+    (ends, power), found = part, []
+    begin, length = ends[steps], np.diff(ends)[steps]
     for _ in range(_HALVINGS):
         chunks = [slice(first, first + _CHUNK) for first in range(0, len(begin), _CHUNK)]
-        errors = [_quadrature_error(loop, begin[chunk], length[chunk], states) for chunk in chunks]
+        errors = [_quadrature_error(power, begin[chunk], length[chunk]) for chunk in chunks]
         bent = np.concatenate([np.zeros(0), *errors]) > allowed
         begin, length = begin[bent], 0.5 * length[bent]
         found.append(begin + length)
@@ -116,64 +112,59 @@ def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
     return np.concatenate(found)
 
 
-def _quadrature_error(loop: ClosedLoop, begin: Array, length: Array, states: Callable[[Array], Array]) -> Array:
+def _quadrature_error(power: Callable[[Array], Array], begin: Array, length: Array) -> Array:
     """Return by how much the integral of any power over steps may be wrong, shape (steps,), J."""
-    one = np.tensordot(_WEIGHTS, _over(loop, begin, length, states, _NODES), (0, 1))
-    other = np.tensordot(_CHECK_WEIGHTS, _over(loop, begin, length, states, _CHECKS), (0, 1))
+    one = np.tensordot(_WEIGHTS, _over(power, begin, length, _NODES), (0, 1))
+    other = np.tensordot(_CHECK_WEIGHTS, _over(power, begin, length, _CHECKS), (0, 1))
     return np.asarray(np.max(np.abs(one - other), axis=1))
 
 
-def _apart(loop: ClosedLoop, trajectory: Trajectory) -> list[_Part]:
-    """Return loops with their breakpoints and states: of the fingers of a hand that move apart, or of the whole."""
-    sizes = [part.finger.layout.size for part in loop.parts]
-    if sizes and sizes == [len(places) for places, _, _ in trajectory.islands]:
-        # Islands stand in the order of their first joint, as fingers do.
-        return [(part, ends, states) for part, (_, ends, states) in zip(loop.parts, trajectory.islands, strict=True)]
-    return [(loop, trajectory.breakpoints, trajectory.interpolate)]
+def _parts(loop: ClosedLoop, trajectory: Trajectory) -> list[_Part]:
+    """Return breakpoints and powers of what moves apart, or of the whole."""
+    reached = trajectory.breakpoints[-1]
+    found: list[_Part] = []
+    for island in trajectory.islands:
+        ends = island.times
+        found.append((np.append(ends[ends < reached], reached), partial(_powers_apart, loop, island)))
+
+    def powers(times: Array) -> Array:
+        return loop.powers(times, trajectory.interpolate(times))
+
+    return found or [(trajectory.breakpoints, powers)]
 
 
-class Works:
-    """Integrals of all powers up to the saved times, taken over steps as they come.
+def _powers_apart(loop: ClosedLoop, island: Apart, times: Array) -> Array:
+    return island.powers(times, loop.force(times), loop.base(times))
+
+
+def _works(part: _Part, times: Array, count: int) -> Array:
+    """Return the integrals of all powers up to the saved times, in order, shape (m, count), J.
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
-
-    Attributes:
-        values: Shape (m, powers + 1), J.
     """
-
-    def __init__(self, loop: ClosedLoop, times: Array) -> None:
-        """Begin at nothing; times have shape (m,), in order."""
-        self._loop, self._times = loop, times
-        count = len(loop.finger.mechanism.books.powers) + 1
-        self.values, self._reached = np.zeros((len(times), count)), np.zeros(count)
-
-    def add(self, ends: Array, states: Callable[[Array], Array]) -> Works:
-        """Go on over steps, given by their ends with the start first, and what maps times to packed states."""
-        for first in range(0, len(ends) - 1, _CHUNK):
-            self._add(ends[first : first + _CHUNK + 1], states)
-        return self
-
-    def _add(self, ends: Array, states: Callable[[Array], Array]) -> None:
-        begin, length = ends[:-1], np.diff(ends)
-        values = _over(self._loop, begin, length, states, _NODES)
-        steps = sum(weight * values[:, node] for node, weight in enumerate(_WEIGHTS))
-        before = self._reached + np.cumsum(steps, axis=0) - steps
-        rows = saved(self._times, ends)
-        times = self._times[rows]
-        step = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, None)
-        share = np.vander((times - begin[step]) / length[step], 4)[:, :3] @ _PARABOLAS
-        self.values[rows] = before[step] + sum(share[:, node, None] * values[step, node] for node in range(len(_NODES)))
-        self._reached = before[-1] + steps[-1]
+    ends, power = part
+    works, reached = np.zeros((len(times), count)), np.zeros(count)
+    for first in range(0, len(ends) - 1, _CHUNK):
+        chunk = ends[first : first + _CHUNK + 1]
+        begin, length = chunk[:-1], np.diff(chunk)
+        values = _over(power, begin, length, _NODES)
+        before = np.vstack([reached, reached + np.cumsum(np.tensordot(_WEIGHTS, values, (0, 1)), axis=0)])
+        rows = _saved(times, chunk)
+        step = np.clip(np.searchsorted(begin, times[rows], side="right") - 1, 0, None)
+        share = np.vander((times[rows] - begin[step]) / length[step], 4)[:, :3] @ _PARABOLAS
+        works[rows] = before[step] + np.einsum("mn,mnp->mp", share, values[step])
+        reached = before[-1]
+    return works
 
 
-def saved(times: Array, ends: Array) -> slice:
+def _saved(times: Array, ends: Array) -> slice:
     """Return which of the saved times lie in steps, those at their ends among them."""
     first, last = np.searchsorted(times, ends[0]), np.searchsorted(times, ends[-1] * (1.0 + 1e-12), side="right")
     return slice(int(first), int(last))
 
 
-def _over(loop: ClosedLoop, begin: Array, length: Array, states: Callable[[Array], Array], nodes: Array) -> Array:
+def _over(power: Callable[[Array], Array], begin: Array, length: Array, nodes: Array) -> Array:
     """Return the powers at nodes of steps, times the steps' lengths, shape (steps, nodes, count)."""
     times = (begin[:, None] + length[:, None] * nodes).ravel()
-    return loop.powers(times, states(times)).reshape(len(begin), len(nodes), -1) * length[:, None, None]
+    return power(times).reshape(len(begin), len(nodes), -1) * length[:, None, None]

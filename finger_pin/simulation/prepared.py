@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.textbook import Stop
 from finger_pin.description.family import Family
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
@@ -118,10 +118,12 @@ class Prepared:
 
     def _run(self, scenario: Scenario, setup: Setup, stop: Stop) -> Recording:
         trajectory = setup.integrate(stop=stop)
-        motions = Motions(setup.loop, trajectory, scenario.sample_times())
+        motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = record(scenario, motions, trajectory, setup.method, self.record)
+            found = record(scenario, motions, trajectory, setup.method, self.record, text="")
         reached = float(trajectory.breakpoints[-1])
+        if trajectory.failure or trajectory.interrupted:
+            found.attrs["scenario"] = to_toml(scenario)
         if trajectory.failure:
             raise IntegrationError(reached, *setup.failure(trajectory), found.dataset())
         if trajectory.interrupted:

@@ -114,8 +114,18 @@ class Motions:
         times: Shape (m,), s, as far as the trajectory goes.
     """
 
-    def __init__(self, loop: ClosedLoop, trajectory: Trajectory, times: Array) -> None:
-        """Compute nothing yet."""
+    def __init__(
+        self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
+    ) -> None:
+        """Compute nothing yet.
+
+        Args:
+            loop: The system.
+            trajectory: Its solution.
+            times: Shape (m,), in order, s.
+            names: What will be asked for, as names of `variables`; by default all.
+        """
+        self._accelerated = names is None or "joint_acceleration" in names
         self.loop, self.trajectory = loop, trajectory
         self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
 
@@ -147,7 +157,7 @@ class Motions:
     @cached_property
     def signals(self) -> LoopSignals:
         """Everything that the finger does."""
-        return self.loop.evaluate(self.times, self.packed)
+        return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
 
     @property
     def finger(self) -> FingerSignals:

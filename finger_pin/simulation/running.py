@@ -117,9 +117,9 @@ class Setup:
         if positioned:
             duration = scenario.simulation.duration
             drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
-            loop = replace(loop, drives=drives, parts=())
+            loop = replace(loop, drives=drives)
         if sampled is not None:
-            loop = replace(loop, controller=sampled, parts=())
+            loop = replace(loop, controller=sampled)
         elif own:
             # A wrong answer of a user's own controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())

@@ -1,0 +1,34 @@
+"""What has been made of the same parts before: descriptions are frozen, so that the same object says the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from threading import Lock
+from typing import Generic, TypeVar
+
+from pydantic import BaseModel
+
+_Made = TypeVar("_Made")
+_MOST = 32
+
+
+class Remembered(Generic[_Made]):
+    """The latest of what was made, by what it was made of: descriptions as objects, all else by value."""
+
+    def __init__(self) -> None:
+        """Remember nothing."""
+        self._known: dict[tuple[Hashable, ...], tuple[tuple[object, ...], _Made]] = {}
+        self._lock = Lock()
+
+    def of(self, parts: tuple[object, ...], make: Callable[[], _Made]) -> _Made:
+        """Return what is made of parts; anew only if it was not made of the same before, or long ago."""
+        key = tuple(id(part) if isinstance(part, BaseModel) else part for part in parts)
+        found = self._known.get(key)
+        if found is None:
+            # The parts are kept: of those that have gone, others may have the identity.
+            found = parts, make()
+            with self._lock:
+                self._known[key] = found
+                if len(self._known) > _MOST:
+                    del self._known[next(iter(self._known))]
+        return found[1]
