@@ -76,8 +76,8 @@ class ProportionalController:
         cls, routing: Routing, gain: Array, minimum: Array, damping: Array | None = None
     ) -> ProportionalController:
         """Prepare (21) for a routing with force closure; without damping by default."""
-        none = np.zeros(len(routing.joints))
-        return cls(gain, minimum, routing.pseudo_inverse, routing.force_closure().tension, none if damping is None else damping)
+        resisting = np.zeros(len(routing.joints)) if damping is None else damping
+        return cls(gain, minimum, routing.pseudo_inverse, routing.force_closure().tension, resisting)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

@@ -88,7 +88,7 @@ class World:
         self._scenario, self._origin = scenario, loop
         self.action = Action(self.task.action, loop.finger, self.task.duration)
         driven = self.action if self.action.drives is not None else None
-        self._loop = replace(loop, controller=self.action, drives=driven, parts=())
+        self._loop = replace(loop, controller=self.action, drives=driven)
         self._stepper = self._stepper_at(loop.initial_state())
         if self.action.drives is not None:
             self._stepper.drive(self.action.drives)
