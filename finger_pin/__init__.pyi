@@ -2,6 +2,7 @@ from . import analysis as analysis
 from . import control as control
 from . import exceptions as exceptions
 from . import learning as learning
+from . import mujoco as mujoco
 from . import studies as studies
 from . import views as views
 from .description.loading import list_scenarios as list_scenarios

@@ -1,8 +1,9 @@
 """MJCF of a finger, for MuJoCo: what of the model MuJoCo can express, as text. MuJoCo itself is not needed here.
 
 Exported are the rigid body, the routing, the passive tendons with their lumped mass, the springs of joints, viscous
-friction, gravity and the shapes. MuJoCo has no counterpart of the stiction and Coulomb parts of law (9), of the stroke
-limiters (2) and of the cut at zero of a delivered tension (12); they are left out, and the file says so at its head.
+friction, gravity and the shapes; on request law (9) too, which MuJoCo then needs `finger_pin.mujoco` for. MuJoCo has no
+counterpart of the stroke limiters (2) and of the cut at zero of a delivered tension (12); they are left out, and the
+file says so at its head.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mjcf_friction import add_friction_elements
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME
@@ -36,13 +38,19 @@ _NOTES = """
   Controls are tendon tensions f^a, N. The length of an actuated tendon is l = H_c theta, m, positive when the tendon is
   drawn towards its actuator, so that a positive control pulls.{passive}
 
-  Left out, because MuJoCo has no counterpart:
-  - stiction and Coulomb friction of tendons and joints (the dynamic friction law; only its viscous part is here);
+{friction}
+  Left out, because MuJoCo has no counterpart:{rough}
   - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
   - the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false", and limited="true" makes them
     MuJoCo's own soft constraints;
   - an external force at the fingertip: apply it to the site "{tip}".{servos}
   Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
+"""
+_SMOOTH = """
+  - stiction and Coulomb friction of tendons and joints (the dynamic friction law; only its viscous part is here);"""
+_ROUGH = """
+  Friction of tendons and joints (the dynamic friction law) is the plugin "finger_pin.friction": import
+  finger_pin.mujoco in Python before loading this file.
 """
 _SERVOS = """
   - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
@@ -60,6 +68,7 @@ def to_mjcf(
     integrator: str = "implicitfast",
     massless: bool = False,
     shapes: bool = True,
+    friction: bool = False,
 ) -> str:
     """Return the MJCF of a finger as text, or of a hand with its palm at rest.
 
@@ -75,6 +84,9 @@ def to_mjcf(
         massless: Replace each passive tendon by one spring K_t without a mass (5): coarser, but with time steps of
             0.1 ms instead of some microseconds.
         shapes: Whether to write the shapes.
+        friction: Whether to write law (9) of tendons and joints, with which the model loads only where
+        `finger_pin.mujoco`
+            has been imported.
 
     Raises:
         InputError: If a joint has no link, the posture has the wrong size, or the time step is not positive.
@@ -91,6 +103,7 @@ def to_mjcf(
         raise InputError("timestep", "must be above 0", timestep)
     root = ET.Element("mujoco", model=description.name)
     notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
+    notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
     notes["servos"] = _SERVOS if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _MASSLESS if massless else _MASSIVE
@@ -111,6 +124,8 @@ def to_mjcf(
     if not massless:
         _add_masses(world, description, tendons)
     _add_tendons(root, tendons, massless)
+    if friction:
+        add_friction_elements(root, description, tendons, massless)
     passive = np.zeros(0) if massless else tendons.rest_position(position)
     keyframe = ET.SubElement(root, "keyframe")
     ET.SubElement(keyframe, "key", name="start", qpos=_numbers(*position, *passive))

@@ -1,0 +1,21 @@
+"""Friction of finger_pin inside MuJoCo's `mj_step`: `add_friction` gives it to a model, `friction` reads it.
+
+Importing this registers the plugin that computes it, so that models that have it can be loaded.
+"""
+
+from __future__ import annotations
+
+from finger_pin.exceptions import InputError
+
+try:
+    import mujoco as _mujoco  # noqa: F401
+except ImportError:
+    raise InputError("mujoco", "is not installed: pip install 'finger-pin[mujoco]'") from None
+
+from finger_pin.mujoco.known_answer import try_known_answer
+from finger_pin.mujoco.signals import Signals, friction
+from finger_pin.mujoco.specification import MujocoWarning, add_friction
+
+try_known_answer()
+
+__all__ = ["MujocoWarning", "Signals", "add_friction", "friction"]

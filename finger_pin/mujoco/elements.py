@@ -1,0 +1,127 @@
+"""Level, load and turn of every kind of friction, from MuJoCo's model and its state."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from finger_pin.laws.bristle import friction_coefficient, friction_level
+from finger_pin.laws.capstan import capstan_coefficient
+from finger_pin.mechanism.mujoco_friction import (
+    COULOMB,
+    DRAG,
+    EXPONENT,
+    FLOOR,
+    HEAD,
+    KIND,
+    LENGTH,
+    LINK,
+    OFFSET,
+    RATIO,
+    STATIC,
+    STRIBECK,
+    VISCOUS,
+)
+from finger_pin.mujoco.loads import between, spring, turn_of_path
+from finger_pin.mujoco.memory import compiled, integers, numbers
+
+_coefficient, _capstan, _least = compiled(friction_coefficient), compiled(capstan_coefficient), compiled(friction_level)
+
+
+@compiled
+def tendon(
+    m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
+) -> Any:
+    """Return speed, level, the most that holds it back, tension and turn of a tendon, by (9b), (14), (16)."""
+    p, objects = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e:]
+    tendon, row = objects[0], objects[1]
+    pull = along[tendon] + spring(m, d, at, of, tendon)
+    if int(p[KIND]) == LINK:
+        pull += about[integers(m, at.jnt_dofadr)[row]] / p[RATIO]
+    tension = abs(pull) + held
+    # Against what pulls: of a pulled tendon its length's speed is negative when it is wound in.
+    way = 1.0 if pull > 0.0 else -1.0
+    speed = numbers(d, of.ten_velocity)[tendon]
+    loss = way * (force + p[VISCOUS] * speed)
+    delivered = max(tension - loss, 0.0)
+    bend, level = p[OFFSET], p[FLOOR]
+    if tension > 0.0 or abs(force) > p[FLOOR] or p[DRAG] > 0.0:
+        bend += _turn(m, d, at, of, kinds, e, tendon)
+        least = _capstan(p[COULOMB], bend)
+        coefficient = _coefficient(speed, least, p[STATIC] * least, p[STRIBECK], p[EXPONENT])
+        level = max(_least(tension + delivered, coefficient, 0.0) + p[DRAG], p[FLOOR])
+    for k in range(HEAD, int(p[LENGTH])):
+        reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
+    # What holds the tendon back takes no more than there is.
+    most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf
+    return speed, level, most, tension, bend
+
+
+@compiled
+def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> Any:
+    """Return the angle by which a path turns besides its offset, (15) or along its points, rad."""
+    if tendon >= 0 and integers(d, of.ten_wrapnum)[tendon] > 0:
+        return turn_of_path(d, of, tendon)
+    p, objects, found = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e:], 0.0
+    places, types = integers(m, at.jnt_qposadr), integers(m, at.tuple_objtype)[e:]
+    for k in range(HEAD, int(p[LENGTH])):
+        if types[k] == kinds.of_joint:
+            found += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
+    return found
+
+
+@compiled
+def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -> Any:
+    """Return speed, level, most, load and turn of a slide that is a passive tendon's mass: (14c), (16)."""
+    p, objects, types = (
+        numbers(m, at.tuple_objprm)[e:],
+        integers(m, at.tuple_objid)[e:],
+        integers(m, at.tuple_objtype)[e:],
+    )
+    speed, load = numbers(d, of.qvel)[integers(m, at.jnt_dofadr)[objects[0]]], 0.0
+    dofs, tension = integers(m, at.jnt_dofadr), 0.0
+    for k in range(HEAD, int(p[LENGTH])):
+        if types[k] == kinds.of_tendon:
+            tension = abs(spring(m, d, at, of, objects[k]))
+            load += tension
+        else:
+            # The joints that the half just named crosses.
+            reactions[dofs[objects[k]]] += tension
+    bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)
+    least = _capstan(p[COULOMB], bend)
+    coefficient = _coefficient(speed, least, p[STATIC] * least, p[STRIBECK], p[EXPONENT])
+    return speed, max(_least(load, coefficient, 0.0) + p[DRAG], p[FLOOR]), np.inf, load, bend
+
+
+@compiled
+def pin(m: Any, d: Any, at: Any, of: Any, e: Any, outside: Any, reactions: Any) -> Any:
+    """Return speed, level, most, load and turn of a joint's pin: (9b), (17)."""
+    p, joint = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e]
+    dof = integers(m, at.jnt_dofadr)[joint]
+    speed, load = numbers(d, of.qvel)[dof], reactions[dof]
+    x, y, z = outside[0], outside[1], outside[2]
+    if x * x + y * y + z * z > 0.0:
+        ex, ey, ez = _proximal(m, d, at, of, joint)
+        load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
+    coefficient = _coefficient(speed, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT])
+    return speed, _least(load, coefficient, p[FLOOR]) + p[DRAG], np.inf, load, 0.0
+
+
+@compiled
+def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
+    """Return e_j: from the joint before to this one, or the x axis of what carries it where there is none."""
+    parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)
+    anchor, own = numbers(d, of.xanchor), integers(m, at.jnt_bodyid)[joint]
+    body = parent[own]
+    while body > 0:
+        if count[body] > 0:
+            other = joints[body] + count[body] - 1
+            x, y, z = between(anchor, other, joint)
+            away = math.sqrt(x * x + y * y + z * z)
+            if away > 1e-6:
+                return x / away, y / away, z / away
+        body = parent[body]
+    frame = numbers(d, of.xmat)[9 * parent[own] :]
+    return frame[0], frame[3], frame[6]

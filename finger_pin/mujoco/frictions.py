@@ -1,0 +1,150 @@
+"""The frictions of a compiled MuJoCo model: what they rub on, in which row of the solver, and what loads them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mujoco_friction import LINK, PIN, TENDON, Friction
+
+# Kinds of joints that have one coordinate.
+_SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+# Fixed tendons whose coefficients agree to this share are parallel.
+_PARALLEL = 1e-9
+
+
+def frictions(model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str, tuple[Any, bool]]) -> list[Friction]:
+    """Return the frictions that users have asked for, folded into as few rows as hold them.
+
+    A fixed tendon over one joint acts in that joint's row, and fixed tendons that are multiples of each other share
+    one.
+
+    Raises:
+        InputError: If nothing pulls a tendon that was named, or a named joint neither turns nor slides.
+    """
+    found: list[Friction] = []
+    first: list[tuple[str, Array]] = []
+    for name, (law, named) in tendons.items():
+        if not _held(model, model.tendon(name).id) and not _linked(model, model.tendon(name).id):
+            if named:
+                raise InputError(
+                    f"tendons.{name}", "nothing pulls it: no actuator, spring, limit or equality of tendons"
+                )
+            continue
+        row, of_joint, ratio = _row(model, name, first)
+        kind = TENDON if _held(model, model.tendon(name).id) else LINK
+        found.append(
+            Friction(kind, name, row, of_joint, ratio, _tendon_law(model, name, law), _crossed(model, name, law))
+        )
+    for name, (law, named) in joints.items():
+        if int(model.joint(name).type[0]) in _SINGLE:
+            loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
+            numbers: tuple[float, ...] = (law.coulomb, law.stiction, law.stiffness, law.viscous, law.stribeck_velocity)
+            numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, 0.0, 0.0)
+            found.append(Friction(PIN, name, name, True, 1.0, numbers))
+        elif named:
+            raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
+    return found + _kept(model, found)
+
+
+def _kept(model: Any, found: list[Friction]) -> list[Friction]:
+    """Return the constant friction of joints in whose rows tendons act, which the model has and keeps."""
+    pins = {each.name for each in found if each.kind == PIN}
+    kept = []
+    for name in dict.fromkeys(each.row for each in found if not each.of_joint and each.row_of_joint):
+        loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
+        if name not in pins and loss > 0.0:
+            kept.append(Friction(PIN, name, name, True, 1.0, (0.0, 0.0, 5.0, 0.0, 0.1, loss, 1.0, 0.0, 0.0, 0.0)))
+    return kept
+
+
+def _held(model: Any, tendon: int) -> bool:
+    """Return whether a tendon has an actuator, a spring, a limit or an equality of its own."""
+    kinds = mujoco.mjtTrn
+    driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
+    coupled = model.eq_type == mujoco.mjtEq.mjEQ_TENDON
+    held = coupled & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))
+    return bool(driven.any() or held.any() or model.tendon_stiffness[tendon] > 0.0 or model.tendon_limited[tendon])
+
+
+def _linked(model: Any, tendon: int) -> bool:
+    """Return whether a fixed tendon runs over one joint alone, which an actuator drives."""
+    kinds = mujoco.mjtTrn
+    over = _coefficients(model, tendon)
+    if np.count_nonzero(over) != 1:
+        return False
+    on_joint = (model.actuator_trntype == kinds.mjTRN_JOINT) | (model.actuator_trntype == kinds.mjTRN_JOINTINPARENT)
+    return bool(np.any(on_joint & (model.actuator_trnid[:, 0] == np.flatnonzero(over)[0])))
+
+
+def _coefficients(model: Any, tendon: int) -> Array:
+    """Return the coefficients of a fixed tendon, shape (joints,); zeros of a spatial one."""
+    found = np.zeros(model.njnt)
+    for k in _pieces(model, tendon):
+        if model.wrap_type[k] == mujoco.mjtWrap.mjWRAP_JOINT:
+            found[model.wrap_objid[k]] += model.wrap_prm[k]
+    return found
+
+
+def _pieces(model: Any, tendon: int) -> range:
+    return range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
+
+
+def _row(model: Any, name: str, first: list[tuple[str, Array]]) -> tuple[str, bool, float]:
+    """Return the row that a tendon acts in: its joint's, an earlier parallel one's, or its own, which is noted."""
+    over = _coefficients(model, model.tendon(name).id)
+    joints = np.flatnonzero(over)
+    if len(joints) == 1:
+        return model.joint(joints[0]).name, True, float(over[joints[0]])
+    for other, along in first if len(joints) else []:
+        ratio = float(over @ along / (along @ along))
+        if np.abs(over - ratio * along).max() <= _PARALLEL * np.abs(over).max():
+            return other, False, ratio
+    if len(joints):
+        first.append((name, over))
+    return name, False, 1.0
+
+
+def _tendon_law(model: Any, name: str, law: Any) -> tuple[float, ...]:
+    drag = law.drag or float(model.tendon_frictionloss[model.tendon(name).id])
+    ratio = (law.coulomb, law.stiction_ratio, law.stiffness, law.viscous, law.stribeck_velocity)
+    return (*ratio, law.floor, law.stribeck_exponent, law.micro_damping, drag, law.curvature_offset)
+
+
+def _crossed(model: Any, name: str, law: Any) -> tuple[tuple[bool, str, float], ...]:
+    """Return the joints that a tendon crosses, whose pins it loads; of a fixed one with 1 where they bend it."""
+    tendon, movers = model.tendon(name).id, None
+    found = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
+    for k in _pieces(model, tendon):
+        kind, at = model.wrap_type[k], model.wrap_objid[k]
+        if kind == mujoco.mjtWrap.mjWRAP_PULLEY:
+            movers = None
+        elif kind != mujoco.mjtWrap.mjWRAP_JOINT:
+            body = model.site_bodyid[at] if kind == mujoco.mjtWrap.mjWRAP_SITE else model.geom_bodyid[at]
+            before, movers = movers, _movers(model, int(body))
+            found |= dict.fromkeys(sorted(movers ^ before) if before is not None else (), 0.0)
+    names = {int(j): model.joint(int(j)).name for j in found}
+    bends = set(names.values()) if law.bends is None else set(law.bends)
+    for joint in law.bends or ():
+        if joint not in names.values():
+            raise InputError(f"tendons.{name}.bends", f"must be joints of it: {', '.join(names.values())}", joint)
+    turns = {j: model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE for j in names}
+    return tuple(
+        (True, names[j], one * float(turns[j] and names[j] in bends))
+        for j, one in ((int(j), one) for j, one in found.items())
+        if int(model.jnt_type[j]) in _SINGLE
+    )
+
+
+def _movers(model: Any, body: int) -> set[int]:
+    """Return the joints that move a body."""
+    found = set[int]()
+    while body:
+        first = int(model.body_jntadr[body])
+        found |= set(range(first, first + int(model.body_jntnum[body])))
+        body = int(model.body_parentid[body])
+    return found

@@ -1,0 +1,42 @@
+"""The plugin tried in the MuJoCo at hand, on a slider whose answer is known."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+
+from finger_pin.exceptions import InputError
+from finger_pin.mujoco.signals import friction
+from finger_pin.mujoco.specification import add_friction
+
+_SLIDER = """
+<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body><joint name="x" type="slide" axis="1 0 0"/>
+<geom size="0.01" mass="0.1"/></body></worldbody><tendon><fixed name="rope"><joint joint="x" coef="1"/></fixed></tendon>
+<actuator><motor tendon="rope"/><motor joint="x"/></actuator></mujoco>"""
+
+
+def try_known_answer() -> None:
+    """Hold a slider below what its tendon's friction bears, and let it run above: T (1 - exp(-mu phi)) of tension T.
+
+    Raises:
+        InputError: If MuJoCo does not do so.
+    """
+    spec = mujoco.MjSpec.from_string(_SLIDER)
+    law = {"coulomb": 0.2, "curvature_offset": 1.5, "stiction_ratio": 1.0, "viscous": 0.0}
+    add_friction(spec, tendons={"rope": law})
+    model = spec.compile()
+    tension, borne = 10.0, 10.0 * (1.0 - math.exp(-0.3))
+    data, moved = mujoco.MjData(model), []
+    for share in (0.8, 1.1):
+        data.ctrl[:] = -tension, tension - share * borne
+        before = data.qpos[0]
+        mujoco.mj_step(model, data, 100)
+        moved.append(before - data.qpos[0])
+    # Bristles give way by less than 10 F / s0; what is left over pulls it for 0.2 s, 0.1 kg.
+    free = 0.5 * 0.1 * borne / 0.1 * 0.2**2
+    level = float(friction(model, data).level[0])
+    if not (
+        model.nu == 2 and moved[0] < 1e-3 and 0.9 * free < moved[1] < 1.1 * free and abs(level / borne - 1.0) < 1e-3
+    ):
+        raise InputError(f"mujoco {mujoco.__version__}", "friction gives a wrong answer in it: use another version")

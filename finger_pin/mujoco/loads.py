@@ -1,0 +1,144 @@
+"""What loads frictions in MuJoCo: actuators and springs of this step, the solver's forces of the last."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from finger_pin.mujoco.memory import (
+    compiled,
+    flags,
+    integer,
+    integers,
+    integers_at,
+    numbers,
+    numbers_at,
+    size,
+)
+
+
+@compiled
+def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
+    """Return what actuators exert along tendons, N, and on degrees of freedom, N m or N, within their limits.
+
+    MuJoCo clamps forces after plugins have been asked, so that they are clamped here.
+    """
+    along, about = np.zeros(size(m, at.ntendon)), np.zeros(size(m, at.nv))
+    kind, target, gear = integers(m, at.actuator_trntype), integers(m, at.actuator_trnid), numbers(m, at.actuator_gear)
+    limited, limits = flags(m, at.actuator_forcelimited), numbers(m, at.actuator_forcerange)
+    force, output, dof = numbers(d, of.actuator_force), integers(m, at.actuator_outadr), integers(m, at.jnt_dofadr)
+    for i in range(size(m, at.nactuator)):
+        exerted = force[output[i]]
+        if limited[i]:
+            exerted = min(max(exerted, limits[2 * i]), limits[2 * i + 1])
+        if kind[i] == kinds.tendon:
+            along[target[2 * i]] += gear[6 * i] * exerted
+        elif kind[i] == kinds.joint or kind[i] == kinds.jointinparent:
+            about[dof[target[2 * i]]] += gear[6 * i] * exerted
+    limited, limits = flags(m, at.tendon_actfrclimited), numbers(m, at.tendon_actfrcrange)
+    for i in range(len(along)):
+        if limited[i]:
+            along[i] = min(max(along[i], limits[2 * i]), limits[2 * i + 1])
+    return along, about
+
+
+@compiled
+def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
+    """Return what a tendon's own spring exerts along it, N: negative where it pulls."""
+    stiffness = numbers(m, at.tendon_stiffness)[tendon]
+    if stiffness == 0.0:
+        return 0.0
+    length, rest = numbers(d, of.ten_length)[tendon], numbers(m, at.tendon_lengthspring)
+    return stiffness * (max(rest[2 * tendon] - length, 0.0) + min(rest[2 * tendon + 1] - length, 0.0))
+
+
+@compiled
+def between(points: Any, first: Any, second: Any) -> Any:
+    """Return the way from one of MuJoCo's points to another, m."""
+    return (
+        points[3 * second] - points[3 * first],
+        points[3 * second + 1] - points[3 * first + 1],
+        points[3 * second + 2] - points[3 * first + 2],
+    )
+
+
+@compiled
+def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
+    """Return the sum of the angles by which a spatial tendon's path turns, rad.
+
+    Of a wrap both tangent points are in the path. The chord between them makes half the arc's angle with either
+    tangent.
+    """
+    first, count = integers(d, of.ten_wrapadr)[tendon], integers(d, of.ten_wrapnum)[tendon]
+    point, of_wrap, found = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
+    x0, y0, z0, known = 0.0, 0.0, 0.0, False
+    for k in range(first, first + count - 1):
+        if of_wrap[k] == -2 or of_wrap[k + 1] == -2:
+            known = False
+            continue
+        x, y, z = between(point, k, k + 1)
+        if x * x + y * y + z * z < 1e-24:
+            continue
+        if known:
+            cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
+            found += math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0)
+        x0, y0, z0, known = x, y, z, True
+    return found
+
+
+@compiled
+def held_tension(m: Any, d: Any, at: Any, of: Any, kinds: Any, tendon: Any) -> Any:
+    """Return what limits and equalities exert along a tendon, N, by the solver's last forces."""
+    kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
+    couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
+    found = 0.0
+    for r in range(integer(d, of.nefc)):
+        if kind[r] == kinds.limit_tendon and which[r] == tendon:
+            found += abs(force[r])
+        elif kind[r] == kinds.equality and couples[which[r]] == kinds.eq_tendon:
+            if first[which[r]] == tendon or second[which[r]] == tendon:
+                found += abs(force[r])
+    return found
+
+
+@compiled
+def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, place: Any, act: Any) -> None:
+    """Add the contact forces on what lies beyond joints, world frame, N: ``place`` says where in act, or is -1."""
+    first = size(d, of.contact)
+    parent, carrier = integers(m, at.body_parentid), integers(m, at.geom_bodyid)
+    joints, count = integers(m, at.body_jntadr), integers(m, at.body_jntnum)
+    force = np.zeros(3)
+    for c in range(integer(d, of.ncon)):
+        one = first + c * contact.size
+        row, geoms = integers_at(one + contact.efc_address)[0], integers_at(one + contact.geom)
+        if row < 0:
+            continue
+        _contact_force(d, of, contact, kinds, one, row, force)
+        for side in range(2):
+            sign, body = 2.0 * side - 1.0, carrier[geoms[side]] if geoms[side] >= 0 else 0
+            while body > 0:
+                for j in range(joints[body], joints[body] + count[body]):
+                    if place[j] >= 0:
+                        for i in range(3):
+                            act[place[j] + i] += sign * force[i]
+                body = parent[body]
+
+
+@compiled
+def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any, force: Any) -> None:
+    """Fill in the force of a contact on its second geom, world frame, N."""
+    exerted, frame = numbers(d, of.efc_force), numbers_at(one + contact.frame)
+    dim, kind = integers_at(one + contact.dim)[0], integers(d, of.efc_type)[row]
+    normal, across, along = exerted[row], 0.0, 0.0
+    if kind == kinds.elliptic:
+        across, along = exerted[row + 1], exerted[row + 2] if dim > 2 else 0.0
+    elif kind == kinds.pyramidal:
+        friction = numbers_at(one + contact.friction)
+        for k in range(1, 2 * (dim - 1)):
+            normal += exerted[row + k]
+        across = friction[0] * (exerted[row] - exerted[row + 1])
+        along = friction[1] * (exerted[row + 2] - exerted[row + 3]) if dim > 2 else 0.0
+    for i in range(3):
+        force[i] = normal * frame[i] + across * frame[3 + i] + along * frame[6 + i]

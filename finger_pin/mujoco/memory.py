@@ -1,0 +1,82 @@
+"""MuJoCo's numbers as arrays, in compiled code: a struct is an address, and a field its offset."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numba.extending import intrinsic
+
+_array: Any = numba.carray  # type: ignore[attr-defined]
+_intrinsic: Any = intrinsic
+#: Compiles a function of numbers and addresses; what it divides by zero is infinite, as in NumPy.
+compiled: Any = numba.njit(error_model="numpy")
+
+
+@_intrinsic
+def _pointer(typing_context: Any, address: Any) -> Any:
+    """Return an address as a pointer."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(numba.types.voidptr))
+
+    return numba.types.voidptr(address), generate
+
+
+@compiled
+def size(owner: Any, offset: Any) -> Any:
+    """Return a number of mjtSize, or an address."""
+    return _array(_pointer(owner + offset), 1, np.int64)[0]
+
+
+@compiled
+def integer(owner: Any, offset: Any) -> Any:
+    """Return a number of int."""
+    return _array(_pointer(owner + offset), 1, np.int32)[0]
+
+
+@compiled
+def number(owner: Any, offset: Any) -> Any:
+    """Return a number of mjtNum."""
+    return _array(_pointer(owner + offset), 1, np.float64)[0]
+
+
+# Arrays are read as far as an index of MuJoCo's leads, so that their lengths are not asked for.
+_ANY = 1 << 40
+
+
+@compiled
+def numbers(owner: Any, offset: Any) -> Any:
+    """Return an array of mjtNum."""
+    return _array(_pointer(size(owner, offset)), _ANY, np.float64)
+
+
+@compiled
+def integers(owner: Any, offset: Any) -> Any:
+    """Return an array of int."""
+    return _array(_pointer(size(owner, offset)), _ANY, np.int32)
+
+
+@compiled
+def flags(owner: Any, offset: Any) -> Any:
+    """Return an array of mjtBool or char."""
+    return _array(_pointer(size(owner, offset)), _ANY, np.uint8)
+
+
+@compiled
+def words(owner: Any, offset: Any) -> Any:
+    """Return an array of uintptr_t."""
+    return _array(_pointer(size(owner, offset)), _ANY, np.int64)
+
+
+@compiled
+def numbers_at(address: Any) -> Any:
+    """Return an array of mjtNum that begins at an address."""
+    return _array(_pointer(address), _ANY, np.float64)
+
+
+@compiled
+def integers_at(address: Any) -> Any:
+    """Return an array of int that begins at an address."""
+    return _array(_pointer(address), _ANY, np.int32)

@@ -1,0 +1,93 @@
+"""What frictions in a MuJoCo model do at present, as arrays of MuJoCo's own memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mujoco_friction import FORCE, LENGTH, LEVEL, LOAD, NAME, SIGNALS, TURN
+from finger_pin.mujoco.registration import register
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Signals of all frictions, which follow ``data`` as it is stepped; N and N m.
+
+    Attributes:
+        names: Of the tendons and joints, shape (k,).
+        level: What steady sliding settles at, by the speed and load of the last step.
+        friction: What the last step took, along the tendon's length or the joint's coordinate, against the motion.
+        bristle: F^s of (9a), the part of it that is elastic.
+        tension: What loads it, N: of a tendon its tension, of a joint the reaction (17).
+        turn: phi, rad, of a tendon.
+    """
+
+    names: tuple[str, ...]
+    level: Array
+    friction: Array
+    bristle: Array
+    tension: Array
+    turn: Array
+
+    def index(self, name: str) -> int:
+        """Return where a tendon or joint stands in the arrays.
+
+        Raises:
+            InputError: If it has no friction.
+        """
+        if name not in self.names:
+            raise InputError(f"friction.{name}", f"there are {', '.join(self.names)}")
+        return self.names.index(name)
+
+
+def friction(model: Any, data: Any) -> Signals:
+    """Return the friction of tendons and joints of a model that `add_friction` has prepared.
+
+    Arrays are parts of ``data``, without copies, where the model has one such hand; of several attached ones they are
+    joined, and copies.
+
+    Raises:
+        InputError: If the model has no friction, or is now integrated by ``discrete``.
+    """
+    register()
+    if int(model.opt.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):
+        raise InputError("model.opt.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
+    own = [i for i in range(model.nactuator) if model.actuator_plugin[i] >= 0 and _table(model, i) is not None]
+    if not own:
+        raise InputError("model", "has no friction: add_friction(spec, ...) before compiling it")
+    found = [_signals(model, data, i) for i in own]
+    if len(found) == 1:
+        return found[0]
+    arrays = {
+        name: np.concatenate([getattr(each, name) for each in found])
+        for name in Signals.__annotations__
+        if name != "names"
+    }
+    return Signals(tuple(name for each in found for name in each.names), **arrays)
+
+
+def _table(model: Any, actuator: int) -> int | None:
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) or ""
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TUPLE, name)
+    return found if found >= 0 and name.endswith(NAME) else None
+
+
+def _signals(model: Any, data: Any, actuator: int) -> Signals:
+    table = _table(model, actuator)
+    assert table is not None
+    e = int(model.tuple_adr[table])
+    end, z = e + int(model.tuple_size[table]), int(model.actuator_actadr[actuator])
+    names = []
+    while e < end:
+        kind = mujoco.mjtObj(int(model.tuple_objtype[e]))
+        names.append(mujoco.mj_id2name(model, kind, int(model.tuple_objid[e])))
+        e += int(model.tuple_objprm[e + LENGTH])
+    first = int(model.plugin_stateadr[model.actuator_plugin[actuator]])
+    states = data.plugin_state[first : first + SIGNALS * len(names)].reshape(-1, SIGNALS)
+    level, force, load, turn = (states[:, k] for k in (LEVEL, FORCE, LOAD, TURN))
+    return Signals(tuple(names), level, force, data.act[z : z + len(names)], load, turn)

@@ -1,0 +1,110 @@
+"""Friction as elements of a `mujoco.MjSpec`: an actuator that stands for it, a tuple of numbers, rows of the solver."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from finger_pin.exceptions import InputError, ScenarioWarning
+from finger_pin.mechanism.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, Friction
+from finger_pin.mujoco.choice import JOINT, TENDON_KEYS, choose
+from finger_pin.mujoco.frictions import frictions
+from finger_pin.mujoco.registration import register
+
+Keys = Mapping[str, Mapping[str, Any]]
+
+
+class MujocoWarning(ScenarioWarning):
+    """A MuJoCo model has an option with which friction is less than it could be."""
+
+
+def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = None) -> None:
+    """Add friction that grows with tension, and holds, to a MuJoCo model.
+
+    Tendons rub in their canals by (9), (14) and (16), joints on their pins by (9) and (17). Names may have stars
+    (``*``); of several entries that match, later ones go on top. With stars, tendons that nothing pulls are passed
+    over. A friction loss that the model has stays, as what a friction is at least: ``drag`` of a tendon, ``floor`` of
+    a joint.
+
+    Args:
+        spec: A `mujoco.MjSpec`, which is changed; compile it afterwards.
+        tendons: By name, keys of ``finger.tendon_friction`` (coulomb, stiction_ratio, stiffness, viscous,
+            stribeck_velocity, floor, stribeck_exponent, micro_damping, drag), ``curvature_offset``, rad, the turn that
+            the model does not show, and for fixed tendons ``bends``, the joints whose angle bends the path.
+        joints: By name, keys of ``finger.joint_friction``.
+
+    Raises:
+        InputError: If a name matches nothing, a key or number is not allowed, the model does not compile, has friction
+            already, or is integrated by ``discrete``, which leaves no room for friction.
+    """
+    register()
+    if not isinstance(spec, mujoco.MjSpec):
+        raise InputError("spec", "must be a mujoco.MjSpec", type(spec).__name__)
+    if any(each.name == NAME for each in spec.actuators):
+        raise InputError("spec", "has friction already: add all of it in one call")
+    if int(spec.option.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):
+        raise InputError("spec.option.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
+    if spec.option.noslip_iterations:
+        warnings.warn(
+            MujocoWarning("spec.option.noslip_iterations: they take the bristles away, so that friction creeps"),
+            stacklevel=2,
+        )
+    _name_all(spec)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise InputError("spec", " ".join(str(error).split())) from None
+    found = frictions(
+        model,
+        choose(tendons, [model.tendon(i).name for i in range(model.ntendon)], "tendons", TENDON_KEYS),
+        choose(joints, [model.joint(i).name for i in range(model.njnt)], "joints", JOINT),
+    )
+    if not found:
+        raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
+    _write(spec, model, found)
+
+
+def _name_all(spec: Any) -> None:
+    """Give tendons and joints without names some, by which the table knows them."""
+    for what, elements in (("tendon", spec.tendons), ("joint", spec.joints)):
+        for index, each in enumerate(elements):
+            each.name = each.name or f"{what}_{index}"
+
+
+def _write(spec: Any, model: Any, found: list[Friction]) -> None:
+    """Add actuator, tuple and plugin, and prepare the rows."""
+    elements = [element for each in found for element in each.elements()]
+    kinds, names, values = zip(*elements, strict=True)
+    types = {"joint": mujoco.mjtObj.mjOBJ_JOINT, "tendon": mujoco.mjtObj.mjOBJ_TENDON}
+    spec.add_tuple(name=NAME, objtype=[types[each] for each in kinds], objname=list(names), objprm=list(values))
+    states = sum(each.states for each in found)
+    for key in spec.keys:
+        if len(key.act):
+            key.act = np.append(np.array(key.act), np.zeros(states))
+    spec.activate_plugin(PLUGIN)
+    plugin = spec.add_plugin(name=NAME, plugin_name=PLUGIN, active=True)
+    plugin.config = {COUNT: str(len(found))}
+    # In a class of its own, so that XML keeps what makes it an actuator without an input.
+    default = spec.add_default(NAME, spec.default)
+    default.actuator.gaintype, default.actuator.ctrlspec = mujoco.mjtGain.mjGAIN_DCMOTOR, NO_INPUT
+    target, kind = _target(spec, found)
+    actuator = spec.add_actuator(default, name=NAME, trntype=kind, target=target, actdim=states)
+    actuator.gaintype, actuator.ctrlspec = mujoco.mjtGain.mjGAIN_DCMOTOR, NO_INPUT
+    actuator.dyntype, actuator.biastype = mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtBias.mjBIAS_NONE
+    actuator.gear, actuator.group, actuator.plugin = np.zeros(6), GROUP, plugin
+    for each in found:
+        row = spec.joint(each.row) if each.row_of_joint else spec.tendon(each.row)
+        row.frictionloss = max(float(row.frictionloss), abs(each.ratio) * each.least, LEAST_LOSS)
+
+
+def _target(spec: Any, found: list[Friction]) -> tuple[str, Any]:
+    """Return what the actuator stands at, on which it does nothing: something driven, whose tree does not sleep."""
+    for each in spec.actuators:
+        if each.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):
+            return each.target, each.trntype
+    kind = mujoco.mjtTrn.mjTRN_JOINT if found[0].of_joint else mujoco.mjtTrn.mjTRN_TENDON
+    return found[0].name, kind

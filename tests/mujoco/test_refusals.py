@@ -1,0 +1,65 @@
+"""What friction in MuJoCo refuses, in one line that names it."""
+
+import mujoco
+import pytest
+from sliders import XML
+
+import finger_pin as fp
+from finger_pin.mujoco import MujocoWarning
+
+
+def rope(**options):
+    spec = mujoco.MjSpec.from_string(XML.format(integrator="Euler", spring=0, mass=1))
+    for name, value in options.items():
+        setattr(spec.option, name, value)
+    return spec
+
+
+@pytest.mark.parametrize(
+    "tendons, joints, entry",
+    [
+        ({"rope": {"coulom": 0.1}}, None, "tendons.rope.coulom"),
+        ({"rope": {"coulomb": -1.0}}, None, "tendons.rope.coulomb"),
+        ({"rope": {"coulomb": [0.1, 0.2]}}, None, "tendons.rope.coulomb"),
+        ({"rope": 0.1}, None, "tendons.rope"),
+        ({"ropes": {}}, None, "tendons.ropes"),
+        ({"rope": {"bends": ["y"]}}, None, "tendons.rope.bends"),
+        (None, {"y*": {}}, "joints.y*"),
+        (None, {"x": {"coulomb": 2.5}}, "joints.x.coulomb"),
+        (None, None, "spec"),
+    ],
+)
+def test_wrong_names_keys_and_numbers_are_named(tendons, joints, entry):
+    with pytest.raises(fp.InputError) as caught:
+        fp.mujoco.add_friction(rope(), tendons=tendons, joints=joints)
+    assert caught.value.entry == entry and "\n" not in str(caught.value)
+
+
+def test_what_cannot_be_is_refused_and_what_is_less_is_warned_of():
+    once = rope()
+    fp.mujoco.add_friction(once, tendons={"rope": {}})
+    refused = [once, "hand.xml"]
+    if hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE"):
+        refused.append(rope(integrator=mujoco.mjtIntegrator.mjINT_DISCRETE))
+        model = once.compile()
+        data = mujoco.MjData(model)
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        with pytest.raises(fp.InputError, match="discrete"):
+            fp.mujoco.friction(model, data)
+    for spec in refused:
+        with pytest.raises(fp.InputError):
+            fp.mujoco.add_friction(spec, tendons={"rope": {}})
+    with pytest.raises(fp.InputError, match="no friction"):
+        plain = rope().compile()
+        fp.mujoco.friction(plain, mujoco.MjData(plain))
+    with pytest.warns(MujocoWarning, match="noslip"):
+        fp.mujoco.add_friction(rope(noslip_iterations=3), tendons={"rope": {}})
+
+
+def test_a_tendon_that_nothing_pulls_is_passed_over_by_stars_and_refused_by_name():
+    for pattern in ("rope*", "rope"):
+        spec = rope()
+        spec.delete(spec.actuator("pull"))
+        spec.delete(spec.actuator("push"))
+        with pytest.raises(fp.InputError, match="nothing pulls"):
+            fp.mujoco.add_friction(spec, tendons={pattern: {}})

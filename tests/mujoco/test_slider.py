@@ -1,0 +1,99 @@
+"""Friction of one tendon in MuJoCo: what sticks, what slides, and at which force."""
+
+import mujoco
+import numpy as np
+import pytest
+from sliders import exact, run, slider
+
+import finger_pin as fp
+
+ROPE = {"coulomb": 0.2, "curvature_offset": 1.0}
+TENSION, BORNE = 10.0, 10.0 * (1.0 - np.exp(-0.2))
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+def test_at_four_fifths_of_the_level_nothing_creeps_in_a_minute(integrator):
+    model = slider(integrator=integrator, **ROPE)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = TENSION, 0.8 * BORNE - TENSION
+    mujoco.mj_step(model, data, 500)
+    before = data.qpos[0]
+    mujoco.mj_step(model, data, 29_500)
+    assert abs(data.qpos[0] - before) < 59.0 * 1e-8
+    # It has given way as bristles do: by more than F / s0, by less than 10 times as much.
+    assert 1.0 < data.qpos[0] / (0.8 * BORNE / 5e4) < 10.0
+    assert fp.mujoco.friction(model, data).friction[0] == pytest.approx(-0.8 * BORNE, rel=1e-6)
+
+
+@pytest.mark.parametrize("mass", [1e-5, 1.0])
+@pytest.mark.parametrize("solver", ["mjSOL_PGS", "mjSOL_CG", "mjSOL_NEWTON"])
+def test_it_breaks_away_within_a_hundredth_of_the_level_and_in_either_direction_by_the_capstan_law(mass, solver):
+    model = slider(mass, **ROPE)
+    model.opt.solver = getattr(mujoco.mjtSolver, solver)
+    for sign, borne in ((1.0, BORNE), (-1.0, 10.0 * (np.exp(0.2) - 1.0))):
+        data, shares = mujoco.MjData(model), np.linspace(0.0, 1.1, 4000)
+        signals, taken, moved = fp.mujoco.friction(model, data), [], []
+        for share in shares:
+            data.ctrl[:] = TENSION, sign * share * borne - TENSION
+            mujoco.mj_step(model, data)
+            taken.append(-sign * signals.friction[0])
+            moved.append(sign * data.qpos[0])
+        assert max(taken) == pytest.approx(borne, rel=0.01)
+        # It has held until then, and runs since.
+        assert max(np.array(moved)[shares < 0.99]) < 1e-3 < 2e-3 < moved[-1]
+
+
+def test_a_slack_tendon_rubs_no_more_than_its_floor():
+    model = slider(**ROPE)
+    data = mujoco.MjData(model)
+    data.ctrl[1] = 0.01
+    mujoco.mj_step(model, data, 500)
+    # 0.1 kg under 0.01 N less the floor of 1e-4 N for a second.
+    assert data.qvel[0] == pytest.approx(0.0099 / 0.1, rel=1e-3)
+
+
+def test_drag_adds_to_the_level():
+    model = slider(**ROPE, drag=0.5)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = TENSION, 3.0 - TENSION
+    mujoco.mj_step(model, data, 500)
+    least = np.tanh(0.1)
+    # F = mu (2 T - F) + drag while it is drawn in.
+    assert fp.mujoco.friction(model, data).bristle[0] == pytest.approx(-(20.0 * least + 0.5) / (1.0 + least), rel=1e-3)
+
+
+@pytest.mark.parametrize("micro_damping", [0.0, 20.0])
+def test_motion_converges_to_the_equations_written_out_at_the_first_order_of_mujoco_s_step(micro_damping):
+    law = {"coulomb": 0.3, "curvature_offset": 1.2, "stiction_ratio": 1.4, "stiffness": 2e3, "viscous": 5.0}
+    law |= {"stribeck_velocity": 0.01, "drag": 0.2, "micro_damping": micro_damping}
+
+    def pull(t):
+        return 6.0 + 5.0 * np.sin(9.0 * t)
+
+    truth = exact(pull, np.linspace(0.0, 0.8, 9), 0.3, 400.0, law)
+    model, errors = slider(0.3, 400.0, **law), []
+    for step in (5e-5, 2.5e-5, 1.25e-5):
+        model.opt.timestep = step
+        errors.append(abs(run(model, pull, 0.8, 0.1) - truth).max())
+    # It has reversed, stuck and slid by centimetres.
+    assert np.ptp(truth) > 0.02 and errors[-1] < 1e-5
+    ratios = np.divide(errors[:-1], errors[1:])
+    assert ratios.min() > 1.8 and ratios[-1] == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize("mass", [1e-4, 2.0])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_friction_gives_back_no_more_than_its_bristles_hold(mass, integrator):
+    """The work taken along the way that MuJoCo goes, under random jumps of tension and load."""
+    model = slider(mass, integrator=integrator, **ROPE)
+    data, random = mujoco.MjData(model), np.random.default_rng(3)
+    signals, taken, most, elastic = fp.mujoco.friction(model, data), 0.0, 0.0, 0.0
+    for step in range(4_000):
+        if step % 40 == 0:
+            data.ctrl[:] = random.uniform(0.0, 20.0), -random.uniform(0.0, 20.0)
+        before = data.qpos[0]
+        mujoco.mj_step(model, data)
+        taken += -signals.friction[0] * (data.qpos[0] - before)
+        most, elastic = max(most, taken), max(elastic, signals.level[0] ** 2 / 1e5)
+        assert taken > most - elastic
+    assert most > 1.0 and elastic < 1e-3
