@@ -10,55 +10,11 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.hand import PathSignal
 from finger_pin.description.routing import Array
+from finger_pin.description.surface import MILLIMETRES, SIZES, Surface, check_sizes, sizes_of
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 
 #: The coordinates of an object's path.
 PATH = ("x", "y", "z")
-
-#: The sizes of each shape. Solids are about their origin, cylinder and capsule along z; a half-space is z < 0.
-SIZES: dict[str, tuple[str, ...]] = {
-    "half_space": (),
-    "sphere": ("radius",),
-    "box": ("sides",),
-    "cylinder": ("radius", "length"),
-    "capsule": ("radius", "length"),
-}
-_MILLIMETRES = " m (is it in millimetres?)"
-
-
-class Surface(Description):
-    """Contact of a surface: Hunt-Crossley along the normal, bristles with Coulomb friction along the tangents.
-
-    Where two objects meet that both have one, the smaller of their numbers count.
-    """
-
-    stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
-        1e4, unit="N/m^exponent", source="a soft fingertip", doc="k of f_n = k d^p (1 + c d')."
-    )
-    damping: Annotated[float, real(0.0, 1e4)] = quantity(
-        2.0, unit="s/m", source="estimate", doc="c; slow impacts come back with 1 - 2 c v / 3 of their speed v."
-    )
-    exponent: Annotated[float, real(1.0, 1.5)] = quantity(
-        1.0, unit="1", source="Hunt and Crossley 1975", doc="p: 1, or 1.5 for a sphere of linear material (Hertz)."
-    )
-    friction: Annotated[float, real(0.0, 10.0)] = quantity(
-        0.7, unit="1", source="rubber on plastic", doc="mu_k, the coefficient of sliding friction."
-    )
-    stiction_ratio: Annotated[float, real(1.0, 100.0)] = quantity(
-        1.0, unit="1", source="chosen", doc="mu_s / mu_k: sliding begins at mu_s f_n."
-    )
-    tangential_stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
-        7e3, unit="N/m", source="two thirds of k (Mindlin 1949, incompressible)", doc="k_t of the bristles."
-    )
-    lag: Annotated[float, real(0.0, 1.0, above=True)] = quantity(
-        1e-3, unit="s", source="estimate", doc="T; k_t T is the bristles' damping, T how fast they forget."
-    )
-    stribeck_velocity: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
-        0.01, unit="m/s", source="estimate", doc="omega, at which mu has fallen by 63 % from mu_s to mu_k."
-    )
-    floor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
-        1e-4, unit="N", source="keeps slopes finite at f_n = 0", doc="Friction below which sticking is gradual."
-    )
 
 
 class Object(Description):
@@ -67,16 +23,16 @@ class Object(Description):
     shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
         ..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule."
     )
-    radius: Annotated[float, real(0.0, 10.0, above=True, hint=_MILLIMETRES)] | None = quantity(
+    radius: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
     )
-    length: Annotated[float, real(0.0, 10.0, above=True, hint=_MILLIMETRES)] | None = quantity(
+    length: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a cylinder; of a capsule without its round ends."
     )
-    sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, _MILLIMETRES)] | None = quantity(
+    sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a box, along x, y and z."
     )
-    position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, _MILLIMETRES)] = quantity(
+    position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its origin, base frame; of a free object at t = 0."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1e3, 1e3)] = quantity(
@@ -113,13 +69,7 @@ class Object(Description):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        for entry in ("radius", "length", "sides"):
-            given, needed = getattr(self, entry), entry in SIZES[self.shape]
-            if given is None and needed:
-                raise problem(entry, f'is missing: shape = "{self.shape}" needs {", ".join(SIZES[self.shape])}')
-            if given is not None and not needed:
-                shapes = ", ".join(shape for shape, entries in SIZES.items() if entry in entries)
-                raise problem(entry, f'is for {shapes}, not for shape = "{self.shape}"', given)
+        check_sizes(self, self.shape)
         if math.hypot(*self.orientation) < 1e-6:
             raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
         if self.shape == "half_space" and self.mass is not None:
@@ -139,9 +89,7 @@ class Object(Description):
     @property
     def sizes(self) -> tuple[float, ...]:
         """The numbers of `SIZES`, m."""
-        if self.sides is not None:
-            return self.sides
-        return tuple(getattr(self, name) for name in SIZES[self.shape])
+        return sizes_of(self, self.shape)
 
     @property
     def quaternion(self) -> Array:

@@ -218,6 +218,11 @@ class FingerDescription(Description):
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiter = StrokeLimiter()
     actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    touches_itself: bool = Field(
+        False,
+        strict=True,
+        description="Whether links that are not neighbours touch each other, where there are contacts.",
+    )
     _hand: Any = PrivateAttr(None)
     tree: Tree | None = Field(None, description="Bodies that are no chain of links, and what drives them.")
 

@@ -14,6 +14,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.meshes import Mesh
+from finger_pin.description.surface import BodyShape
 from finger_pin.description.validation import (
     MOST_ANGLE,
     Description,
@@ -78,6 +79,7 @@ class Body(Description):
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
     solids: dict[Name, Solid] = Field({}, description="What is seen of it, by name.")
+    shapes: dict[Name, BodyShape] = Field({}, description="What touches of it, by name; no two of a tree are alike.")
 
     @field_validator("orientation")
     @classmethod
@@ -208,6 +210,7 @@ class Tree(Description):
     couplings: dict[Name, Coupling] = Field({}, description="By name.")
     actuators: dict[Name, Actuator] = Field({}, description="By name.")
     tip: Tip = Tip()
+    touching: tuple[tuple[Name, Name], ...] = Field((), description="Pairs of its own shapes that touch each other.")
     meshes: dict[Name, Mesh] = Field({}, description="What solids are made of, by name.")
     left_out: tuple[str, ...] = Field((), description="What the model had that is not here.")
 
@@ -236,7 +239,21 @@ class Tree(Description):
             _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
         _check("tip.body", self.tip.body, self.bodies, "body")
+        self._check_shapes()
         return self
+
+    def _check_shapes(self) -> None:
+        owner: dict[str, str] = {}
+        for name, body in self.bodies.items():
+            for shape in body.shapes:
+                if shape in owner:
+                    raise problem(f"bodies.{name}.shapes.{shape}", f"{owner[shape]} has a shape of this name")
+                owner[shape] = name
+        for pair in self.touching:
+            for shape in pair:
+                _check("touching", shape, owner, "shape")
+            if owner[pair[0]] == owner[pair[1]]:
+                raise problem("touching", "shapes of one body do not touch each other", list(pair))
 
     def crossed(self, tendon: str) -> frozenset[str]:
         """Return the joints that a tendon crosses: those that move one piece of its path and not the next."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from finger_pin.description.objects import Surface
 from finger_pin.description.routing import Array
+from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.features import Part, contacts_of
@@ -22,12 +22,13 @@ from finger_pin.mechanism.solids import Solid
 DEEPEST_START = 1e-3
 
 
-def contact_rows(solids: Sequence[Solid], width: int) -> Rows:
+def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozenset[str]] = ()) -> Rows:
     """Return the contacts of all pairs that can touch: not of one group, not both fixed, and within reach.
 
     Args:
         solids: Links and objects.
         width: Number of coordinates.
+        within: Pairs of one group, by their names, that touch all the same.
 
     Returns:
         A table of contacts named ``link-object``, numbered where a pair has several.
@@ -36,7 +37,8 @@ def contact_rows(solids: Sequence[Solid], width: int) -> Rows:
     numbers: list[tuple[float, ...]] = []
     paths: list[tuple[Leg, ...]] = []
     for one, other in itertools.combinations(solids, 2):
-        if one.group == other.group or (one.led and other.led) or one.never_meets(other):
+        apart = one.group == other.group and frozenset((one.name, other.name)) not in within
+        if apart or (one.led and other.led) or one.never_meets(other):
             continue
         found = list(contacts_of(one, other))
         for index, (a, part, w, prism) in enumerate(found):

@@ -124,7 +124,9 @@ class Finger:
             self.routing.actuated,
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
-        self.surroundings = None if objects is None else Surroundings.of(objects, description, self.mechanism)
+        placed = None if self.paths is None else self.paths.placed
+        around = None if objects is None else Surroundings.of(objects, description, self.mechanism, placed)
+        self.surroundings = around
         if self.surroundings is not None:
             self.mechanism = self.surroundings.around(self.mechanism)
             free, contacts = tuple(self.surroundings.free), self.surroundings.contacts.names

@@ -17,6 +17,7 @@ from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mujoco_names import Names, Table, distinct, entry_name, quaternion
 from finger_pin.mechanism.mujoco_rest import Rest
+from finger_pin.mechanism.mujoco_shapes import Shapes
 from finger_pin.mechanism.mujoco_tendons import STOP, TendonReader
 from finger_pin.mechanism.routes import rotation
 
@@ -69,6 +70,7 @@ class _Reader:
             raise InputError("model", "has no tendons")
         self.rest = Rest(mujoco, model)
         self.names = Names.of(model)
+        self.shapes = Shapes(mujoco, model, self.names, self.rest)
         kinds = mujoco.mjtJoint
         for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
             raise InputError(
@@ -106,6 +108,7 @@ class _Reader:
                 "couplings": self._couplings(),
                 "actuators": self._actuators(),
                 "tip": self._tip(),
+                "touching": self.shapes.pairs(bodies),
                 "meshes": self._meshes(bodies),
                 "left_out": self.rest.listed(),
             },
@@ -141,6 +144,7 @@ class _Reader:
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
             "solids": self._solids(i),
+            "shapes": self.shapes.of_body(i),
         }
 
     def _solids(self, body: int) -> Table:

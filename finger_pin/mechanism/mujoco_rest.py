@@ -41,9 +41,6 @@ class Rest:
         self._every("tendon", "tendon_springyield", "a spring that yields")
         if model.opt.density or model.opt.viscosity:
             self.add("the medium: nothing is dragged")
-        colliding = int(np.count_nonzero(model.geom_contype | model.geom_conaffinity))
-        if colliding or model.npair:
-            self.add(f"contacts: {colliding} geoms collide in the model, none here")
         for count, what in (
             (model.nflex, "flexible bodies"),
             (model.nplugin, "plugins"),

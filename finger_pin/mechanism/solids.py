@@ -8,10 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.objects import Object, Surface
-from finger_pin.description.parameters import Link
+from finger_pin.description.objects import Object
+from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
+from finger_pin.description.surface import Surface
+from finger_pin.description.tree import Tree
 from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.routes import Placed, rotation
 
 # A link's own z axis runs along it, which is the x axis of its joint.
 _ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -68,6 +71,8 @@ class Solid:
 
     def kept_near(self, body: RigidBody) -> Solid:
         """Return it with the ball about the first joint that carries it, in which joints that turn keep it."""
+        if not self.joint:
+            return replace(self, home=np.array(self.place.translation), range=self.reach, led=True)
         first, *others = [each for each in body.model.supports[self.joint] if each]
         radius = float(np.linalg.norm(self.place.translation)) + self.reach
         radius += sum(float(np.linalg.norm(body.model.jointPlacements[each].translation)) for each in others)
@@ -102,6 +107,30 @@ def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
         ).kept_near(body)
         for name, link in links.items()
     ]
+
+
+def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody) -> list[Solid]:
+    """Return the shapes of the bodies of a tree, which are one group; ``placed`` says where the bodies stand."""
+    found = []
+    for name, each in tree.bodies.items():
+        for own, shape in each.shapes.items():
+            place = pin.SE3(rotation(shape.orientation), np.array(shape.position))
+            solid = Solid(own, "tree", placed[name].joint, placed[name].frame * place, shape.shape, shape.sizes)
+            found.append(replace(solid, surface=shape.surface).kept_near(body))
+    return found
+
+
+def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
+    """Return the names of links, or of shapes, of one finger that touch each other: no neighbours among links."""
+    if description.tree is not None:
+        return {frozenset(pair) for pair in description.tree.touching}
+    hand = description.hand
+    fingers = {"": description} if hand is None else {f"{key}.": each.finger for key, each in hand.fingers.items()}
+    found = set()
+    for prefix, finger in fingers.items():
+        names = [prefix + name for name in finger.joints] if finger.touches_itself else []
+        found |= {frozenset((names[i], names[k])) for k in range(len(names)) for i in range(k - 1)}
+    return found
 
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:

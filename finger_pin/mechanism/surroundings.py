@@ -18,11 +18,21 @@ from finger_pin.mechanism.evaluation import Touching
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.routes import Placed
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids
+from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids, pairs_within, tree_solids
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
+
+
+def _links(description: FingerDescription) -> dict[str, Link]:
+    links: dict[str, Link] = {}
+    for name, joint in description.joints.items():
+        if joint.link is None:
+            raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
+        links[name] = joint.link
+    return links
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,33 +50,40 @@ class Surroundings:
     contacts: Rows
 
     @classmethod
-    def of(cls, objects: Mapping[str, Object], description: FingerDescription, mechanism: Mechanism) -> Surroundings:
+    def of(
+        cls,
+        objects: Mapping[str, Object],
+        description: FingerDescription,
+        mechanism: Mechanism,
+        placed: Mapping[str | None, Placed] | None = None,
+    ) -> Surroundings:
         """Put objects around a finger.
 
         Args:
             objects: By name.
             description: The finger.
             mechanism: The finger alone.
+            placed: Where the bodies of a tree stand; None of one that is made of links.
 
         Raises:
-            InputError: If an object has the name of a joint, or a link has no size.
+            InputError: If an object has the name of a joint or a shape, or a link has no size.
         """
-        links: dict[str, Link] = {}
-        for name, joint in description.joints.items():
-            if joint.link is None:
-                raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
-            links[name] = joint.link
+        extended, tree = add_free_objects(mechanism.body, objects), description.tree
+        if tree is not None and placed is not None:
+            own = tree_solids(tree, placed, extended)
+        else:
+            own = finger_solids(_links(description), extended)
         for name in objects:
-            if name in links:
-                raise InputError(f"environment.objects.{name}", "a joint has this name; choose another")
-        extended = add_free_objects(mechanism.body, objects)
-        solids = [*finger_solids(links, extended), *object_solids(objects, extended)]
+            for what, taken in (("joint", description.joints), ("shape", [each.name for each in own])):
+                if name in taken:
+                    raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
+        solids = [*own, *object_solids(objects, extended)]
         free = {name: each for name, each in objects.items() if each.moves}
         for name, each in free.items():
             if each.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
-        return cls(free, extended, contact_rows(solids, width))
+        return cls(free, extended, contact_rows(solids, width, pairs_within(description)))
 
     def around(self, mechanism: Mechanism) -> Mechanism:
         """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.

@@ -21,7 +21,7 @@ def test_a_mujoco_hand_is_simulated_and_its_scenario_runs_again(tmp_path, capsys
     arguments = ["--mujoco", str(tmp_path / "one.xml"), "--duration", "0.5", "--output", str(output)]
     assert run_function(simulate, arguments) == 0
     said = capsys.readouterr().out
-    assert "Not carried over:\n  contacts: 1 geoms collide in the model, none here" in said
+    assert "Not carried over" not in said
     assert "servo" in said and "finger_joint" in said
     assert sorted(each.name for each in (output / "figures").iterdir()) == ["energy.png", "motion.png"]
     page = (output / "animation.html").read_text("utf-8")

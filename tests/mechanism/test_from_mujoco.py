@@ -177,11 +177,11 @@ def test_what_is_not_carried_over_is_listed():
     assert description.tree.left_out == (
         "free joint of thing: it stays where it is",
         "body w: gravity compensation",
-        "contacts: 2 geoms collide in the model, none here",
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
         "equality equality_0: of kind weld",
         "equality equality_1: its polynomial is not linear",
+        "geom geom_1: its body stands still and carries nothing",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w"]

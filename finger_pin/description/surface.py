@@ -1,0 +1,109 @@
+"""Surfaces with which bodies touch, and the shapes with which those of a tree do."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from finger_pin.description.validation import Description, choice, problem, quantity, real, vector
+
+#: The sizes of each shape. Solids are about their origin, cylinder and capsule along z; a half-space is z < 0.
+SIZES: dict[str, tuple[str, ...]] = {
+    "half_space": (),
+    "sphere": ("radius",),
+    "box": ("sides",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+}
+MILLIMETRES = " m (is it in millimetres?)"
+
+
+class Surface(Description):
+    """Contact of a surface: Hunt-Crossley along the normal, bristles with Coulomb friction along the tangents.
+
+    Where two objects meet that both have one, the smaller of their numbers count.
+    """
+
+    stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
+        1e4, unit="N/m^exponent", source="a soft fingertip", doc="k of f_n = k d^p (1 + c d')."
+    )
+    damping: Annotated[float, real(0.0, 1e4)] = quantity(
+        2.0, unit="s/m", source="estimate", doc="c; slow impacts come back with 1 - 2 c v / 3 of their speed v."
+    )
+    exponent: Annotated[float, real(1.0, 1.5)] = quantity(
+        1.0, unit="1", source="Hunt and Crossley 1975", doc="p: 1, or 1.5 for a sphere of linear material (Hertz)."
+    )
+    friction: Annotated[float, real(0.0, 10.0)] = quantity(
+        0.7, unit="1", source="rubber on plastic", doc="mu_k, the coefficient of sliding friction."
+    )
+    stiction_ratio: Annotated[float, real(1.0, 100.0)] = quantity(
+        1.0, unit="1", source="chosen", doc="mu_s / mu_k: sliding begins at mu_s f_n."
+    )
+    tangential_stiffness: Annotated[float, real(0.0, 1e12, above=True)] = quantity(
+        7e3, unit="N/m", source="two thirds of k (Mindlin 1949, incompressible)", doc="k_t of the bristles."
+    )
+    lag: Annotated[float, real(0.0, 1.0, above=True)] = quantity(
+        1e-3, unit="s", source="estimate", doc="T; k_t T is the bristles' damping, T how fast they forget."
+    )
+    stribeck_velocity: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        0.01, unit="m/s", source="estimate", doc="omega, at which mu has fallen by 63 % from mu_s to mu_k."
+    )
+    floor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
+        1e-4, unit="N", source="keeps slopes finite at f_n = 0", doc="Friction below which sticking is gradual."
+    )
+
+
+class BodyShape(Description):
+    """A shape with which a body of a tree touches."""
+
+    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
+        ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule."
+    )
+    radius: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
+    )
+    length: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of a cylinder; of a capsule without its round ends; along z."
+    )
+    sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
+        None, unit="m", source="design", doc="Of a box, along x, y and z."
+    )
+    position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
+    )
+    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        check_sizes(self, self.shape)
+        if abs(math.hypot(*self.orientation) - 1.0) > 1e-6:
+            raise problem("orientation", "must be a quaternion x, y, z, w of length 1", list(self.orientation))
+        return self
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """The numbers of `SIZES`, m."""
+        return sizes_of(self, self.shape)
+
+
+def check_sizes(described: Any, shape: str) -> None:
+    """Refuse what lacks a size that its shape needs, or has one that it has no use for."""
+    for entry in ("radius", "length", "sides"):
+        given, needed = getattr(described, entry), entry in SIZES[shape]
+        if given is None and needed:
+            raise problem(entry, f'is missing: shape = "{shape}" needs {", ".join(SIZES[shape])}')
+        if given is not None and not needed:
+            shapes = ", ".join(each for each, entries in SIZES.items() if entry in entries)
+            raise problem(entry, f'is for {shapes}, not for shape = "{shape}"', given)
+
+
+def sizes_of(described: Any, shape: str) -> tuple[float, ...]:
+    """Return the numbers of `SIZES` that describe a shape, m."""
+    if described.sides is not None:
+        return tuple(described.sides)
+    return tuple(getattr(described, name) for name in SIZES[shape])
