@@ -21,8 +21,9 @@ class StableBaselinesEnvironment(VecEnv):
         space = worlds.single_action_space
         assert isinstance(space, Box)
         shape = space.shape
+        # Asked for its attributes at once.
+        self.worlds = worlds
         super().__init__(worlds.num_envs, worlds.single_observation_space, Box(-1.0, 1.0, shape, np.float32))
-        self.worlds, self.render_mode = worlds, None
         self._middle, self._half = 0.5 * (space.high + space.low), 0.5 * (space.high - space.low)
         self._actions = np.zeros((worlds.num_envs, *shape))
 

@@ -1,0 +1,193 @@
+"""Train a policy on a task that ships, with stable-baselines3, and draw how it learns."""
+
+from __future__ import annotations
+
+import sys
+import time
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from finger_pin.commands.application import run_function
+from finger_pin.commands.console import print_text
+from finger_pin.commands.options import Output, Restart, wrong
+
+# Proximal policy optimisation: what a task of a hundred short steps needs.
+SETTINGS = {"n_steps": 100, "batch_size": 800, "n_epochs": 8, "learning_rate": 5e-4, "gamma": 0.95, "gae_lambda": 0.9}
+NETWORK = {"net_arch": [128, 128], "log_std_init": -1.0}
+#: Columns of the curve: steps, seconds of training, and the mean reward per step of the last episodes.
+COLUMNS = ("steps", "seconds", "reward")
+
+
+def train(
+    task: Annotated[str, typer.Argument(metavar="TASK", help="Reach, Press or Grasp.")] = "Reach",
+    steps: Annotated[int, typer.Option(metavar="N", help="Control steps of all worlds together.")] = 400_000,
+    worlds: Annotated[int, typer.Option(metavar="N", help="Worlds side by side.")] = 32,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of everything that is drawn.")] = 1,
+    restart: Restart = False,
+    output: Output = Path("results/policies"),
+) -> None:
+    """Train a policy on a task that ships, and draw how it learns.
+
+    Ctrl-C keeps the policy so far, and the same command goes on with it.
+    """
+    if task not in ("Reach", "Press", "Grasp"):
+        raise wrong("TASK", f"{task}: must be Reach, Press or Grasp")
+    for name, value in (("--steps", steps), ("--worlds", worlds)):
+        if value < 1:
+            raise wrong(name, "must be above 0")
+    folder = output / task.lower()
+    policy = Policy.trained(folder, task, steps, worlds, seed, restart=restart)
+    errors = policy.evaluate(task, episodes=100)
+    draw_curve(policy.curve, task, folder / "curve.png")
+    print_text(f"{task}: reward {errors:.3f} a step over 100 new episodes (1 at best). Results are in {folder}")
+
+
+class Policy:
+    """A policy and how it was trained.
+
+    Attributes:
+        model: Of stable-baselines3.
+        folder: With ``policy.zip``, ``normalisation.pkl`` and ``curve.csv``.
+        curve: Shape (k, 3), as `COLUMNS` has it.
+    """
+
+    def __init__(self, model: Any, folder: Path, curve: Any) -> None:
+        """Keep them."""
+        self.model, self.folder, self.curve = model, folder, curve
+
+    @classmethod
+    def trained(
+        cls, folder: Path, task: str, steps: int, worlds: int, seed: int, *, restart: bool = False, **fields: Any
+    ) -> Policy:
+        """Return a policy that has made some steps, of which those that a folder has kept count.
+
+        Args:
+            folder: Where it is kept, again and again.
+            task: Name.
+            steps: Of all worlds together.
+            worlds: How many.
+            seed: Of everything that is drawn.
+            restart: Whether to forget what the folder has kept.
+            fields: Of the task, in place of its own.
+        """
+        import torch
+        from stable_baselines3 import PPO
+        from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+        # Two threads step the worlds; more for networks of this size only get in their way.
+        torch.set_num_threads(1)
+        folder.mkdir(parents=True, exist_ok=True)
+        kept = [folder / name for name in ("policy.zip", "normalisation.pkl", "curve.csv")]
+        monitored = VecMonitor(build_worlds(task, worlds, **fields))
+        if restart or not all(path.exists() for path in kept):
+            environment = VecNormalize(monitored, gamma=SETTINGS["gamma"])
+            model = PPO("MlpPolicy", environment, policy_kwargs=NETWORK, seed=seed, device="cpu", **SETTINGS)
+            curve: list[tuple[float, ...]] = []
+        else:
+            environment = VecNormalize.load(str(kept[1]), monitored)
+            model = PPO.load(kept[0], environment, device="cpu")
+            curve = [tuple(row) for row in np.atleast_2d(np.loadtxt(kept[2], delimiter=",", skiprows=1)).tolist()]
+        keeper = build_keeper(curve, kept)
+        try:
+            model.learn(max(steps - model.num_timesteps, 0), keeper, reset_num_timesteps=False)
+        finally:
+            keeper.keep()
+            environment.close()
+        return cls(model, folder, np.array(curve))
+
+    def evaluate(self, task: str, episodes: int, **fields: Any) -> float:
+        """Return the mean reward per step over new episodes, without exploration.
+
+        Args:
+            task: Name.
+            episodes: How many, with the same seeds at every call.
+            fields: Of the task, in place of its own.
+        """
+        from stable_baselines3.common.vec_env import VecNormalize
+
+        environment = VecNormalize.load(str(self.folder / "normalisation.pkl"), build_worlds(task, episodes, **fields))
+        environment.training = environment.norm_reward = False
+        environment.seed(10_000)
+        seen, total, count, going = environment.reset(), 0.0, 0, np.ones(episodes, dtype=bool)
+        while going.any():
+            action, _ = self.model.predict(seen, deterministic=True)
+            seen, reward, over, _ = environment.step(action)
+            total, count, going = total + float(reward[going].sum()), count + int(going.sum()), going & ~over
+        environment.close()
+        return total / count
+
+
+def build_worlds(task: str, count: int, **fields: Any) -> Any:
+    """Return worlds of a task as stable-baselines3 takes them."""
+    try:
+        from finger_pin.learning.stable_baselines import StableBaselinesEnvironment
+    except ModuleNotFoundError as error:
+        raise wrong("train", f"needs {error.name}: pip install stable-baselines3") from None
+    from finger_pin.learning.tasks import make_vector
+
+    return StableBaselinesEnvironment(make_vector(f"{task}-v0", count, **fields))
+
+
+def build_keeper(curve: list[tuple[float, ...]], kept: list[Path]) -> Any:
+    """Return what keeps policy and curve now and then, and says how far it is."""
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    class Keeper(BaseCallback):
+        def __init__(self) -> None:
+            super().__init__()
+            self.before, self.began = curve[-1][1] if curve else 0.0, time.perf_counter()
+
+        def _on_step(self) -> bool:
+            return True
+
+        def _on_rollout_end(self) -> None:
+            last = self.model.ep_info_buffer
+            if not last:
+                return
+            reward = float(np.sum([each["r"] for each in last]) / np.sum([each["l"] for each in last]))
+            curve.append((self.num_timesteps, self.before + time.perf_counter() - self.began, reward))
+            if sys.stderr.isatty():
+                print(
+                    f"\r{self.num_timesteps:9d} steps, {curve[-1][1]:5.0f} s, reward {reward:.3f}",
+                    end="",
+                    file=sys.stderr,
+                )
+            if len(curve) % 10 == 0:
+                self.keep()
+
+        def keep(self) -> None:
+            self.model.save(kept[0])
+            self.model.get_env().save(str(kept[1]))
+            np.savetxt(
+                kept[2], np.reshape(curve, (-1, len(COLUMNS))), delimiter=",", header=",".join(COLUMNS), comments=""
+            )
+
+    return Keeper()
+
+
+def draw_curve(curve: Any, task: str, path: Path) -> None:
+    """Write the figure of a curve."""
+    from finger_pin.views.plots import save_figure
+    from finger_pin.views.plots.style import new_figure, styled
+
+    @styled
+    def plot() -> Any:
+        figure = new_figure(6.4, 3.6)
+        axes = figure.subplots()
+        steps, seconds, reward = np.reshape(curve, (-1, len(COLUMNS))).T
+        axes.plot(seconds / 60.0, reward)
+        axes.set(xlabel="training (min)", ylabel="reward per step", ylim=(0.0, 1.0), xlim=(0.0, None))
+        axes.set_title(f"{task}: {int(steps[-1]):,} steps of 20 ms" if len(steps) else task)
+        return figure
+
+    save_figure(plot(), path)
+
+
+main = partial(run_function, train)
+
+if __name__ == "__main__":
+    sys.exit(main())
