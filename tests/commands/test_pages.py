@@ -38,6 +38,8 @@ SHORTER = {
     r"reaction\.py$": "reaction.py fig6 --forces 1",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
+    # They train for minutes, with a library that tests do without.
+    r"((train|transfer)\.py).*": r"\1 --help",
 }
 #: A fenced block with its kind, or code within a line.
 SHOWN = re.compile(r"^```(\w+)\n(.*?)^```$|(?<!`)`([^`\n]+)`(?!`)", re.DOTALL | re.MULTILINE)
