@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import sys
+import time
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -33,7 +34,7 @@ def benchmark(
     anew when the code has changed. Times are the least of several turns that the compared jobs take in alternation, and
     ratios are of times from one run. Run it on a quiet machine.
     """
-    names = chosen(only)
+    names, begun = chosen(only), time.monotonic()
     from benchmarks.store import Store, say, write
 
     output.mkdir(parents=True, exist_ok=True)
@@ -55,7 +56,7 @@ def benchmark(
         write(output / "benchmark.json", json.dumps(whole, indent=1))
         write(output / "benchmark.txt", lines)
         draw(stages, output)
-    print_text(f"{lines}\n\nResults are in {output}")
+    print_text(f"{lines}\n\nMeasured in {(time.monotonic() - begun) / 60.0:.1f} min. Results are in {output}")
 
 
 def chosen(names: str) -> tuple[str, ...]:
