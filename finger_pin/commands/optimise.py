@@ -80,7 +80,7 @@ def optimise(
         raise wrong("--no-constraints", "contradicts --constraint")
     given = {"population": population, "generations": generations, "seed": seed}
     effort = {name: value for name, value in given.items() if value is not None}
-    changed, executor = overrides(settings), pool(workers, scheduler)
+    changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.studies import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise
     from finger_pin.studies.keys import Starting
 
@@ -90,20 +90,21 @@ def optimise(
     folder = output or Path("results", folder_name(f"optimise-{name}", *settings, *goals))
 
     def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
-        return optimise(
-            scenario,
-            over or None,
-            minimise=minimise or (() if maximise else DEFAULT_OBJECTIVES),
-            maximise=maximise,
-            constraints=constraint or (() if no_constraints else DEFAULT_CONSTRAINTS),
-            effort=Effort(**effort),
-            overrides=changed,
-            output=folder,
-            executor=executor,
-            restart=restart,
-            progress=progress,
-            stop=stop,
-        )
+        with crew as executor:
+            return optimise(
+                scenario,
+                over or None,
+                minimise=minimise or (() if maximise else DEFAULT_OBJECTIVES),
+                maximise=maximise,
+                constraints=constraint or (() if no_constraints else DEFAULT_CONSTRAINTS),
+                effort=Effort(**effort),
+                overrides=changed,
+                output=folder,
+                executor=executor,
+                restart=restart,
+                progress=progress,
+                stop=stop,
+            )
 
     result = conduct("search", run, summary, "pareto", folder, figures=figures, format=format, quiet=quiet)
     if not result["feasible"].any():

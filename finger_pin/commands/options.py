@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import re
 import tomllib
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
-
-if TYPE_CHECKING:
-    from finger_pin.studies import DaskCluster, LocalProcesses
 
 # A string without quotes: it begins like a name or a path, and holds nothing that has a meaning in TOML.
 _BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]*")
@@ -19,6 +21,8 @@ _BARE_STRING = re.compile(r"(?:[^\W\d]|/|~|\.{1,2}/)[^\"'\[\]{}=,#\x00-\x1f\x7f]
 # Tables that the name of a folder leaves out: what stands in them has other names than what stands elsewhere.
 _OUTER = re.compile(r"^(?:controller|finger|simulation)\.")
 _LONGEST = 60
+# How long a scheduler is tried to be reached, s.
+_PATIENCE = 10.0
 
 ScenarioName = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name, or path of a .toml file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="Override an entry; repeatable.")]
@@ -28,7 +32,7 @@ Figures = Annotated[bool, typer.Option(help="Draw the figures.")]
 Format = Annotated[
     Literal["png", "pdf", "svg"] | None, typer.Option(help="Format of the figures; default png.", show_default=False)
 ]
-Workers = Annotated[int | None, typer.Option(metavar="N", help="Processes; default one per core.")]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Threads; default one per core.")]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster of a scheduler, such as tcp://host:8786.")
 ]
@@ -69,17 +73,38 @@ def _value(key: str, text: str) -> Any:
     raise wrong(key, f"{text[:80]}: must be TOML, such as 2.0, true, [1, 2] or a name")
 
 
-def pool(workers: int | None, scheduler: str | None) -> DaskCluster | LocalProcesses:
-    """Return what makes the runs of a study.
+def pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
+    """Return what makes the runs of a study: threads, or the workers of a Dask scheduler, while entered.
 
     Raises:
-        InputError: If there are no workers.
+        InputError: If there are no workers; and, as it is entered, if the scheduler cannot be reached.
     """
-    if scheduler is not None and workers is not None:
-        raise wrong("--workers", "are local; those of a scheduler are its own")
-    from finger_pin.studies import DaskCluster, LocalProcesses
+    if scheduler is not None:
+        if workers is not None:
+            raise wrong("--workers", "are local; those of a scheduler are its own")
+        return _dask(scheduler)
+    from finger_pin.core.stepper import usable_cores
 
-    return LocalProcesses(workers) if scheduler is None else DaskCluster(scheduler)
+    if workers is not None and workers < 1:
+        raise wrong("--workers", f"must be at least 1, not {workers}")
+    return ThreadPoolExecutor(workers or usable_cores())
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[Executor]:
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise wrong("--scheduler", "needs Dask: python -m pip install distributed") from None
+    # An error says what the client would log about a lost scheduler.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        what = f"{address}: cannot be reached: {str(error) or type(error).__name__}"
+        raise wrong("--scheduler", what) from None
+    with client:
+        yield client.get_executor(pure=False)
 
 
 def numbers(option: str, text: str) -> list[float]:

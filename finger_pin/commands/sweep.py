@@ -78,7 +78,7 @@ def sweep(
         raise wrong("--samples", "is needed by --design latin, and by no other")
     if seed is not None and design != "latin":
         raise wrong("--seed", "is for --design latin")
-    changed, executor = overrides(settings), pool(workers, scheduler)
+    changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
     from finger_pin.studies import DEFAULT_METRICS, sweep
     from finger_pin.studies.keys import Starting
@@ -89,22 +89,23 @@ def sweep(
     folder = output or Path("results", folder_name(f"sweep-{name}", *settings, *chosen))
 
     def run(progress: Progress | None, stop: Stop) -> xr.Dataset:
-        try:
-            return sweep(
-                scenario,
-                points,
-                metrics=metric or DEFAULT_METRICS,
-                overrides=changed,
-                output=folder,
-                executor=executor,
-                restart=restart,
-                retry_failed=retry_failed,
-                progress=progress,
-                stop=stop,
-            )
-        except StudyError as error:
-            # The summary says why runs failed.
-            return error.result
+        with crew as executor:
+            try:
+                return sweep(
+                    scenario,
+                    points,
+                    metrics=metric or DEFAULT_METRICS,
+                    overrides=changed,
+                    output=folder,
+                    executor=executor,
+                    restart=restart,
+                    retry_failed=retry_failed,
+                    progress=progress,
+                    stop=stop,
+                )
+            except StudyError as error:
+                # The summary says why runs failed.
+                return error.result
 
     result = conduct(
         "sweep", run, summary, "sweep", folder, figures=figures, format=format, quiet=quiet, unfinished=misses

@@ -223,12 +223,18 @@ class Stepper:
         return failure(part, status, [names[at] for at in self.places(part.island)])
 
 
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    # Only Linux binds processes to cores.
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
     """Do a task that holds no lock of Python for all items side by side; return what it returns in their order.
 
     Only what the main thread does is spread: who runs many at once has no core to spare.
     """
-    workers = min(len(items), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2)
+    workers = min(len(items), usable_cores())
     if workers < 2 or threading.current_thread() is not threading.main_thread():
         return [task(item) for item in items]
     with ThreadPoolExecutor(workers) as pool:

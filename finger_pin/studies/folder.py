@@ -8,7 +8,6 @@ run is done again.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import tomllib
 import warnings
@@ -17,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import filelock
 import tomli_w
 import xarray as xr
 
@@ -29,6 +29,9 @@ from finger_pin.studies.metrics import Metric
 from finger_pin.studies.runs import Record
 
 STUDY, RUNS = "study.toml", "runs.jsonl"
+_LOCK = ".lock"
+# Windows would write other line ends.
+_BINARY = getattr(os, "O_BINARY", 0)
 _MARK = "# What the study in this folder asks for. The same again goes on where it stopped; runs.jsonl has every run.\n"
 
 
@@ -51,7 +54,7 @@ class Store:
         self._records: dict[str, Record] = {}
         self._file: int | None = None
         if path is not None:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _BINARY, 0o666)
             self._read(Path(path))
 
     @property
@@ -127,7 +130,7 @@ class StudyFolder:
         self._text = _MARK + tomli_w.dumps(asked)
         self._artifacts = [*products, RUNS, STUDY]
         self._restart = restart
-        self._lock: int | None = None
+        self._lock = filelock.FileLock(self.path / _LOCK)
 
     def __enter__(self) -> Self:
         """Make and lock the folder, and read the runs that are there.
@@ -139,13 +142,12 @@ class StudyFolder:
         made = [each for each in (self.path, *self.path.parents) if not each.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(self.path, os.O_RDONLY)
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._lock.acquire(blocking=False)
             self._prepare()
             self.store = Store(self.path / RUNS)
         except BaseException as error:
             self._leave(made)
-            if isinstance(error, BlockingIOError):
+            if isinstance(error, filelock.Timeout):
                 raise InputError("output", "another process is at work there", str(self.path)) from None
             if isinstance(error, OSError):
                 reason = f"cannot be written: {error.strerror or error}"
@@ -180,9 +182,11 @@ class StudyFolder:
                 Path(temporary).write_text(self._text, encoding="utf-8", newline="\n")
 
     def _leave(self, made: list[Path]) -> None:
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        if self._lock.is_locked:
+            with contextlib.suppress(OSError):
+                # Where a file that is open cannot be removed, the name of a lock that nobody has stays.
+                (self.path / _LOCK).unlink()
+            self._lock.release()
         for folder in made:
             with contextlib.suppress(OSError):
                 folder.rmdir()

@@ -1,10 +1,10 @@
-"""Many runs at once: scenarios over processes, results stacked in one Dataset."""
+"""Many runs at once: scenarios over threads or another executor, results stacked in one Dataset."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
+from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
 
@@ -12,13 +12,14 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.core.textbook import Stop
 from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import InputError, IntegrationError, ScenarioWarning, SelfLockingWarning, StudyError
+from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning, StudyError
 from finger_pin.simulation.notebook import notebook_bar
+from finger_pin.simulation.prepared import prepare
 from finger_pin.simulation.simulate import simulate
-from finger_pin.studies.machine import usable_cores
-from finger_pin.studies.processes import Lost, Pool
+from finger_pin.studies.executing import Crew, Lost
 
 _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
 
@@ -26,20 +27,20 @@ _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time"
 def simulate_many(
     scenarios: Iterable[Scenario | str | Path],
     *,
+    executor: Executor | None = None,
     workers: int | None = None,
     variables: Sequence[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
-    """Simulate scenarios in parallel processes.
-
-    If a process dies, only its own run is done again; this process does the first run and, while the others
-    start, the next ones.
+    """Simulate scenarios in parallel threads, or by another executor.
 
     Args:
         scenarios: Scenarios, or what `load_scenario` takes, whose fingers have the same joints and tendons, with the
             same sample times.
-        workers: Number of processes; by default one per core that this process may use.
-        variables: Names of the variables to keep; all by default. Fewer need less memory.
+        executor: Any of `concurrent.futures`, for controllers in Python, which threads would do one after the other.
+        workers: Number of threads; by default one for each core that this process may use.
+        variables: Names of the variables to keep; all by default. Fewer need less memory and less time: then only what
+            is kept is computed, and nothing is judged, as by `fp.prepare`.
         progress: Called with the numbers of finished and of all runs;
             in a notebook there is a bar by default.
 
@@ -60,18 +61,18 @@ def simulate_many(
     if not runs:
         raise InputError("scenarios", "at least one is needed")
     _check_alike(runs)
-    if workers is not None and workers < 1:
-        raise InputError("workers", "must be at least 1", workers)
-    count = min(workers or usable_cores(), len(runs))
     run = partial(_run, keep=None if variables is None else tuple(variables))
-    results: list[xr.Dataset | Lost] = [Lost("")] * len(runs)
     progress = progress or notebook_bar("runs")
-    with Pool(count) if count > 1 else nullcontext() as pool:
-        found = enumerate(map(run, runs)) if pool is None else pool.do(run, runs, lambda: False, helping=True)
-        for done, (index, result) in enumerate(found, start=1):
-            results[index] = result
+    with Crew(executor, workers) as crew:
+        crew.compile(runs[0])
+        found: dict[int, xr.Dataset | Lost] = {}
+        for index, result in crew.do(run, runs, lambda: False):
+            if isinstance(result, Lost) and isinstance(result.error, InputError):
+                raise result.error
+            found[index] = result
             if progress is not None:
-                progress(done, len(runs))
+                progress(len(found), len(runs))
+    results = [found[index] for index in range(len(runs))]
     stacked = _stack(runs, results)
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
@@ -85,24 +86,27 @@ def simulate_many(
     return stacked
 
 
-def _run(scenario: Scenario, keep: tuple[str, ...] | None) -> xr.Dataset:
+def _run(scenario: Scenario, stop: Stop, keep: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
-        with warnings.catch_warnings():
-            # Other processes cannot warn here, and a hundred runs should not warn a hundred times.
-            warnings.simplefilter("ignore", ScenarioWarning)
-            result = simulate(scenario, progress=lambda time: None)
+        # The study has a bar of its own.
+        result = (
+            simulate(scenario, progress=lambda time: None, stop=stop)
+            if keep is None
+            else _recorded(scenario, stop, keep)
+        )
     except IntegrationError as error:
         assert error.result is not None
         failure, result = str(error), error.result
-    if keep is not None:
-        for name in keep:
-            if name not in result:
-                raise InputError(
-                    "variables", f"there is no such variable; there are {', '.join(map(str, result))}", name
-                )
-        result = result[list(keep)]
     return result.assign_attrs(failure=failure)
+
+
+def _recorded(scenario: Scenario, stop: Stop, keep: tuple[str, ...]) -> xr.Dataset:
+    try:
+        prepared = prepare(scenario, record=keep)
+    except InputError as error:
+        raise InputError("variables", error.allowed, error.value) from None
+    return prepared.run(stop=stop).dataset()
 
 
 def _check_alike(runs: Sequence[Scenario]) -> None:
@@ -120,7 +124,7 @@ def _check_alike(runs: Sequence[Scenario]) -> None:
 
 def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost]) -> xr.Dataset:
     found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
-    longest = max(found.values(), key=lambda result: result.sizes["time"])
+    longest = max(found.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
     times = runs[0].sample_times()
     labels = _labels(found.values())
     stacked: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {}

@@ -6,7 +6,6 @@ samples.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,12 +16,14 @@ import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
 from finger_pin.control.reference import SignalReference
+from finger_pin.core.textbook import Stop
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
-from finger_pin.exceptions import InputError, ScenarioWarning
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.simulate import simulate
+from finger_pin.studies.executing import quiet
 from finger_pin.studies.response import (
     fingertip_hysteresis,
     grip_margin,
@@ -42,18 +43,16 @@ class Run:
         scenario: The scenario.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        """Keep a scenario."""
-        self.scenario = scenario
+    def __init__(self, scenario: Scenario, stop: Stop | None = None) -> None:
+        """Keep a scenario, and what its simulation asks whether it is to stop."""
+        self.scenario, self._stop = scenario, stop
 
     @cached_property
     def result(self) -> xr.Dataset:
         """What `simulate` returns."""
-        with warnings.catch_warnings():
-            # Studies look at many designs, and at the margin by its metric.
-            warnings.simplefilter("ignore", ScenarioWarning)
-            # The study has a bar of its own.
-            return simulate(self.scenario, progress=lambda time: None)
+        # Studies look at many designs, and at the margin by its metric; they have a bar of their own.
+        with quiet():
+            return simulate(self.scenario, progress=lambda time: None, stop=self._stop)
 
 
 @dataclass(frozen=True)

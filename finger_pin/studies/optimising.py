@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from finger_pin.files import replacing
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Listing
+from finger_pin.studies.executing import Crew
 from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
 from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric
@@ -32,8 +34,7 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.processes import LocalProcesses
-from finger_pin.studies.runs import DONE, Executor, Progress, Record, Stop, Workers, evaluate
+from finger_pin.studies.runs import DONE, Progress, Record, Stop, evaluate
 from finger_pin.studies.search import HOPELESS, Search, nondominated
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
@@ -98,7 +99,7 @@ def optimise(
         overrides: Entries of the scenario that hold for all designs.
         output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv`` and ``front``, which has every
             design of the front as a scenario; by default nothing is kept.
-        executor: Where runs are done: `LocalProcesses` by default, or a `DaskCluster`.
+        executor: Where runs are done: any of `concurrent.futures`, by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         progress: Called with the numbers of finished, failed and all runs;
             in a notebook there is a bar by default.
@@ -112,6 +113,7 @@ def optimise(
         InputError: Naming the argument, key or value that is wrong; nothing is written then.
         StudyError: If every run failed.
         OSError: If a record cannot be written.
+        ExecutorError: If the executor cannot go on.
     """
     effort = effort or Effort()
     goals = Goals.of(minimise, maximise, constraints)
@@ -125,7 +127,7 @@ def optimise(
         _shares(variables, own),
     )  # fmt: skip
     with ExitStack() as stack:
-        workers = stack.enter_context((executor or LocalProcesses()).start())
+        crew = stack.enter_context(Crew(executor))
         if output is None:
             store = stack.enter_context(Store())
         else:
@@ -133,7 +135,7 @@ def optimise(
             asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
             folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
             store = stack.enter_context(folder).store
-        course = _Course(starting, goals, variables, store, workers, effort, progress or notebook_bar("runs"), stop)
+        course = _Course(starting, goals, variables, store, crew, effort, progress or notebook_bar("runs"), stop)
         result = _assembled(starting, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")
@@ -149,7 +151,7 @@ class _Course:
     goals: Goals
     variables: Sequence[Variable]
     store: Store
-    workers: Workers
+    crew: Crew
     effort: Effort
     progress: Progress | None
     stop: Stop | None
@@ -179,7 +181,7 @@ class _Course:
                 self.progress(len(earlier) + finished, failed + failures, total)
 
         return evaluate(
-            self.starting, points, self.goals.metrics, self.store, self.workers, progress=report, stop=self.stop
+            self.starting, points, self.goals.metrics, self.store, self.crew, progress=report, stop=self.stop
         )
 
     def _judge(self, record: Record) -> tuple[Array, Array]:

@@ -10,15 +10,15 @@ import hashlib
 import json
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from typing import Any, Protocol, Self
 
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import FingerPinError, InputError
+from finger_pin.exceptions import FingerPinError, InputError, Interrupted
+from finger_pin.studies.executing import Crew, Lost
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, source_digest, versions
 from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric, Run
@@ -89,20 +89,6 @@ class Task:
         return Record(self.key, dict(self.point), FAILED, " ".join(reason.split()), {}, seconds)
 
 
-class Workers(Protocol):
-    """What does tasks, once started."""
-
-    def run(self, tasks: Sequence[Task], stop: Stop) -> Iterator[Record]:
-        """Do tasks in any order and yield the record of each as soon as it is done; end early when told to stop."""
-
-
-class Executor(Protocol):
-    """Where tasks are done."""
-
-    def start(self) -> AbstractContextManager[Workers]:
-        """Return workers for the time of a ``with`` statement."""
-
-
 class Archive(Protocol):
     """Where records are found and kept."""
 
@@ -114,6 +100,10 @@ class Archive(Protocol):
         """Keep a record."""
 
 
+class ExecutorError(FingerPinError):
+    """An executor cannot go on: a pool is broken, a cluster is lost; what it had finished is recorded."""
+
+
 class VersionError(FingerPinError):
     """A worker has another version of the package than the process that asks."""
 
@@ -123,7 +113,7 @@ def evaluate(
     points: Sequence[Point],
     metrics: tuple[Metric, ...],
     archive: Archive,
-    workers: Workers,
+    crew: Crew,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
@@ -136,10 +126,13 @@ def evaluate(
         points: Where.
         metrics: What is measured.
         archive: Where records are found and kept.
-        workers: Who does the runs.
+        crew: Who does the runs.
         progress: Called with the numbers of finished, failed and all runs, first with those found.
         stop: When it returns true, runs that have not been done are None.
         retry_failed: Whether runs that failed before count as not done.
+
+    Raises:
+        ExecutorError: If the executor cannot go on.
     """
     asked_to_stop = stop or (lambda: False)
     measured = [_identity(metric) for metric in metrics]
@@ -158,26 +151,40 @@ def evaluate(
             records[each.key] = each
             archive.append(each)
     report()
-    for record in workers.run(list(tasks.values()), asked_to_stop):
+    waiting = list(tasks.values())
+    if waiting:
+        crew.compile(waiting[0].scenario)
+    for index, done in crew.do(execute, waiting, asked_to_stop):
+        record = _failed(waiting[index], done) if isinstance(done, Lost) else done
         archive.append(record)
         records[record.key] = record
         report()
     return [records.get(each.key) for each in plans] + [None] * (len(points) - len(plans))
 
 
-def execute(task: Task) -> Record:
+def _failed(task: Task, lost: Lost) -> Record:
+    """Return the record of a run that ended the processes that did it, as Dask finds out."""
+    if type(lost.error).__name__ == "KilledWorker":
+        return task.failed(f"the workers that ran it died: {lost.error}")
+    raise ExecutorError(f"the executor cannot go on: {lost.reason}; give an output to keep what it has finished")
+
+
+def execute(task: Task, stop: Stop) -> Record:
     """Do a task.
 
     Raises:
         VersionError: If this package is not the one that asked.
+        Interrupted: If it was told to stop.
     """
     if task.source != source_digest():
         own = f"{versions()['finger-pin']}, source {source_digest()}"
         raise VersionError(f"a worker has another finger_pin ({own}), not that of source {task.source}")
     begin = time.perf_counter()
-    run = Run(task.scenario)
+    run = Run(task.scenario, stop)
     try:
         values = {metric.name: float(metric.measure(run)) for metric in task.metrics}
+    except Interrupted:
+        raise
     except Exception as error:
         # Whatever goes wrong with one point is kept with it, and the others go on.
         kind = "" if isinstance(error, FingerPinError) else f"{type(error).__name__}: "

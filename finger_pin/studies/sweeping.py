@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,11 @@ import xarray as xr
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
+from finger_pin.studies.executing import Crew
 from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
 from finger_pin.studies.keys import Starting, Value
 from finger_pin.studies.metrics import DEFAULT_METRICS, Metric, choose
-from finger_pin.studies.processes import LocalProcesses
-from finger_pin.studies.runs import Executor, Progress, Stop, evaluate
+from finger_pin.studies.runs import Progress, Stop, evaluate
 
 PRODUCTS = ["sweep.nc", "figures/sweep.png"]
 
@@ -50,7 +51,7 @@ def sweep(
         metrics: Names of `METRICS`, or metrics of one's own.
         overrides: Entries of the scenario that hold at all points.
         output: Folder for ``study.toml``, ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
-        executor: Where runs are done: `LocalProcesses` by default, or a `DaskCluster`.
+        executor: Where runs are done: any of `concurrent.futures`, by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         retry_failed: Whether to repeat runs that failed before.
         progress: Called with the numbers of finished, failed and all runs, first with those found;
@@ -65,6 +66,7 @@ def sweep(
         InputError: Naming the argument, key or value that is wrong; nothing is written then.
         StudyError: If every run failed.
         OSError: If a record cannot be written.
+        ExecutorError: If the executor cannot go on.
     """
     design = Grid(over) if isinstance(over, Mapping) else over
     chosen = choose(metrics)
@@ -72,7 +74,7 @@ def sweep(
     for key, values in design.values.items():
         starting.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:
-        workers = stack.enter_context((executor or LocalProcesses()).start())
+        crew = stack.enter_context(Crew(executor))
         if output is None:
             store = stack.enter_context(Store())
         else:
@@ -83,7 +85,7 @@ def sweep(
             design.points(),
             chosen,
             store,
-            workers,
+            crew,
             progress=progress or notebook_bar("runs"),
             stop=stop,
             retry_failed=retry_failed,

@@ -1,4 +1,4 @@
-"""Many runs: `finger_pin.simulate_many` on one and on two processes."""
+"""Many runs: `finger_pin.simulate_many` in one and in two threads."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
-from finger_pin.studies.machine import usable_cores
+from finger_pin.core.stepper import usable_cores
 
 WORKERS = (1, 2)
-# Many enough that the start of the processes, two seconds, no longer counts.
+# Many enough that what is loaded first no longer counts.
 _COUNTS = (12, 200)
 _QUICK_COUNTS = (4, 12)
 
@@ -28,7 +28,7 @@ def measure(store: Store) -> dict[str, Any] | None:
 
 def _study(counts: tuple[int, int], duration: float) -> dict[str, Any]:
     times: dict[str, float] = {}
-    # So that no process compiles while it is timed.
+    # So that nothing is compiled while it is timed.
     fp.simulate_many([fp.load_scenario("fig6", {"simulation.duration": 0.01})] * 4, workers=max(WORKERS))
     for count in counts:
         gains = np.linspace(0.8, 1.2, count)
@@ -40,9 +40,9 @@ def _study(counts: tuple[int, int], duration: float) -> dict[str, Any]:
                     scenarios, workers=workers, variables=["joint_position", "tendon_tension"]
                 )
             )
-            times[f"{count} runs, {workers} processes"] = elapsed
-            say(f"  {count} runs of {duration:g} s on {workers} processes: {elapsed:.1f} s")
-    few, many = ([times[f"{count} runs, {workers} processes"] for workers in WORKERS] for count in counts)
+            times[f"{count} runs, {workers} threads"] = elapsed
+            say(f"  {count} runs of {duration:g} s in {workers} threads: {elapsed:.1f} s")
+    few, many = ([times[f"{count} runs, {workers} threads"] for workers in WORKERS] for count in counts)
     further = [late - early for late, early in zip(many, few, strict=True)]
     marginal = further[0] / further[1] if min(further) > 0.0 else None
     return {

@@ -151,7 +151,7 @@ def _many(study: Mapping[str, Any]) -> Iterator[str]:
     yield f"simulate_many, fig6, {study['duration']:g} s each, on {study['cores']} cores"
     for name, elapsed in study["times"].items():
         yield f"  {name}: {elapsed:.2f} s"
-    yield f"  two processes are {study['speed_up']:.2f} times as fast as one,"
+    yield f"  two threads are {study['speed_up']:.2f} times as fast as one,"
     if study["speed_up_without_start"]:
         yield f"  {study['speed_up_without_start']:.2f} times for every further run"
 

@@ -54,41 +54,15 @@ def stops_at_two(run):
     return gain(run)
 
 
-def threads(run):
-    """How many threads BLAS libraries are told to use."""
-    return float(os.environ["OPENBLAS_NUM_THREADS"])
-
-
-GAIN, CHEAP, DEAR, SLOW, DIES, DIES_ONCE, RAISES, STOPS, THREADS = (
+GAIN, CHEAP, DEAR, SLOW, DIES, DIES_ONCE, RAISES, STOPS = (
     Metric(function.__name__, "N m/rad", "planted", function)
-    for function in (gain, cheap, dear, slow_gain, dies_at_two, dies_once_at_two, raises_at_two, stops_at_two, threads)
+    for function in (gain, cheap, dear, slow_gain, dies_at_two, dies_once_at_two, raises_at_two, stops_at_two)
 )
 
 
-def tripled(number):
+def tripled(number, stop):
     return 3 * number
 
 
-def kills(number):
-    """Kill this process at 2, every time."""
-    if number == 2:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number
-
-
-def sends_much_or_waits(order):
-    """Leave this process's id at a path and send more than a pipe can hold, the second time little; or wait for it."""
-    mark, sends = order
-    if not sends:
-        while not mark.exists():
-            time.sleep(0.01)
-        return "waited"
-    if mark.exists():
-        return "again"
-    mark.write_text(str(os.getpid()))
-    time.sleep(0.1)
-    return "x" * 10_000_000
-
-
-def raises(number):
+def raises(number, stop):
     raise ArithmeticError(f"planted\n{number}")

@@ -4,6 +4,7 @@ import importlib
 import json
 import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,7 @@ import pytest
 from planted import DIES, GAIN, SLOW
 
 import finger_pin as fp
-from finger_pin.exceptions import InputError
-from finger_pin.studies import ClusterError
+from finger_pin.studies import ExecutorError
 
 distributed = pytest.importorskip("distributed")
 
@@ -30,7 +30,13 @@ def cluster():
         yield cluster
 
 
-def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_local_processes(cluster, tmp_path):
+@pytest.fixture(scope="module")
+def executor(cluster):
+    with distributed.Client(cluster, set_as_default=False) as client:
+        yield client.get_executor(pure=False)
+
+
+def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_threads(cluster, executor, tmp_path):
     victim = cluster.workers[0].pid
     seen = []
 
@@ -42,32 +48,32 @@ def test_a_killed_worker_costs_no_run_and_doubles_none_and_all_are_those_of_loca
     over = {"controller.gain": GAINS}
     away = fp.sweep(
         "fig6", over, metrics=METRICS, overrides=SHORT, output=tmp_path,
-        executor=fp.studies.DaskCluster(cluster.scheduler_address), progress=kill,
+        executor=executor, progress=kill,
     )  # fmt: skip
     assert seen == [victim]
     keys = [json.loads(line)["key"] for line in (tmp_path / "runs.jsonl").read_text().splitlines()]
     assert len(keys) == len(set(keys)) == len(GAINS)
     assert set(away["status"].values) == {"done"}
-    here = fp.sweep("fig6", over, metrics=METRICS, overrides=SHORT, executor=fp.studies.LocalProcesses(2))
+    here = fp.sweep("fig6", over, metrics=METRICS, overrides=SHORT, executor=ThreadPoolExecutor(2))
     assert away.identical(here)
 
 
-def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster):
+def test_a_run_that_kills_its_workers_is_recorded_with_its_reason(cluster, executor):
     with distributed.Client(cluster) as client:
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
     result = fp.sweep(
         "fig6", {"controller.gain": [1.0, 2.0]}, metrics=[DIES], overrides=SHORT,
-        executor=fp.studies.DaskCluster(cluster.scheduler_address),
+        executor=executor,
     )  # fmt: skip
     assert result["status"].values[1] == "failed"
     assert "died" in str(result["reason"].values[1])
 
 
-def test_a_stop_ends_a_sweep_on_a_cluster(cluster):
+def test_a_stop_ends_a_sweep_on_a_cluster(executor):
     done = []
     result = fp.sweep(
         "fig6", {"controller.gain": GAINS}, metrics=[SLOW], overrides=SHORT,
-        executor=fp.studies.DaskCluster(cluster.scheduler_address), progress=lambda *numbers: done.append(numbers[0]),
+        executor=executor, progress=lambda *numbers: done.append(numbers[0]),
         stop=lambda: bool(done) and done[-1] >= 2,
     )  # fmt: skip
     assert (result["status"] == "missing").any()
@@ -85,20 +91,17 @@ def test_a_scheduler_that_goes_away_is_told_and_what_was_done_stays(tmp_path):
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
     ) as own:
-        executor = fp.studies.DaskCluster(own.scheduler_address)
-        with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
-            fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=executor, progress=leave)
+        away = distributed.Client(own, set_as_default=False).get_executor(pure=False)
+        with pytest.raises(ExecutorError, match="the executor cannot go on"):
+            fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=away, progress=leave)
     assert len((folder / "runs.jsonl").read_text().splitlines()) == 2
-    again = fp.sweep(
-        "fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=fp.studies.LocalProcesses(2)
-    )
+    again = fp.sweep("fig6", over, metrics=[SLOW], overrides=SHORT, output=folder, executor=ThreadPoolExecutor(2))
     np.testing.assert_array_equal(again["slow_gain"], GAINS)
 
 
-def test_workers_of_another_source_are_refused(cluster, monkeypatch):
+def test_workers_of_another_source_are_refused(executor, monkeypatch):
     monkeypatch.setattr("finger_pin.studies.runs.source_digest", lambda: "another")
-    executor = fp.studies.DaskCluster(cluster.scheduler_address)
-    with pytest.raises(ClusterError, match=r"a worker has another finger_pin \(\d.*\), not that of source another"):
+    with pytest.raises(ExecutorError, match=r"a worker has another finger_pin \(\d.*\), not that of source another"):
         fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], overrides=SHORT, executor=executor)
 
 
@@ -111,10 +114,13 @@ def test_the_command_line_runs_on_a_cluster(cluster, tmp_path, monkeypatch, caps
     assert "2 runs: 2 done" in capsys.readouterr().out
 
 
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path):
-    for address in ("tcp://127.0.0.1:9", "nonsense://x", "not an address"):
-        with pytest.raises(InputError, match="scheduler") as caught:
-            executor = fp.studies.DaskCluster(address, timeout=0.3)
-            fp.sweep("fig6", {"controller.gain": [1.0]}, metrics=[GAIN], output=tmp_path / "o", executor=executor)
-        assert str(caught.value).isprintable()
-    assert not (tmp_path / "o").exists()
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "not an address"])
+def test_a_scheduler_that_is_not_there_is_told_in_one_line(address, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("finger_pin.commands.options._PATIENCE", 0.3)
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    main = importlib.import_module("sweep").main
+    assert main(["--over", "controller.gain=1,2", "--scheduler", address, "--quiet"]) == 2
+    told = capsys.readouterr().err
+    assert "--scheduler" in told and len(told.splitlines()) == 1
+    assert not (tmp_path / "results").exists()

@@ -1,10 +1,10 @@
-"""Many runs in processes: the same results as one by one, stacked, with failures kept apart."""
+"""Many runs at once: the same results as one by one, stacked, with failures kept apart."""
 
 from __future__ import annotations
 
-import multiprocessing
-import time
-from collections.abc import Callable
+import os
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ def scenarios(*gains: float) -> list[fp.Scenario]:
     return [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in gains]
 
 
-def test_runs_in_processes_are_bit_by_bit_the_runs_one_by_one() -> None:
+def test_runs_at_once_are_bit_by_bit_the_runs_one_by_one() -> None:
     runs = scenarios(0.8, 0.9, 1.0, 1.1)
     seen: list[tuple[int, int]] = []
     stacked = fp.simulate_many(runs, workers=2, progress=lambda done, total: seen.append((done, total)))
@@ -36,44 +36,18 @@ def test_runs_in_processes_are_bit_by_bit_the_runs_one_by_one() -> None:
     assert set(stacked.failure.values) == {""}
 
 
-def test_a_killed_process_costs_no_run() -> None:
-    runs = scenarios(*np.linspace(0.8, 1.2, 40))
-    killed: list[int | None] = []
-
-    def kill(done: int, total: int) -> None:
-        while done == 2 and not multiprocessing.active_children():
-            time.sleep(0.01)
-        if done in (2, 20):
-            victim = multiprocessing.active_children()[0]
-            victim.kill()
-            killed.append(victim.pid)
-
-    stacked = fp.simulate_many(runs, workers=2, variables=["tracking_error"], progress=kill)
-    assert len(set(killed)) == 2
-    assert set(stacked.failure.values) == {""}
-    for index in (0, 20, 39):
-        alone = fp.simulate(runs[index])
-        np.testing.assert_array_equal(stacked.tracking_error.values[index], alone.tracking_error.values)
-
-
-def test_a_run_whose_process_dies_every_time_is_nan_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    def do(self: object, function: Callable[[fp.Scenario], object], items: list, stop: object, helping: bool) -> object:
-        yield 1, many.Lost("planted")
-        yield 0, function(items[0])
-
-    monkeypatch.setattr(many.Pool, "do", do)
-    stacked = fp.simulate_many(scenarios(1.0, 2.0), workers=2)
-    assert list(stacked.failure.values) == ["", "planted"]
-    assert np.isfinite(stacked.joint_position.values[0]).all()
-    assert np.isnan(stacked.joint_position.values[1]).all()
-    assert np.isnan(stacked.end_time.values[1])
-    assert [fp.to_toml(run) for run in scenarios(1.0, 2.0)] == list(stacked.scenario.values)
+def test_runs_that_a_broken_pool_has_not_done_are_nan_and_say_why() -> None:
+    with ProcessPoolExecutor(1) as pool:
+        with pytest.raises(BrokenProcessPool):
+            pool.submit(os._exit, 1).result()
+        with pytest.raises(StudyError, match="BrokenProcessPool"):
+            fp.simulate_many(scenarios(1.0), executor=pool)
 
 
 def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     real = many.simulate
 
-    def failing(scenario: fp.Scenario, progress: object) -> None:
+    def failing(scenario: fp.Scenario, **options: object) -> None:
         raise IntegrationError(0.02, "planted", "nothing", real(scenario).isel(time=slice(0, 5)))
 
     monkeypatch.setattr(many, "simulate", failing)
@@ -125,7 +99,7 @@ def test_a_failing_run_is_nan_from_where_it_stopped_and_says_why(monkeypatch: py
     runs = scenarios(1.0, 2.0)
     real = many.simulate
 
-    def failing(scenario: fp.Scenario, progress: object) -> object:
+    def failing(scenario: fp.Scenario, **options: object) -> object:
         result = real(scenario)
         if scenario.controller.gain == 2.0:
             raise IntegrationError(0.02, "planted", "nothing", result.isel(time=slice(0, 5)))

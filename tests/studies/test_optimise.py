@@ -2,6 +2,7 @@
 
 import csv
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from finger_pin.studies.problem import Constraint, Goals, parse_constraint, pars
 from finger_pin.studies.search import Search, nondominated
 
 SHORT = {"simulation.duration": 0.02}
-TWO = fp.studies.LocalProcesses(2)
+TWO = ThreadPoolExecutor(2)
 FEW = fp.studies.Effort(population=8, generations=3)
 RADII = {"T3": (-0.008, -0.006), "T4": (0.006, 0.008)}
 ABDUCTION = "finger.tendons.{}.crossings.abduction.radius"

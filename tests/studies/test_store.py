@@ -1,6 +1,5 @@
 """The store and the folder of a study: what is there is whole, and stays."""
 
-import fcntl
 import os
 
 import pytest
@@ -97,14 +96,15 @@ def test_files_that_no_study_wrote_are_left_alone(tmp_path, name, restart):
     assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [(name, "mine")]
 
 
-def test_one_process_at_a_time_works_in_a_folder(tmp_path):
-    lock = os.open(tmp_path, os.O_RDONLY)
-    fcntl.flock(lock, fcntl.LOCK_EX)
-    with pytest.raises(fp.InputError, match="another process"):
-        StudyFolder(tmp_path, asks(), []).__enter__()
-    os.close(lock)
+def test_one_study_at_a_time_works_in_a_folder_and_a_killed_one_is_not_in_the_way(tmp_path):
+    # What a killed process leaves.
+    (tmp_path / ".lock").touch()
+    with StudyFolder(tmp_path, asks(), []):
+        with pytest.raises(fp.InputError, match="another process"):
+            StudyFolder(tmp_path, asks(), []).__enter__()
     with StudyFolder(tmp_path, asks(), []):
         pass
+    assert {each.name for each in tmp_path.iterdir()} == {"study.toml", "runs.jsonl"}
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path):
