@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from finger_pin.core.textbook import Statistics, Stop, Trajectory, Watch
+from finger_pin.core.textbook import Meeting, Statistics, Stop, Trajectory, Watch
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 
@@ -22,6 +22,7 @@ def integrate_cvode(
     rtol: float,
     atol: Array,
     longest: float = np.inf,
+    meeting: Meeting | None = None,
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
@@ -34,6 +35,7 @@ def integrate_cvode(
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
         longest: The longest step, s.
+        meeting: As for `textbook.integrate`.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
 
@@ -57,17 +59,27 @@ def integrate_cvode(
     solver = CVODE(fill, rtol=rtol, atol=atol, max_step=most, max_num_steps=100_000, linsolver="dense")
     solver.init_step(0.0, start)
     times, states, rates = [0.0], [start], [rhs(0.0, start)]
-    reason, interrupted, jacobians = "", False, 0
+    reason, interrupted, jacobians, end = "", False, 0, duration
     while times[-1] < duration and not reason and not interrupted:
-        found = solver.step(duration, method="onestep", tstop=duration)
+        found = solver.step(end, method="onestep", tstop=end)
         instant, x = float(np.ravel(found.t)[-1]), np.array(np.atleast_2d(found.y)[-1])
         if not found.success or not np.isfinite(x).all() or instant <= times[-1]:
             reason = " ".join(str(found.message).split())
             break
+        rate = rhs(instant, x)
+        if meeting is not None:
+            between = [times[-1], instant], [states[-1], x], [rates[-1], rate]
+            met = meeting(times[-1], instant, scipy.interpolate.CubicHermiteSpline(*between))
+            if met is not None:
+                end = met
+                solver.init_step(times[-1], states[-1])
+                continue
         times.append(instant)
         states.append(x)
-        rates.append(rhs(instant, x))
+        rates.append(rate)
         jacobians = int(found.njev)
+        if instant >= end:
+            end = duration
         if watch is not None:
             watch(instant, x)
         interrupted = stop is not None and instant < duration and stop()

@@ -12,12 +12,13 @@ import scipy
 
 from finger_pin.description.routing import Array
 
-_MOST_STALLED = 1000
 # So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.
 _WINDOW, _LEAST_MEAN_STEP, _MOST_STEPS = 5000, 1e-9, 1_000_000
 
 Watch = Callable[[float, Array], None]
 Stop = Callable[[], bool]
+#: Maps the start and the end of a step and its interpolant to when bodies meet that it does not show there; else None.
+Meeting = Callable[[float, float, Callable[[Array], Array]], float | None]
 
 
 @dataclass(frozen=True)
@@ -65,54 +66,6 @@ class Trajectory:
     islands: tuple[Apart, ...] = ()
 
 
-class _Broken(Exception):
-    """The integrator produced something that it cannot go on from."""
-
-
-class _Monitor:
-    """Sees every accepted step: shows it, and ends the integration inside a step when asked to.
-
-    It is given to solve_ivp as an event function, the only place where solve_ivp calls back once a step.
-    """
-
-    terminal = True
-
-    def __init__(self, watch: Watch | None, stop: Stop | None, bounded: bool = True) -> None:
-        self.bounded = bounded
-        self.watch = watch
-        self.stop = stop
-        self.reached = 0.0
-        self.stop_time = np.inf
-        self.calls_here = 0
-        self.steps = 0
-        self.window_start = 0.0
-
-    def __call__(self, instant: float, x: Array) -> float:
-        if self.stop_time < np.inf:
-            # solve_ivp finds the root of this function: the time to stop at.
-            return self.stop_time - instant
-        if not np.all(np.isfinite(x)):
-            raise _Broken("the state is not finite")
-        self.calls_here = 0 if instant > self.reached else self.calls_here + 1
-        if self.calls_here > _MOST_STALLED:
-            raise _Broken("the step size is less than the spacing between numbers")
-        if instant > self.reached:
-            self.steps += 1
-            if self.bounded and self.steps % _WINDOW == 0:
-                if instant - self.window_start < _WINDOW * _LEAST_MEAN_STEP:
-                    raise _Broken(f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each")
-                self.window_start = float(instant)
-            if self.bounded and self.steps > _MOST_STEPS:
-                raise _Broken(f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory")
-            if self.watch is not None:
-                self.watch(float(instant), x)
-            if self.stop is not None and self.stop():
-                self.stop_time = 0.5 * (self.reached + instant)
-                return self.stop_time - instant
-            self.reached = float(instant)
-        return 1.0
-
-
 def integrate(
     rhs: Callable[[float, Array], Array],
     start: Array,
@@ -122,6 +75,7 @@ def integrate(
     rtol: float,
     atol: Array,
     longest: float = np.inf,
+    meeting: Meeting | None = None,
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
@@ -135,64 +89,90 @@ def integrate(
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
         longest: The longest step, s.
+        meeting: Finds when bodies meet within a step that does not show it: it is taken again, to end there.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
     """
     began = time.perf_counter()
-    system, monitor = _System(rhs), _Monitor(watch, stop)
+    system, run = _System(rhs), _Steps([0.0], [], [])
     options: dict[str, Any] = {} if method == "LSODA" else {"jac": _Jacobian(system, atol / rtol)}
 
-    def solve(end: float, monitor: _Monitor) -> Any:
-        # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
-        with np.errstate(over="ignore", invalid="ignore"):
-            return scipy.integrate.solve_ivp(
-                system,
-                (0.0, end),
-                start,
-                method=method,
-                rtol=rtol,
-                atol=atol,
-                max_step=longest,
-                dense_output=True,
-                events=monitor,
-                **options,
-            )
+    def solver(x: Array, end: float) -> Any:
+        made = getattr(scipy.integrate, method)(
+            system, run.times[-1], x, end, rtol=rtol, atol=atol, max_step=longest, **options
+        )
+        run.solvers.append(made)
+        return made
 
-    reason = ""
-    try:
-        solution = solve(duration, monitor)
-    except (_Broken, ValueError, scipy.linalg.LinAlgError) as error:
-        if error is system.error:
-            raise
-        if isinstance(error, _Broken):
-            reason = str(error)
-        else:
-            reason = f"the state or its Jacobian is not finite ({error})"
-        # Repeat up to the last good step, to keep what was computed.
+    x, reason, interrupted, current, window = np.array(start, dtype=float), "", False, None, 0.0
+    while run.times[-1] < duration and not reason and not interrupted:
         try:
-            solution = solve(monitor.reached, _Monitor(None, None, bounded=False)) if monitor.reached > 0.0 else None
-        except (ValueError, scipy.linalg.LinAlgError):
-            # The Jacobian at that step's end, by differences.
-            solution = None
-    if solution is None:
-        nothing = Statistics(0, system.evaluations, 0, 0, time.perf_counter() - began)
-        return Trajectory(np.zeros(1), lambda at: np.tile(start, (len(at), 1)), nothing, failure=reason)
-    if solution.status == -1 and not reason:
-        reason = str(solution.message)
-    dense = solution.sol
+            # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
+            with np.errstate(over="ignore", invalid="ignore"):
+                if current is None or current.status == "finished":
+                    current = solver(x, duration)
+                message = current.step()
+        except (ValueError, scipy.linalg.LinAlgError) as error:
+            if error is system.error:
+                raise
+            reason = f"the state or its Jacobian is not finite ({error})"
+            break
+        reached, reason = float(current.t), str(message) if current.status == "failed" else ""
+        if not reason and not np.all(np.isfinite(current.y)):
+            reason = "the state is not finite"
+        if not reason and not reached > run.times[-1]:
+            reason = "the step size is less than the spacing between numbers"
+        if reason:
+            break
+        dense = current.dense_output()
+        met = None if meeting is None else meeting(run.times[-1], reached, _transposed(dense))
+        if met is not None:
+            current = solver(x, met)
+            continue
+        run.times.append(reached)
+        run.dense.append(dense)
+        x, steps = current.y.copy(), len(run.dense)
+        if steps % _WINDOW == 0:
+            if reached - window < _WINDOW * _LEAST_MEAN_STEP:
+                reason = f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each"
+            window = reached
+        if steps > _MOST_STEPS:
+            reason = f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory"
+        if watch is not None:
+            watch(reached, x)
+        interrupted = stop is not None and not reason and reached < duration and stop()
     return Trajectory(
-        breakpoints=solution.t,
-        interpolate=lambda at: np.asarray(dense(at).T),
+        breakpoints=np.array(run.times),
+        interpolate=run.interpolant(start),
         statistics=Statistics(
-            steps=len(solution.t) - 1,
+            steps=len(run.dense),
             evaluations=system.evaluations,
-            jacobians=int(solution.njev),
-            factorisations=int(solution.nlu),
+            jacobians=sum(int(each.njev) for each in run.solvers),
+            factorisations=sum(int(each.nlu) for each in run.solvers),
             wall_time=time.perf_counter() - began,
         ),
         failure=reason,
-        interrupted=solution.status == 1,
+        interrupted=interrupted,
     )
+
+
+def _transposed(dense: Any) -> Callable[[Array], Array]:
+    return lambda at: np.asarray(dense(at).T)
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """The ends of steps with the start first, their interpolants, and the solvers that took them."""
+
+    times: list[float]
+    dense: list[Any]
+    solvers: list[Any]
+
+    def interpolant(self, start: Array) -> Callable[[Array], Array]:
+        """Return what maps times to states."""
+        if not self.dense:
+            return lambda at: np.tile(start, (len(at), 1))
+        return _transposed(scipy.integrate.OdeSolution(self.times, self.dense))
 
 
 class _Jacobian:

@@ -166,7 +166,10 @@ def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
 
 
 def left_open(result: Recording) -> float:
-    """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding."""
+    """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding.
+
+    Of bodies that exchange none, such as one that flies freely, it is the share of the most that is stored.
+    """
     most = {
         name.removeprefix("energy_"): float(np.abs(values).max())
         for name, (_, values, _) in result.variables.items()
@@ -176,7 +179,7 @@ def left_open(result: Recording) -> float:
     exchanged = sum(value for name, value in most.items() if name.startswith("exchanged_"))
     if not residual > _ROUNDING * max(most.values()):
         return 0.0
-    return residual / exchanged if exchanged else np.inf
+    return residual / (exchanged or max(most.values()))
 
 
 def open_account(share: float) -> str:

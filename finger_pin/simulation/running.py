@@ -19,6 +19,7 @@ from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.sampling import SampledController, sampling_settings
 from finger_pin.core.cvode import integrate_cvode
+from finger_pin.core.encounters import meetings
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
@@ -275,6 +276,7 @@ def _integrate(
             together=chunk == _CHUNK_OBSERVED,
             stop=stop,
         )
+    meeting = meetings(loop.finger.mechanism)
     if method == "CVODE":
         return integrate_cvode(
             loop.rhs,
@@ -283,6 +285,7 @@ def _integrate(
             rtol=settings.rtol,
             atol=atol,
             longest=loop.longest_step(settings.rtol),
+            meeting=meeting,
             watch=watch,
             stop=stop,
         )
@@ -294,6 +297,7 @@ def _integrate(
         rtol=settings.rtol,
         atol=atol,
         longest=loop.longest_step(settings.rtol),
+        meeting=meeting,
         watch=watch,
         stop=stop,
     )

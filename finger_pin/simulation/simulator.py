@@ -64,7 +64,7 @@ class Simulator:
             atol_scale: Absolute tolerance over the scale of each kind of state.
 
         Raises:
-            InputError: Naming the argument that is wrong.
+            InputError: Naming the argument that is wrong, or bodies that start deep in each other.
         """
         if method not in TABLEAUS:
             near = nearest(method, TABLEAUS)
@@ -84,6 +84,10 @@ class Simulator:
         control, guides = held_control(mechanism.channels, mechanism.coordinates), Guides.of(finger, 0.0)
         if guides is not None:
             x, control = guides.place(finger, x), control._replace(guide=core_signal(guides.signal))
+        if finger.surroundings is not None:
+            state = finger.layout.unpack(x)
+            assert state.object_pose is not None
+            finger.surroundings.check(state.position, state.object_pose)
         self._stepper = Stepper(
             mechanism,
             control,

@@ -111,3 +111,21 @@ def test_a_ball_stays_above_a_finger_that_is_held_under_it(tmp_path):
 def test_a_small_ball_stays_on_a_thin_plate_beside_a_finger_in_full_motion(tmp_path, tolerance):
     result = result_of(tmp_path, BESIDE, rtol=tolerance, atol_scale=tolerance)
     assert 0.0 < float(result.object_position.sel(object="ball", axis="z").min()) < 0.0011
+
+
+def test_a_stepped_finger_refuses_to_start_deep_inside_an_object_as_a_run_does(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(SHELF.replace("position = [0.3, 0.0, 0.1]", "position = [0.3, 0.0, -0.005]"))
+    scenario = fp.load_scenario(path)
+    finger = fp.Finger(scenario.finger, objects=scenario.environment.objects)
+    for begin in (lambda: fp.simulate(scenario), lambda: fp.Simulator(finger)):
+        with pytest.raises(fp.InputError, match=r"shelf.* starts 5 mm deep in each other"):
+            begin()
+
+
+def test_a_body_that_flies_freely_has_an_account_that_closes(tmp_path):
+    """It exchanges no energy: what is left open is a share of what it has."""
+    text = HEAD_ON.replace("0.05, 0.0, 0.0", "0.0, 0.0, 1.0").replace(
+        'extends = "fig6"', 'extends = "fig6"\ncontroller.gain = 0.1'
+    )
+    assert "account" not in result_of(tmp_path, text, duration=0.2).attrs
