@@ -116,7 +116,7 @@ def closure_over_range(finger: Finger, samples: int = 512) -> ClosureRange:
 
 
 def locking_over_range(finger: Finger, samples: int = 64) -> tuple[CriticalFriction, Array]:
-    """Return where over the joints' ranges a finger is closest to locking itself, and the posture, shape (n,), rad.
+    """Return the least margin to self-locking over the joints' ranges, and its posture, shape (n,), rad.
 
     All joints move in their worst directions, which are 2^n, at evenly spread postures with force closure; tendons
     along paths have their arms and turns there. The margin is the critical coefficient over the joints' M^c.

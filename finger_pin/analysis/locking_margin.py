@@ -48,7 +48,7 @@ class SelfLockingMargin(Finding):
 def self_locking_margin(
     scenario: Scenario, samples: int = 500, most: int | None = None, servos: bool = False
 ) -> SelfLockingMargin:
-    """Return how far a scenario stays from self-locking on its reference.
+    """Return the margin to self-locking along a scenario's reference.
 
     The stiction coefficients M^c are scaled in proportion, joints and tendons move as the reference does, tendons rub
     with mu^d at its postures and passive tendons are elastic under the controller's gain. Every combination of
@@ -138,7 +138,7 @@ def _within_reach(
 
 
 def quick_margin(scenario: Scenario) -> float:
-    """Return how far a scenario stays from self-locking, at a cost that is bounded.
+    """Return the margin to self-locking along a scenario's reference, at a cost that is bounded.
 
     Of many combinations of directions only those that seem closest to locking are looked at.
     """
@@ -152,7 +152,7 @@ def quick_margin(scenario: Scenario) -> float:
 
 
 def locking_advice(margin: float) -> str:
-    """Return what to say about a margin, in one line; nothing where it is wide."""
+    """Return the warning about a narrow margin, in one line; empty where it is wide."""
     if not margin < CLOSE_TO_LOCKING:
         return ""
     if margin < 1.0:

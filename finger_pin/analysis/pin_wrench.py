@@ -69,7 +69,7 @@ def pin_wrench(
     fingertip_force: Array,
     groove: Groove = Groove.DISTAL,
 ) -> PinWrench:
-    """Return what the pins exert at m states.
+    """Return the forces and moments of the pins at m states.
 
     Args:
         finger: A finger whose joints all carry links.

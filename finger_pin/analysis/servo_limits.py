@@ -47,7 +47,7 @@ def tension_limits(finger: Finger, *, holding: bool = False) -> tuple[float, ...
 
 
 def gear_shares(description: FingerDescription) -> Array:
-    """Return what share of a large command is at the spool while a tendon is drawn in, and while it is let out.
+    """Return the shares of a large command that reach the spool, while a tendon is drawn in and while it is let out.
 
     Shape (2, a); 1 for an ideal source, and in position drive, where gears change no tension. Where no load turns the
     gears, m x >= 1, a tendon that is let out keeps whatever it has: infinity.

@@ -143,7 +143,7 @@ class TipStatics:
 
 
 def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> list[tuple[tuple[float, ...], Array]]:
-    """Return how everything may slip under a force E, shape (3,): signs of passive tendons, and of joints, shape (n,).
+    """Return the ways to slip under a force E, shape (3,): signs of passive tendons, and of joints, shape (n,).
 
     That is for HINDERING alone. A force that passes a joint's axis at no more than the coefficient M^d of its friction,
     inside of its friction circle, does not decide which way the joint slips: both ways must be looked at. Where it

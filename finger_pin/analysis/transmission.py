@@ -75,7 +75,7 @@ class TransmissionInMotion(Finding):
 
 
 def transmission_efficiency(finger: Finger, position: Array) -> TransmissionEfficiency:
-    """Return what every tendon delivers in steady sliding and at rest.
+    """Return the transmission efficiency of every tendon in steady sliding and at rest.
 
     Args:
         finger: Any finger.
@@ -154,7 +154,7 @@ def flexion_postures(finger: Finger, samples: int = 41) -> Array:
 
 
 def transmission_in_motion(finger: Finger, result: xr.Dataset) -> TransmissionInMotion:
-    """Return what every tendon delivered along a simulation, beside what steady sliding would.
+    """Return the transmission of every tendon along a simulation, beside that of steady sliding.
 
     Args:
         finger: The finger that was simulated.

@@ -161,7 +161,7 @@ def _copied(table: Table) -> Table:
 
 
 def _found(owner: Any, path: Sequence[str]) -> Any:
-    """Return what stands at an entry, defaults among it; None for nothing."""
+    """Return the value of an entry, defaults among them; None for nothing."""
     for at, part in enumerate(path):
         if isinstance(owner, Mapping):
             # Tables of a hand have dotted names inside.

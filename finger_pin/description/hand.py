@@ -128,7 +128,7 @@ class HandDescription(Description):
     file_keys = ("base",)
 
     def __repr__(self) -> str:
-        """Return what it is in a line; `to_toml` writes all of it."""
+        """Return its name and fingers in a line; `to_toml` writes all of it."""
         return f"<{type(self).__name__} {self.name}: fingers {', '.join(self.fingers)}>"
 
     __str__ = __repr__

@@ -201,7 +201,7 @@ class FingerDescription(Description):
     file_keys = ("base",)
 
     def __repr__(self) -> str:
-        """Return what it is in a line; `to_toml` writes all of it."""
+        """Return its name and size in a line; `to_toml` writes all of it."""
         return f"<{type(self).__name__} {self.name}: {len(self.joints)} joints, {len(self.tendons)} tendons>"
 
     __str__ = __repr__

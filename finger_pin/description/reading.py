@@ -29,7 +29,7 @@ _LARGEST = 100_000_000
 
 
 def shipped(kind: str) -> dict[str, str]:
-    """Return what ships of a kind, such as fingers, with a line about each."""
+    """Return the names of a kind that ship, such as fingers, with a line about each."""
     return {name: str(tomllib.loads(text).get("title", "")) for name, text in _shipped_texts(kind).items()}
 
 

@@ -154,7 +154,7 @@ class Scenario(Description):
     simulation: SimulationSettings = SimulationSettings()
 
     def __repr__(self) -> str:
-        """Return what it is in a line; `to_toml` writes all of it."""
+        """Return its name, duration and finger in a line; `to_toml` writes all of it."""
         moved = self.finger if self.hand is None else self.hand
         return f"<{type(self).__name__} {self.name}: {self.simulation.duration:g} s of {moved!r}>"
 
@@ -273,7 +273,7 @@ class Scenario(Description):
             raise problem("finger.tendons", f"{missing}, and {tautness}")
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
-        """Return what the passive tendons impose on the references (20)."""
+        """Return the constraint of the passive tendons on the references (20)."""
         fingers = {"": self.finger}
         if self.hand is not None:
             fingers = {name: placed.finger for name, placed in self.hand.fingers.items()}

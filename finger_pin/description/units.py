@@ -31,7 +31,7 @@ UNITS: dict[str, dict[str, float]] = {
 
 
 def in_si(entry: str, unit: str, wanted: str) -> float:
-    """Return what one of a unit is in the SI unit of what it is for.
+    """Return the factor from a unit to SI.
 
     Raises:
         InputError: If it is no unit of that; ``entry`` says where it stands.

@@ -14,7 +14,7 @@ _LEAST = 1e-9
 
 
 def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
-    """Return when a scenario's finger locks itself, as plain text: with or without tendon friction, at which posture.
+    """Return the self-locking of a scenario's finger as plain text: critical frictions, postures, its own.
 
     Args:
         scenario: Of a finger with force closure.
@@ -64,7 +64,7 @@ def _closest(margin: SelfLockingMargin) -> str:
 
 
 def _verdict(share: float) -> str:
-    """Return what a share of the critical friction means."""
+    """Return a share of the critical friction in words."""
     if share * _LEAST >= 1.0:
         return "it locks, whatever its friction"
     what = "it locks" if share >= 1.0 else "it does not lock"

@@ -1,4 +1,4 @@
-"""What contacts do: normal force and friction over time, the friction cone, sliding, and where free objects go."""
+"""Contacts: normal force and friction over time, the friction cone, sliding, and the motion of free objects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MILLI = 1e3
 
 @styled
 def plot_contact(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw what contacts do, from a result of a finger with objects around it.
+    """Draw contact forces, friction cone, sliding and the motion of free objects, from a result with objects.
 
     (a) One panel per contact that ever closed, N: normal force, friction, and the most that friction can be; sticking
     is where friction is less. (b) Friction against normal force: the cone, whose edge is sliding. (c) Speed of sliding,

@@ -23,7 +23,7 @@ _LEAST = 1e-14
 
 @styled
 def plot_convergence(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw how far every joint is from the run at a tighter tolerance, rad, and where the two part.
+    """Draw the difference of every joint from the run at a tighter tolerance, rad, and the time at which they part.
 
     Args:
         result: Dataset of `simulate`, of any finger, with what `Convergence.attach` adds.

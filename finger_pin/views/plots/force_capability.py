@@ -72,7 +72,7 @@ def plot_radius_sensitivity(
     width: Width = None,
     titles: bool = True,
 ) -> Figure:
-    """Draw how the tension that a fingertip force needs changes with every winding radius, N/mm, without friction.
+    """Draw the derivative of the tension for a fingertip force by every winding radius, N/mm, without friction.
 
     Args:
         finger: A finger with force closure.

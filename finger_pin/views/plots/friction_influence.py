@@ -28,7 +28,7 @@ _MEASURES: tuple[tuple[str, Callable[[Measures], Array]], ...] = (
 
 @styled
 def plot_friction_influence(found: FrictionInfluence, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw what both frictions and the least tension do, and in which sense joint friction is the more crucial.
+    """Draw errors, tensions and losses over both frictions and the least tension, and the two frictions compared.
 
     Args:
         found: What the experiment `friction_influence` returned.

@@ -31,7 +31,7 @@ def fingers_of(result: xr.Dataset) -> list[str]:
 
 
 def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
-    """Return what a hand's result says of one finger: joints and tendons under their own names, no energies.
+    """Return the part of a hand's result about one finger: joints and tendons by their own names, no energies.
 
     Raises:
         InputError: If there is no such finger.

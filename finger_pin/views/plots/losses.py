@@ -24,7 +24,7 @@ _COLUMNS = (
 
 @styled
 def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw what friction takes, from a result.
+    """Draw tensions and torques before and after friction, from a result.
 
     (a) One panel per tendon, N: the tension before its friction (the command, or that at a spool; of a passive tendon,
     the proximal half) and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d

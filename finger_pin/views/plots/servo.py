@@ -1,4 +1,4 @@
-"""What servos do: spools against joints, tension at the spool and at the finger, current, and where the power goes."""
+"""Servos: spools against joints, tension at the spool and at the finger, current, and where the power goes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LOST = {
 
 @styled
 def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw what servos do, from a result of a finger that has some.
+    """Draw joints against spools, tensions at both ends, currents and powers, from a result of a finger with servos.
 
     (a) One panel per motor: angles of the joints that its tendons turn against the angle of its spool, deg; what gears,
     stretch and canals keep back makes loops of them. (b) One panel per tendon on a spool, N: the tension there, and

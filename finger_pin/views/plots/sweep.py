@@ -52,7 +52,7 @@ def plot_sweep(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
 
 
 def short_key(key: str) -> str:
-    """Return what a key says to a reader, such as ``T3 medial radius``."""
+    """Return a key in words, such as ``T3 medial radius``."""
     return " ".join(part.replace("_", " ") for part in key.split(".") if part not in _SILENT)
 
 

@@ -49,7 +49,7 @@ class Ghost:
     poses: LinkPoses
 
     def header(self) -> dict[str, Any]:
-        """Return what the page needs to know of it."""
+        """Return its part of the page's header."""
         scene = self.scene
         solids = solid_commands(scene.geometry, scene.tube_radius, _GHOST, _GHOST_COLOUR)
         moving = [each for each in solids if not each["path"].startswith(f"{_GHOST}/base/")]
@@ -65,7 +65,7 @@ class Ghost:
 
 
 def shown(finger: Finger | FingerDescription) -> TendonGeometry | TreeGeometry:
-    """Return what can be shown of a finger or hand, or of the description of one.
+    """Return the geometry of a finger or hand, or of the description of one.
 
     Raises:
         InputError: If a joint of a description carries no link.
@@ -126,7 +126,7 @@ class Scene:
         ghost: Ghost | None = None,
         palm: LinkPoses | None = None,
     ) -> dict[str, Any]:
-        """Return what the page needs to know before the first frame.
+        """Return the page's header: what stays the same in all frames.
 
         Args:
             title: Shown above the legend.
@@ -213,7 +213,7 @@ class Scene:
         return np.stack(places, axis=-2)
 
     def looseness(self, strand_tension: Array) -> Array:
-        """Return how loose tendons are drawn, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""
+        """Return the looseness of tendons, shape (..., t), 0 to 1, at tensions of the strands, (..., s), N."""
         # A passive tendon is drawn loose when both its halves are.
         actuated = len(self.geometry.description.actuated_names)
         passive = strand_tension[..., actuated:]

@@ -94,7 +94,7 @@ class Things:
         return cls(objects, tuple(found), poses, contacts, steepness[steepness > 0.0], size, middle)
 
     def header(self, turn: Array) -> dict[str, Any]:
-        """Return what the page needs before the first frame; ``turn`` is the rotation of the scene."""
+        """Return their part of the page's header; ``turn`` is the rotation of the scene."""
         length = self._newton()
         return {
             "things": {
@@ -112,7 +112,7 @@ class Things:
         return {name: _encode(values) for name, values in (("object", self.poses), ("contact", self.contacts))}
 
     def seen(self) -> Array:
-        """Return where free objects are and where bodies touch, as far as that is near the finger, shape (m, 3)."""
+        """Return the places of free objects and of contacts, as far as they are near the finger, shape (m, 3)."""
         free = [index for index, name in enumerate(self.moving) if self.objects[name].mass is not None]
         places = self.poses[:, free, :3].reshape(-1, 3)
         points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
@@ -140,7 +140,7 @@ class Things:
         return np.tile(each.pose, (len(self.poses), 1))
 
     def arrows(self) -> Array:
-        """Return where the arrow of every contact's force begins and ends in all frames, shape (m, c, 2, 3), m."""
+        """Return both ends of the arrow of every contact's force in all frames, shape (m, c, 2, 3), m."""
         points, force = self.contacts[..., :3], self.contacts[..., 3:6]
         return np.stack([points, points + self._newton() * force], axis=-2)
 
@@ -153,7 +153,7 @@ class Things:
         return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": placed(rotation, pose[:3])}
 
     def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
-        """Yield what draws an object: meshcat's geometry, its rotation and place in the object, and its colour."""
+        """Yield the solids of an object: meshcat's geometry, its rotation and place in the object, and its colour."""
         each = self.objects[name]
         sizes, colour = each.sizes, _FIXED if each.mass is None else _FREE
         rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
