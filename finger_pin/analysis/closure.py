@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
@@ -21,7 +21,7 @@ _DEEPER = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ClosureRange(Finding):
+class ClosureRange(BriefRepr):
     """Internal tensions over the joints' ranges, t tendons at m postures.
 
     Attributes:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
@@ -22,7 +22,7 @@ _REST = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Equilibrium(Finding):
+class Equilibrium(BriefRepr):
     """A posture in which a finger is at rest, and stays.
 
     Attributes:

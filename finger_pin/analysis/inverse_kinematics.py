@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import least_squares
 
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
@@ -25,7 +25,7 @@ _STARTS, _MOST = (0.1, 0.5, 0.9), 27
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TipPosture(Finding):
+class TipPosture(BriefRepr):
     """The posture whose fingertip is nearest to a point.
 
     Attributes:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import directions_of_motion, sliding_velocity
-from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.hand import one_finger
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -22,7 +22,7 @@ from finger_pin.mechanism.tendons import Tendons
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CriticalFriction(Finding):
+class CriticalFriction(BriefRepr):
     """The least joint friction at which a finger locks, over the directions that were asked about.
 
     Attributes:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.directions import directions_of_motion
-from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
@@ -19,7 +19,7 @@ from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SelfLockingMap(Finding):
+class SelfLockingMap(BriefRepr):
     """Critical coefficients over the angles of two joints, or of one where no other is free.
 
     Attributes:

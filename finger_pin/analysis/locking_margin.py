@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import sliding_velocity
-from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.locking_loop import FrictionLoop
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
@@ -28,7 +28,7 @@ _NEARLY, _MOST, _HALVINGS = 0.95, 1e3, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SelfLockingMargin(Finding):
+class SelfLockingMargin(BriefRepr):
     """How far a scenario stays from self-locking.
 
     Attributes:

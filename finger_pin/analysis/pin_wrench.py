@@ -26,14 +26,14 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PinWrench(Finding):
+class PinWrench(BriefRepr):
     """What the pins exert on what the joints carry, base frame, moments about the joints' origins; shapes (m, n, 3).
 
     Attributes:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -22,7 +22,7 @@ _NEW = 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ForcePolytope(Finding):
+class ForcePolytope(BriefRepr):
     """The forces that a fingertip can exert, in the directions that its joints can move it.
 
     Attributes:

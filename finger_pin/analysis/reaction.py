@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger_pin.analysis.finding import Finding
 from finger_pin.analysis.pin_wrench import pin_wrench
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.hand import one_finger
 from finger_pin.description.loading import scenario_of
 from finger_pin.description.routing import Array
@@ -29,7 +29,7 @@ _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointReactions(Finding):
+class JointReactions(BriefRepr):
     """Reactions of n joints at m instants, shapes (m, n), N unless said otherwise.
 
     Attributes:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.laws.bristle import friction_coefficient
@@ -17,7 +17,7 @@ from finger_pin.mechanism.tendons import Tendons
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SteadyState(Finding):
+class SteadyState(BriefRepr):
     """What tendons deliver and motors draw while a finger's actuated tendons slide evenly; m states.
 
     Attributes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.tip_statics import (
     INFEASIBLE,
     UNBOUNDED,
@@ -24,7 +24,7 @@ from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RequiredTension(Finding):
+class RequiredTension(BriefRepr):
     """The tensions that a fingertip force needs, those with the least maximum.
 
     Attributes:

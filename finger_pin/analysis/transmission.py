@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import sliding_velocity
-from finger_pin.analysis.finding import Finding
+from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
@@ -37,7 +37,7 @@ _SETTLED = 5.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TransmissionEfficiency(Finding):
+class TransmissionEfficiency(BriefRepr):
     """Delivered over commanded tension, f / f^a, of every tendon; shapes (..., t).
 
     Attributes:
@@ -56,7 +56,7 @@ class TransmissionEfficiency(Finding):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TransmissionInMotion(Finding):
+class TransmissionInMotion(BriefRepr):
     """Delivered over commanded tension along a simulation; shapes (m, t), not a number where nothing is commanded.
 
     Attributes:

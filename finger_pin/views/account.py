@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 _EXCHANGED = "energy_exchanged_"
 
 
-class Account(NamedTuple):
+class AccountSeries(NamedTuple):
     """Energies over time by name, J.
 
     Attributes:
@@ -24,9 +24,9 @@ class Account(NamedTuple):
     lost: dict[str, xr.DataArray]
 
 
-def account(result: xr.Dataset) -> Account:
+def account(result: xr.Dataset) -> AccountSeries:
     """Return the account of a result, in its order, without the residual."""
-    found = Account({}, {}, {})
+    found = AccountSeries({}, {}, {})
     for name, values in result.items():
         name = str(name)
         if name.startswith(_EXCHANGED):

@@ -22,7 +22,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
-from finger_pin.views.viewer.things import Things
+from finger_pin.views.viewer.scene_objects import SceneObjects
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,19 +75,19 @@ def animation_page(
     finger: Finger | None = None,
 ) -> str:
     """Return the page that plays a result, with a set of fingertip forces and another result beside it if given."""
-    motion = Motion.of(result, finger=finger)
+    motion = Playback.of(result, finger=finger)
     every = slice(None, None, max(1, len(motion.time) // _POSITIONS_IN_VIEW))
     seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
-    beside = Motion.of(ghost).ghost(motion.time) if ghost is not None else None
+    beside = Playback.of(ghost).ghost(motion.time) if ghost is not None else None
     header = motion.scene.header(
         motion.title, motion.position[every], motion.largest, live=False, forces=forces, ghost=beside, palm=seen
     )
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
         chunk["ghost"] = beside.chunk()
-    if motion.things is not None:
-        header |= motion.things.header(motion.scene.view())
-        chunk |= motion.things.chunk()
+    if motion.objects is not None:
+        header |= motion.objects.header(motion.scene.view())
+        chunk |= motion.objects.chunk()
     return render({**header, "chunks": [chunk]})
 
 
@@ -109,7 +109,7 @@ def posture_page(finger: Finger | FingerDescription, forces: ForcePolytope, stra
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Playback:
     """What of a result is shown: the frames of a film.
 
     Attributes:
@@ -119,7 +119,7 @@ class Motion:
         position: theta, shape (m, n), rad.
         tension: Of every strand, shape (m, s), N.
         palm: Where the palm is, m poses, if it moves.
-        things: What the finger may touch, if there is anything.
+        objects: What the finger may touch, if there is anything.
     """
 
     scene: Scene
@@ -128,7 +128,7 @@ class Motion:
     position: Array
     tension: Array
     palm: LinkPoses | None = None
-    things: Things | None = None
+    objects: SceneObjects | None = None
 
     @property
     def largest(self) -> float:
@@ -142,7 +142,7 @@ class Motion:
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
-    def of(cls, result: xr.Dataset | Recording, rate: float = FRAME_RATE, finger: Finger | None = None) -> Motion:
+    def of(cls, result: xr.Dataset | Recording, rate: float = FRAME_RATE, finger: Finger | None = None) -> Playback:
         """Choose the frames of a result.
 
         Args:
@@ -169,8 +169,8 @@ class Motion:
         title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
         palm, few = _palm(result, frames), slice(None, None, max(1, len(frames) // _POSITIONS_IN_VIEW))
         tips = scene.tips(scene.geometry.poses(position[few])).reshape(-1, 3)
-        things = Things.of(result, time[frames], scene.size, tips.mean(axis=0), palm)
-        return cls(scene, title, time[frames], position, tension, palm, things)
+        objects = SceneObjects.of(result, time[frames], scene.size, tips.mean(axis=0), palm)
+        return cls(scene, title, time[frames], position, tension, palm, objects)
 
 
 def _strand_tensions(scene: Scene, result: xr.Dataset | Recording, frames: Indices) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import LinkPoses
-from finger_pin.views.viewer.animation import Motion
+from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.scene import SLACK_TENSION, Scene, scale_above
 from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, solid_commands
 
@@ -44,11 +44,11 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
     for name, value in (("speed", speed), ("rate", rate)):
         if not value > 0.0:
             raise InputError(name, "must be above 0", value)
-    motion = Motion.of(result, rate / speed)
+    motion = Playback.of(result, rate / speed)
     root = visualizer.path.lower()
     scene, tube, scale = motion.scene, motion.scene.tube_radius, scale_above(motion.largest)
-    things = motion.things
-    for command in (*solid_commands(scene.geometry, tube), *(things.commands() if things else ())):
+    objects = motion.objects
+    for command in (*solid_commands(scene.geometry, tube), *(objects.commands() if objects else ())):
         _send(visualizer, {**command, "path": root + command["path"]})
     started, last = time.monotonic(), len(motion.time) - 1
     for index, due in enumerate((motion.time - motion.time[0]) / speed):
@@ -59,9 +59,9 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
         time.sleep(max(0.0, ahead))
         palm = motion.palm and LinkPoses(motion.palm.rotation[index], motion.palm.translation[index])
         shown = _frame(scene, motion.position[index], motion.tension[index], scale, palm)
-        if things:
-            arrows = enumerate(things.arrows()[index])
-            shown += [*things.frame(index), *(_tube(f"contact{c}", ends, tube, FORCE_COLOUR) for c, ends in arrows)]
+        if objects:
+            arrows = enumerate(objects.arrows()[index])
+            shown += [*objects.frame(index), *(_tube(f"contact{c}", ends, tube, FORCE_COLOUR) for c, ends in arrows)]
         for command in shown:
             _send(visualizer, {**command, "path": root + command["path"]})
 

@@ -27,11 +27,11 @@ from finger_pin.files import replacing
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.simulation.recorded import Recording
 from finger_pin.views.plots.style import new_figure, styled
-from finger_pin.views.viewer.animation import Motion
+from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
+from finger_pin.views.viewer.scene_objects import SceneObjects
 from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, is_mesh
-from finger_pin.views.viewer.things import Things
 
 _BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -75,7 +75,7 @@ def write_video(
         if not 0.0 < value < np.inf:
             raise InputError(name, "must be a number above 0", value)
     writer = _writer(gif, rate)
-    motion = Motion.of(result, rate / speed)
+    motion = Playback.of(result, rate / speed)
     figure = new_figure(*_INCHES, layout=None)
     film = _Film(figure, motion)
     with replacing(target) as temporary, writer.saving(figure, temporary, (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]):
@@ -97,7 +97,7 @@ def draw_picture(result: xr.Dataset | Recording, stage: Array) -> NDArray[np.uin
     figure = new_figure(*_INCHES, layout=None)
     figure.set_dpi(_GIF_WIDTH / _INCHES[0])
     figure.set_facecolor(_BACKGROUND)
-    motion = Motion.of(result)
+    motion = Playback.of(result)
     _Film(figure, motion, stage).show(len(motion.time) - 1)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
@@ -124,17 +124,17 @@ class _Solid:
 class _Film:
     """A motion on a figure, a frame at a time."""
 
-    def __init__(self, figure: Figure, motion: Motion, stage: Array = _NO_POINTS) -> None:
+    def __init__(self, figure: Figure, motion: Playback, stage: Array = _NO_POINTS) -> None:
         """Set the stage: camera, legend, and what stays; further points that are in view have shape (k, 3), m."""
         scene = motion.scene
         self.motion = motion
         self.poses = scene.geometry.poses(motion.position, motion.palm)
-        self.solids, things = tuple(_solids(scene)), motion.things
+        self.solids, objects = tuple(_solids(scene)), motion.objects
         # Objects are further links; what is seen of them does not move the camera far away.
         own = self.solids
-        if things is not None:
-            self.solids += tuple(_things(things, self.poses.translation.shape[1]))
-            placed = np.stack([things.placed(name) for name in things.objects], axis=1)
+        if objects is not None:
+            self.solids += tuple(_objects(objects, self.poses.translation.shape[1]))
+            placed = np.stack([objects.placed(name) for name in objects.by_name], axis=1)
             turned = Rotation.from_quat(placed[..., 3:].reshape(-1, 4)).as_matrix().reshape(*placed.shape[:2], 3, 3)
             self.poses = LinkPoses(
                 np.concatenate([self.poses.rotation, turned], axis=1),
@@ -154,7 +154,7 @@ class _Film:
             [
                 self.tips.reshape(-1, 2),
                 stage @ self.camera[:2].T,
-                np.zeros((0, 2)) if things is None else things.seen() @ self.camera[:2].T,
+                np.zeros((0, 2)) if objects is None else objects.seen() @ self.camera[:2].T,
                 *(self._outline(solid, frame) for frame in few for solid in own),
             ]
         )
@@ -195,8 +195,8 @@ class _Film:
         self.tubes.set_color(tension_colours(tension, self.scale)[strands])
         for index, trace in enumerate(self.traces):
             trace.set_data(*self.tips[: frame + 1, index].T)
-        if motion.things is not None:
-            self.arrows.set_segments(list(motion.things.arrows()[frame] @ self.camera[:2].T))
+        if motion.objects is not None:
+            self.arrows.set_segments(list(motion.objects.arrows()[frame] @ self.camera[:2].T))
         self.clock.set_text(f"{motion.time[frame]:.2f} s")
 
     def _placed(self, solid: _Solid, frame: int) -> Array:
@@ -228,9 +228,9 @@ def _solids(scene: Scene) -> Iterator[_Solid]:
         yield _Solid(pulley.joint, ring + np.array([0.0, 0.0, pulley.offset]), (*GROOVE_COLOUR, SOLID_OPACITY))
 
 
-def _things(things: Things, first: int) -> Iterator[_Solid]:
-    for index, name in enumerate(things.objects):
-        for shape, turned, offset, colour in things.parts(name):
+def _objects(objects: SceneObjects, first: int) -> Iterator[_Solid]:
+    for index, name in enumerate(objects.by_name):
+        for shape, turned, offset, colour in objects.parts(name):
             corners = _corners_of(shape) @ turned.T + offset
             yield _Solid(first + index, corners, (*colour, SOLID_OPACITY))
 

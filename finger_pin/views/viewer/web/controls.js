@@ -140,7 +140,7 @@ class Player {
     const names = ["play", "restart", "scrub", "clock", "speed", "loop", "live", "legend", "ticks"];
     this.element = Object.fromEntries(names.map((name) => [name, document.getElementById(name)]));
     document.getElementById("title").textContent = this.config.title;
-    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title], ["things", this.config.things?.note]]) {
+    for (const [name, text] of [["forces", this.config.forces], ["ghost", this.config.ghost?.title], ["objects", this.config.objects?.note]]) {
       const note = document.getElementById(name);
       note.hidden = !text;
       note.lastElementChild.textContent = text;

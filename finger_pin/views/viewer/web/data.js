@@ -63,9 +63,9 @@ class Frames {
       tension: new Rows(config.strands.length, Float32Array),
       tip: new Rows(3 * config.tips, Float32Array),
       joint: new Rows(config.joints.length, Float32Array),
-      ...(config.things && {
-        object: new Rows(7 * config.things.free.length, Float32Array),
-        contact: new Rows(9 * config.things.steepness.length, Float32Array),
+      ...(config.objects && {
+        object: new Rows(7 * config.objects.free.length, Float32Array),
+        contact: new Rows(9 * config.objects.steepness.length, Float32Array),
       }),
       ...(config.ghost && { ghost: new Rows(7 * config.ghost.links.length, Float32Array) }),
     };

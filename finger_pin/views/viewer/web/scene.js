@@ -117,7 +117,7 @@ class Trace {
 class ContactView {
   constructor(viewer, config, steepness, index) {
     const { ArrowHelper, ConeGeometry, DoubleSide, Group, Mesh, MeshPhongMaterial, Vector3 } = MeshCat.THREE;
-    this.length = config.things.length;
+    this.length = config.objects.length;
     this.group = new Group();
     this.arrow = new ArrowHelper(new Vector3(0, 0, 1), new Vector3(), 1, 0xff5a5a);
     // Its apex at the origin, open along -y.
@@ -156,9 +156,9 @@ class FingerScene {
     this.links = config.links.map((name) => viewer.scene_tree.find([ROOT, name]).object);
     for (const command of config.ghost?.commands ?? []) viewer.handle_command(command);
     this.ghostLinks = (config.ghost?.links ?? []).map((name) => viewer.scene_tree.find([ROOT, "ghost", name]).object);
-    for (const command of config.things?.commands ?? []) viewer.handle_command(command);
-    this.free = (config.things?.free ?? []).map((name) => viewer.scene_tree.find([ROOT, name]).object);
-    this.contacts = (config.things?.steepness ?? []).map((each, i) => new ContactView(viewer, config, each, i));
+    for (const command of config.objects?.commands ?? []) viewer.handle_command(command);
+    this.free = (config.objects?.free ?? []).map((name) => viewer.scene_tree.find([ROOT, name]).object);
+    this.contacts = (config.objects?.steepness ?? []).map((each, i) => new ContactView(viewer, config, each, i));
     config.inView.push(...(config.alsoInView ?? []));
     this.tendons = config.tendons.map((tendon) => new TendonView(viewer, config, tendon));
     this.traces = Array.from({ length: config.tips }, (_, i) => new Trace(viewer, config, frames, i));
@@ -204,7 +204,7 @@ class FingerScene {
   show(place, colours) {
     this.pose(this.links, "pose", place);
     if (this.config.ghost) this.pose(this.ghostLinks, "ghost", place);
-    if (this.config.things) {
+    if (this.config.objects) {
       this.pose(this.free, "object", place);
       const numbers = this.frames.mix("contact", place);
       this.contacts.forEach((contact, i) => contact.show(numbers.subarray(9 * i, 9 * i + 9)));

@@ -12,7 +12,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.views import draw
 from finger_pin.views.plots.style import new_figure
-from finger_pin.views.viewer.animation import Motion, animation_page
+from finger_pin.views.viewer.animation import Playback, animation_page
 from finger_pin.views.viewer.drawing import FORCE_COLOUR
 from finger_pin.views.viewer.video import _Film
 
@@ -35,10 +35,10 @@ def pinched():
 
 def test_every_object_stands_where_it_is_and_moves_as_in_the_result(pinched):
     found, column = played(pinched)
-    things = found["things"]
+    objects = found["objects"]
     # On a palm that moves, what is fixed moves along.
-    assert things["free"] == ["object_ball", "object_tray"]
-    drawn = {each["path"] for each in things["commands"]}
+    assert objects["free"] == ["object_ball", "object_tray"]
+    drawn = {each["path"] for each in objects["commands"]}
     assert {"/finger_pin/object_ball/part0", "/finger_pin/object_tray/part0"} <= drawn
     time, poses = column("time", "<f8"), column("object").reshape(-1, 2, 7)
     at = pinched.sel(time=time)
@@ -51,19 +51,19 @@ def test_every_object_stands_where_it_is_and_moves_as_in_the_result(pinched):
 
 def test_arrows_are_the_forces_of_the_contacts_that_close_and_cones_as_steep_as_friction(pinched):
     found, column = played(pinched)
-    assert found["things"]["steepness"] == [0.7, 0.7]
+    assert found["objects"]["steepness"] == [0.7, 0.7]
     numbers = column("contact").reshape(-1, 2, 9)
     at = pinched.sel(time=column("time", "<f8"), contact=["left.distal-ball", "right.distal-ball"])
     points = at.contact_point.values + at.palm_position.values[:, None]
     for first, expected in ((0, points), (3, at.contact_force.values), (6, at.contact_normal.values)):
         assert numbers[..., first : first + 3] == pytest.approx(expected, abs=1e-5)
     strongest = np.linalg.norm(at.contact_force.values, axis=-1).max()
-    assert 0.02 < found["things"]["length"] * strongest < 0.06
+    assert 0.02 < found["objects"]["length"] * strongest < 0.06
 
 
-def test_a_result_without_objects_has_no_things():
+def test_a_result_without_objects_has_none_on_its_page():
     found, _ = played(fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.1})))
-    assert "things" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
+    assert "objects" not in found and set(found["chunks"][0]) == {"time", "pose", "path", "tension", "tip", "joint"}
 
 
 class Window:
@@ -92,7 +92,7 @@ def test_a_meshcat_window_shows_objects_where_they_end_and_the_forces_on_them(pi
 
 
 def test_a_film_shows_the_ball_round_and_where_it_is(pinched):
-    motion = Motion.of(pinched, 10.0)
+    motion = Playback.of(pinched, 10.0)
     film, frame = _Film(new_figure(4.0, 3.0), motion), 3
     film.show(frame)
     at = pinched.sel(time=motion.time[frame])

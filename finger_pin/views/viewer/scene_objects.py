@@ -30,11 +30,11 @@ _ARROW = 0.22
 
 
 @dataclass(frozen=True, eq=False)
-class Things:
+class SceneObjects:
     """Objects around a finger, and contacts, in the frames of a page.
 
     Attributes:
-        objects: By name.
+        by_name: The objects.
         moving: Names of those that move: the free ones, and all on a palm that moves.
         poses: Their poses, x, y, z and quaternion x, y, z, w, shape (m, k, 7).
         contacts: Point, m, force on the second body, N, and normal of every contact, shape (m, c, 9).
@@ -43,7 +43,7 @@ class Things:
         middle: Where the finger is, shape (3,), m.
     """
 
-    objects: dict[str, Object]
+    by_name: dict[str, Object]
     moving: tuple[str, ...]
     poses: Array
     contacts: Array
@@ -54,7 +54,7 @@ class Things:
     @classmethod
     def of(
         cls, result: xr.Dataset | Recording, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
-    ) -> Things | None:
+    ) -> SceneObjects | None:
         """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
 
         Args:
@@ -97,7 +97,7 @@ class Things:
         """Return their part of the page's header; ``turn`` is the rotation of the scene."""
         length = self._newton()
         return {
-            "things": {
+            "objects": {
                 "commands": list(self.commands()),
                 "free": [f"object_{name}" for name in self.moving],
                 "steepness": np.round(self.steepness, 4).tolist(),
@@ -113,7 +113,7 @@ class Things:
 
     def seen(self) -> Array:
         """Return the places of free objects and of contacts, as far as they are near the finger, shape (m, 3)."""
-        free = [index for index, name in enumerate(self.moving) if self.objects[name].mass is not None]
+        free = [index for index, name in enumerate(self.moving) if self.by_name[name].mass is not None]
         places = self.poses[:, free, :3].reshape(-1, 3)
         points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
         found = np.concatenate([places, points])
@@ -121,7 +121,7 @@ class Things:
 
     def commands(self) -> Iterator[Command]:
         """Yield meshcat's commands for all objects, each where it starts."""
-        for name, each in self.objects.items():
+        for name, each in self.by_name.items():
             path = f"{ROOT}/object_{name}"
             for index, (shape, turned, offset, colour) in enumerate(self.parts(name)):
                 yield mesh(f"{path}/part{index}", shape, turned, offset, colour, 1.6 * SOLID_OPACITY)
@@ -136,7 +136,7 @@ class Things:
         """Return poses of an object in all frames, shape (m, 7)."""
         if name in self.moving:
             return np.asarray(self.poses[:, self.moving.index(name)])
-        each = self.objects[name]
+        each = self.by_name[name]
         return np.tile(each.pose, (len(self.poses), 1))
 
     def arrows(self) -> Array:
@@ -154,7 +154,7 @@ class Things:
 
     def parts(self, name: str) -> Iterator[tuple[Command, Array, Array, tuple[float, float, float]]]:
         """Yield the solids of an object: meshcat's geometry, its rotation and place in the object, and its colour."""
-        each = self.objects[name]
+        each = self.by_name[name]
         sizes, colour = each.sizes, _FIXED if each.mass is None else _FREE
         rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
         place = np.array(each.position)

@@ -1,4 +1,4 @@
-"""How the findings of this room look when they are printed."""
+"""Results of analyses in print: large arrays by shape and range."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 _FEW = 8
 
 
-class Finding:
+class BriefRepr:
     """A dataclass that prints its large arrays by shape and range, one entry a line."""
 
     def __repr__(self) -> str:
