@@ -24,6 +24,8 @@ from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
 
 FIRST_STEP = 1e-6
+# A tolerance that every step keeps, and a step that every end cuts.
+_ANY = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +191,24 @@ class Part:
     def moment(self) -> tuple[Array, ...]:
         """All that steps have changed and later ones depend on; arrays of its own, which may be filled."""
         return self.x, self.attitude, self.memory, self.control.tension, self.tables.tip_force, self.tables.bodies
+
+    def repeating(self, ends: Array) -> Part:
+        """Return the same part that takes steps with these ends, s, whatever their errors are."""
+        bound = self._bound
+        twin = Part(
+            self.island,
+            self.laws,
+            self.tables,
+            self.control,
+            bound.x,
+            bound.attitude,
+            bound.tableau,
+            _ANY,
+            np.full_like(bound.atol, _ANY),
+            bound.memory,
+        )
+        twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
+        return twin
 
     def copy(self) -> Part:
         """Return an independent part that goes on bit by bit alike."""

@@ -169,6 +169,11 @@ class Stepper:
         for part in self.parts:
             part.knots = np.array(knots, dtype=float)
 
+    def repeat(self, ends: Sequence[Array]) -> None:
+        """Take steps with given ends from now on, s, for each island, whatever their errors."""
+        for index, (part, own) in enumerate(zip(self.parts, ends, strict=True)):
+            self.parts[index] = part.repeating(own[own > part.time])
+
     def hold(self, inputs: Array) -> None:
         """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
         for part in self.parts:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.textbook import Stop
+from finger_pin.core.stepper import TABLEAUS
+from finger_pin.core.textbook import Stop, Trajectory
 from finger_pin.description.family import Family
 from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.routing import Array
@@ -21,7 +22,8 @@ from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import Motions, record, variables
-from finger_pin.simulation.running import Setup, run
+from finger_pin.simulation.running import Setup, Steps, run
+from finger_pin.simulation.sensitivity import TIGHT, TIGHTER, add_slopes
 from finger_pin.simulation.starting import own_parts, packed_state
 
 if TYPE_CHECKING:
@@ -95,6 +97,8 @@ class Prepared:
         *,
         initial: ArrayLike | xr.Dataset | None = None,
         stop: Stop | None = None,
+        sensitivities: bool = False,
+        accuracy: float | None = None,
     ) -> Recording:
         """Simulate, and return what is recorded, and no more: bit for bit as in the result of `simulate`.
 
@@ -104,6 +108,10 @@ class Prepared:
             values: One for each key, in their order; by default the scenario's own.
             initial: The packed state to start from, shape (size,), or a result to continue from, as for `fp.simulate`.
             stop: Asked now and then; when it returns true the run ends there.
+            sensitivities: Whether to add the derivatives of what is recorded by the values, ``run.slopes[variable]`` of
+                shape (p, ...): by repeating the run once for each on the same steps. From the time of the attribute
+                ``sensitivities_lost`` on they are beyond all measure: the motion says nothing of the values there.
+            accuracy: Loosest tolerances of a run with sensitivities, by default 1e-8, or 1e-9 where bodies touch.
 
         Raises:
             InputError: Naming the entry that is wrong.
@@ -111,13 +119,47 @@ class Prepared:
             Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
             InterruptedByKeyboard: After Ctrl-C, a KeyboardInterrupt; its ``result`` likewise.
         """
+        return interruptible(lambda asked: self._run(values, initial, asked, sensitivities, accuracy), stop)
+
+    def _run(
+        self,
+        values: Sequence[Any] | None,
+        initial: ArrayLike | xr.Dataset | None,
+        stop: Stop,
+        sensitivities: bool,
+        accuracy: float | None,
+    ) -> Recording:
         scenario = self.scenario(values)
+        if not sensitivities:
+            return self._made(scenario, initial, stop)[0]
+        given = self.values if values is None else values
+        for key, value in zip(self.parameters, given, strict=True):
+            if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+                raise InputError(key, "sensitivities are those to single numbers", value)
+        if scenario.simulation.method not in TABLEAUS:
+            allowed = f"sensitivities are for {', '.join(TABLEAUS)}"
+            raise InputError("simulation.method", allowed, scenario.simulation.method)
+        apart = bool(scenario.environment.objects)
+        tight = accuracy or (TIGHTER if apart else TIGHT)
+        found, trajectory = self._made(_tight(scenario, tight), initial, stop)
+        steps = None if apart else [ends for _, ends, _ in trajectory.islands] or [trajectory.breakpoints]
+
+        def again(moved: Sequence[float]) -> Recording:
+            return self._made(_tight(self.scenario(moved), tight), initial, stop, steps)[0]
+
+        return add_slopes(found, [float(value) for value in given], again, apart=apart)
+
+    def _made(
+        self,
+        scenario: Scenario,
+        initial: ArrayLike | xr.Dataset | None,
+        stop: Stop | None,
+        steps: Steps | None = None,
+    ) -> tuple[Recording, Trajectory]:
+        """Make a run, on given steps if there are any."""
         setup = Setup.of(scenario, _started(scenario, initial))
         self._check(setup.loop)
-        return interruptible(lambda asked: self._run(scenario, setup, asked), stop)
-
-    def _run(self, scenario: Scenario, setup: Setup, stop: Stop) -> Recording:
-        trajectory = setup.integrate(stop=stop)
+        trajectory = setup.integrate(stop=stop, steps=steps)
         motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = record(scenario, motions, trajectory, setup.method, self.record, text="")
@@ -128,7 +170,7 @@ class Prepared:
             raise IntegrationError(reached, *setup.failure(trajectory), found.dataset())
         if trajectory.interrupted:
             raise Interrupted(reached, found.dataset())
-        return found
+        return found, trajectory
 
     def simulate(
         self,
@@ -164,3 +206,10 @@ class Prepared:
 def _started(scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
     loop = ClosedLoop.from_scenario(scenario)
     return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
+
+
+def _tight(scenario: Scenario, tolerance: float) -> Scenario:
+    """Return a scenario with tolerances that are at most as loose as asked for."""
+    own = scenario.simulation
+    update = {"rtol": min(own.rtol, tolerance), "atol_scale": min(own.atol_scale, tolerance)}
+    return scenario.model_copy(update={"simulation": own.model_copy(update=update)})

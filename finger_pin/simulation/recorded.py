@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +21,14 @@ class Recording:
         variables: Dimensions, of which time is the first, values and attributes, by name.
         coordinates: Likewise, or the values alone.
         attrs: Of the whole.
+        slopes: Derivatives of the variables by the values that the run was given, shape (p, ...), if they were asked
+            for.
     """
 
     variables: dict[str, tuple[Any, Array, dict[str, str]]]
     coordinates: dict[str, Any]
     attrs: dict[str, Any]
+    slopes: dict[str, Array] = field(default_factory=dict)
 
     @property
     def time(self) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,6 +56,10 @@ _ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within t
 _CONTINUOUS = "Radau"
 # Steps between two looks at a compiled simulation that is observed.
 _CHUNK_OBSERVED = 4
+
+
+#: Ends of the steps of every island, s.
+Steps = Sequence[Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +137,7 @@ class Setup:
         *,
         scenario: Scenario | None = None,
         chunk: int = CHUNK,
+        steps: Steps | None = None,
     ) -> Trajectory:
         """Integrate, at the tolerances of another scenario if given.
 
@@ -141,8 +146,10 @@ class Setup:
             stop: Asked now and then.
             scenario: Like this one, with tolerances of its own.
             chunk: Steps between two calls.
+            steps: To be taken whatever their errors: what comes out is then as smooth a function of start and
+                parameters as the equations are.
         """
-        return _integrate(scenario or self.scenario, self.loop, self.method, watch, chunk, stop)
+        return _integrate(scenario or self.scenario, self.loop, self.method, watch, chunk, stop, steps)
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
         """Return why a trajectory ended early, and what to try.
@@ -257,6 +264,7 @@ def _integrate(
     watch: Watch | None,
     chunk: int,
     stop: Stop | None,
+    steps: Steps | None = None,
 ) -> Trajectory:
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
@@ -265,12 +273,15 @@ def _integrate(
         stepper = Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force)
         if isinstance(loop.drives, PositionDrives):
             stepper.drive(loop.drives.compiled)
+        knots = loop.knots(settings.rtol)
+        if steps is not None:
+            stepper.repeat([np.union1d(ends, knots) for ends in steps])
         return integrate_compiled(
             stepper,
             settings.duration,
             loop.finger.layout.names,
             held=controller if isinstance(controller, SampledController) else None,
-            knots=loop.knots(settings.rtol),
+            knots=None if steps is not None else knots,
             watch=watch,
             chunk=chunk,
             together=chunk == _CHUNK_OBSERVED,
