@@ -50,6 +50,9 @@ class RecordingSettings(Description):
     window: Annotated[float, real(0.0, 1e6, above=True)] | None = quantity(
         None, unit="s", source="chosen", doc="Motion: cut into pieces of this length with starts of their own."
     )
+    settle: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="s", source="chosen", doc="Motion: not compared after every start, where bristles begin relaxed."
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

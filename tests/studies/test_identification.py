@@ -150,3 +150,65 @@ def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_pat
     assert fp.load_result(folder / "identification.nc").units.values.tolist() == ["1", "N"]
     assert write_report(fp.load_result(folder / "identification.nc"), tmp_path / "again.html").exists()
     assert run("identify", ["no_such_bench"]) == 2
+
+
+def ramp(rng, coulomb, drag, correlation=0.0, rate=100.0):
+    """The scenario canal drawn in evenly, in closed form: k theta + c theta' = r f, f by the capstan law and a drag."""
+    turn, radius, stiffness, viscous, rise = np.pi / 2.0, 0.02, 0.2, 2e-3, 4.0
+    time = np.arange(0.5, 3.0, 1.0 / rate)
+    pull = 3.0 + rise * time
+    out = pull * np.exp(-coulomb * turn) - drag / (1.0 + np.tanh(coulomb * turn / 2.0))
+    angle = (radius * out - viscous * radius * rise * np.exp(-coulomb * turn) / stiffness) / stiffness
+    noise = np.zeros((2, time.size))
+    for k, fresh in enumerate(rng.normal(size=(time.size, 2))):
+        noise[:, k] = correlation * noise[:, k - 1] + np.sqrt(1.0 - correlation**2) * fresh
+    return {"t": time, "in": pull, "f": out + 0.03 * noise[0], "q": np.degrees(angle + 2e-3 * noise[1])}
+
+
+MOTION = {
+    "time": "t",
+    "start": "recorded",
+    "settle": 0.2,
+    "inputs": {"tendon_command.T1": "in"},
+    "outputs": {"tendon_tension.T1": "f", "joint_position.drum": {"column": "q", "unit": "deg"}},
+}
+
+
+@pytest.mark.parametrize("more", [{}, {"window": 1.0}, {"start": "found"}], ids=["whole", "windows", "start found"])
+def test_a_recorded_motion_gives_the_friction_that_it_was_made_with(more):
+    truth = {COULOMB: 0.15, DRAG: 0.5}
+    data = ramp(np.random.default_rng(4), *truth.values())
+    recordings = {"pull": {**MOTION, **more}}
+    result = fp.identify("canal", parameters=BOUNDS, recordings=recordings, data={"pull": data}, starts=1)
+    np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
+    np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
+    assert result.parameter.size == 2 and result.signal.size == 2
+
+
+def test_residuals_that_follow_each_other_count_as_fewer():
+    """With a correlation of 0.9 between neighbours, one sample in 19 is independent (Bartlett)."""
+    given = {"parameters": BOUNDS, "recordings": {"pull": MOTION}, "starts": 1}
+    white, red = (
+        fp.identify("canal", data={"pull": ramp(np.random.default_rng(8), 0.15, 0.5, rho)}, **given)
+        for rho in (0.0, 0.9)
+    )
+    assert white.independent_share.values == pytest.approx([1.0, 1.0], abs=0.15)
+    assert red.independent_share.values == pytest.approx([1 / 19, 1 / 19], rel=0.6)
+    width = [float(each.upper[1] - each.lower[1]) for each in (white, red)]
+    assert 2.5 < width[1] / width[0] < 8.0
+
+
+def test_an_offset_and_a_delay_of_an_output_are_found():
+    data = ramp(np.random.default_rng(6), 0.15, 0.5)
+    data["f"] = np.interp(data["t"] - 0.05, data["t"], data["f"]) + 0.2
+    key = "recordings.pull.tendon_tension.T1"
+    parameters = {COULOMB: (0.005, 1.0), f"{key}.offset": (-1.0, 1.0)}
+    columns = {**MOTION["outputs"], "tendon_tension.T1": {"column": "f", "delay": 0.05}}
+    recordings = {"pull": {**MOTION, "outputs": columns}}
+    given = {"data": {"pull": data}, "starts": 1, "overrides": {DRAG: 0.5}}
+    result = fp.identify("canal", parameters=parameters, recordings=recordings, **given)
+    np.testing.assert_allclose(result.estimate, [0.15, 0.2], rtol=0.05)
+    assert result.units.values.tolist() == ["1", "N"]
+    with pytest.raises(fp.InputError, match="must be recordings"):
+        wrong = {**parameters, f"{key}.gain": (0.1, 2.0)}
+        fp.identify("canal", parameters=wrong, recordings=recordings, **given)

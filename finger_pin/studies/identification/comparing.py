@@ -68,16 +68,16 @@ def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> Co
     for name, law in [(OWN, problem), *others]:
         best = found if law is problem else _best(law, found.weights, _places(law, problem, found.z))
         size = float(sum(w * len(e) for e, w in zip(best.residuals, found.weights, strict=True)))
-        value = minus_twice_likelihood(best.residuals, found.weights) + len(law.keys) * math.log(size)
-        values = dict(zip(law.keys, law.values(best.z).tolist(), strict=True))
+        value = minus_twice_likelihood(best.residuals, found.weights, law.groups) + law.asked * math.log(size)
+        values = dict(zip(law.keys[: law.asked], law.values(best.z).tolist(), strict=False))
         out = _held_out(law, best, found, folds)
-        rows.append((name, len(law.keys), value, _scaled_rms(best.residuals, found.noise), out, values))
+        rows.append((name, law.asked, value, _scaled_rms(best.residuals, found.noise), out, values))
     return Comparison(*(list(column) for column in zip(*rows, strict=True)))
 
 
 def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
     """Return the problem under another law: some keys held, some with bounds of their own."""
-    bounds = {key: (float(a), float(b)) for key, a, b in zip(problem.keys, problem.low, problem.high, strict=True)}
+    bounds = {key: (float(a), float(b)) for key, a, b in zip(*_asked(problem), strict=True)}
     held: dict[str, float] = {}
     for key, value in law.items():
         if isinstance(value, int | float) and not isinstance(value, bool):
@@ -92,6 +92,11 @@ def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
         return Problem(problem.scenario, tuple(bounds), low, high, problem.models, problem.signals, held, problem.stop)
     except InputError as error:
         raise InputError(f"identify.compare.{name}", str(error)) from None
+
+
+def _asked(problem: Problem) -> tuple[Sequence[str], Array, Array]:
+    """Return the keys that were asked for, without what belongs to a recording, and their bounds."""
+    return problem.keys[: problem.asked], problem.low[: problem.asked], problem.high[: problem.asked]
 
 
 def _places(law: Problem, own: Problem, z: Array) -> list[Array]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.bench import IdentifySettings
 from finger_pin.description.loading import load_bench
@@ -18,6 +19,7 @@ from finger_pin.studies.identification.comparing import Comparison, compare_laws
 from finger_pin.studies.identification.estimate import Fit, fit
 from finger_pin.studies.identification.intervals import Side, covariance, profile
 from finger_pin.studies.identification.ledger import Ledger, digest
+from finger_pin.studies.identification.motions import RecordedMotion, windows
 from finger_pin.studies.identification.outcome import outcome, write_outcome
 from finger_pin.studies.identification.problem import Model, Problem, Signal, Stopped
 from finger_pin.studies.identification.readings import SteadyReadings
@@ -101,8 +103,18 @@ def build_problem(scenario: Scenario, settings: IdentifySettings, taken: Sequenc
     Raises:
         InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
     """
-    models: list[Model] = [SteadyReadings(recording, scenario) for recording in taken]
-    signals = [_signal(recording, name, values) for recording in taken for name, values in recording.outputs.items()]
+    models: list[Model] = []
+    signals: list[Signal] = []
+    for recording in taken:
+        if recording.settings.kind == "steady":
+            models.append(SteadyReadings(recording, scenario))
+            parts = [np.arange(len(recording.speed))]
+        else:
+            parts = list(windows(recording))
+            models += [RecordedMotion(recording, scenario, rows, k) for k, rows in enumerate(parts)]
+        signals += [
+            _signal(recording, name, values, rows) for rows in parts for name, values in recording.outputs.items()
+        ]
     low, high = np.array(list(settings.parameters.values()), dtype=float).T
     count = sum(len(signal.measured) for signal in signals)
     if count <= len(low):
@@ -110,15 +122,15 @@ def build_problem(scenario: Scenario, settings: IdentifySettings, taken: Sequenc
     return Problem(scenario, tuple(settings.parameters), low, high, models, signals, {})
 
 
-def _signal(recording: Recording, name: str, values: Array) -> Signal:
-    there = np.flatnonzero(np.isfinite(values))
+def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.intp]) -> Signal:
+    later = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
+    there = np.flatnonzero(np.isfinite(values[rows]) & (later | (recording.settings.kind == "steady")))
+    at = rows[there]
     steady = recording.settings.kind == "steady"
     loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
     load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
     instant = np.arange(len(values), dtype=float) if steady else recording.time
-    return Signal(
-        recording.name, name, unit_of(name), values[there], there, instant[there], load[there], ordered=not steady
-    )
+    return Signal(recording.name, name, unit_of(name), values[at], there, instant[at], load[at], ordered=not steady)
 
 
 class _Work:
@@ -142,12 +154,17 @@ class _Work:
             self.tell("searching", k, len(starts))
             work = partial(fit, self.problem, start, loss=self.loss)
             self.fits.append(self.ledger.fit(f"start {k}", self.problem, work))
-        _check_felt(self.problem, [*starts, *(each.z for each in self.fits)])
+        if not np.isfinite(self.best.objective):
+            raise InputError(
+                "identify.recordings", "the motion fails wherever the search starts; narrow the parameters"
+            )
+        _check_felt(self.problem, [self.best.z, *starts])
 
     def follow(self) -> None:
         """Follow all profiles; from a lower minimum, if one turns up on the way, all over again."""
-        best, self.spread = self.best, covariance(self.problem, self.best)
-        ends = [(k, way) for k in range(len(self.problem.keys)) for way in (-1, 1)]
+        best = self.best
+        self.spread = covariance(self.problem, best)
+        ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
         for place, (k, way) in enumerate(ends):
             self.tell("following the likelihood", place, len(ends))
             work = partial(profile, self.problem, best, k, way, self.spread)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.studies.identification.estimate import Fit, fit, information
+from finger_pin.studies.identification.estimate import Fit, fit_beside, information
 from finger_pin.studies.identification.problem import Problem
 
 #: 95 % of the chi-squared distribution with one degree of freedom.
@@ -68,8 +68,9 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array) -> Si
         if room <= 1e-9 * (high[k] - low[k]):
             break
         at = found.z[k] + way * reach
-        guess = np.clip(found.z + tilt * (at - found.z[k]), low, high) if len(path) == 1 else start
-        there = fit(problem, guess, held={k: at}, weights=found.weights)
+        guess = np.clip(start + tilt * (at - start[k]), low, high)
+        guess[k] = at
+        there = fit_beside(problem, found, guess, k)
         rise, start = there.objective - found.objective, there.z
         path.append((at, rise))
         if rise < -0.05:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Minima whose objective differs by less than this are the same one.
-_SAME = 0.05
+_SAME = 1.0
 
 
 def outcome(
@@ -39,22 +39,24 @@ def outcome(
     import xarray as xr
 
     best = min(fits, key=lambda each: each.objective)
-    count = len(problem.keys)
+    count, keys = problem.asked, problem.keys[: problem.asked]
+    spread = None if spread is None else spread[:count, :count]
     ends = np.full((2, count), np.nan)
     for (k, way), side in sides.items():
         z = best.z.copy()
         z[k] = side.end if math.isfinite(side.end) else z[k]
         ends[(way + 1) // 2, k] = problem.values(z)[k] if math.isfinite(side.end) else side.end
-    units = [describe(key)["units"] for key in problem.keys]
+    units = [_units(problem, key) for key in keys]
     deviation = np.sqrt(np.maximum(np.diag(spread), 0.0)) if spread is not None else np.full(count, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = spread / np.outer(deviation, deviation) if spread is not None else np.full((count, count), np.nan)
-    estimate = problem.values(best.z)
-    linear = [problem.values(best.z + way * 1.96 * deviation) for way in (-1.0, 1.0)]
+    whole, wide = problem.values(best.z), np.zeros(len(best.z))
+    wide[:count] = deviation
+    estimate, linear = whole[:count], [problem.values(best.z + way * 1.96 * wide)[:count] for way in (-1.0, 1.0)]
     profiles = _profiles(problem, best, sides)
     free = free_directions(problem, best) if spread is not None else []
     closed = np.isfinite(ends).all(axis=0)
-    closed[[k for _, shown in free for k in shown]] = False
+    closed[[k for _, shown in free for k in shown if k < count]] = False
     variables: dict[str, Any] = {
         "estimate": ("parameter", estimate, {"long_name": "estimate; units in the variable units"}),
         "lower": ("parameter", ends[0], {"long_name": "lower end of the 95 % interval; infinite where open"}),
@@ -63,8 +65,8 @@ def outcome(
         "units": ("parameter", units, {"long_name": "units of estimate, lower and upper"}),
         "linear_lower": ("parameter", linear[0], {"long_name": "lower end by the slopes alone"}),
         "linear_upper": ("parameter", linear[1], {"long_name": "upper end by the slopes alone"}),
-        "least": ("parameter", problem.low, {"long_name": "least value that was allowed"}),
-        "greatest": ("parameter", problem.high, {"long_name": "greatest value that was allowed"}),
+        "least": ("parameter", problem.low[:count], {"long_name": "least value that was allowed"}),
+        "greatest": ("parameter", problem.high[:count], {"long_name": "greatest value that was allowed"}),
         "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
         "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
         "profile_rise": (
@@ -74,12 +76,12 @@ def outcome(
         ),
         **_signals(problem, best),
         "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
-        "start_estimate": (("start", "parameter"), [problem.values(each.z) for each in fits]),
+        "start_estimate": (("start", "parameter"), [problem.values(each.z)[:count] for each in fits]),
     }
     coordinates: dict[str, Any] = {
-        "parameter": list(problem.keys),
-        "other": list(problem.keys),
-        "signal": [f"{signal.recording}.{signal.name}" for signal in problem.signals],
+        "parameter": list(keys),
+        "other": list(keys),
+        "signal": list(dict.fromkeys(f"{signal.recording}.{signal.name}" for signal in problem.signals)),
     }
     if comparison is not None:
         coordinates["law"] = comparison.law
@@ -104,7 +106,7 @@ def _pairs(best: Fit) -> list[tuple[Array, float]]:
 def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side]) -> tuple[Array, Array]:
     """Return values and rises along every profile, ascending, filled up with what is not a number."""
     rows: list[Array] = []
-    for k in range(len(problem.keys)):
+    for k in range(problem.asked):
         paths = [side.path for (j, _), side in sides.items() if j == k]
         points = np.unique(np.concatenate([np.array([[best.z[k], 0.0]]), *paths]), axis=0)
         values = np.array([problem.values(np.where(np.arange(len(best.z)) == k, z, best.z))[k] for z in points[:, 0]])
@@ -116,10 +118,20 @@ def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side]
     return filled[0], filled[1]
 
 
+def _units(problem: Problem, key: str) -> str:
+    if not key.startswith("recordings."):
+        return describe(key)["units"]
+    name, _, what = key.removeprefix("recordings.").rpartition(".")
+    unit = next((s.unit for s in problem.signals if f"{s.recording}.{s.name}" == name), "1")
+    return {"offset": unit, "delay": "s"}.get(what, "1")
+
+
 def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
-    signals = problem.signals
+    signals, groups = problem.signals, problem.groups
+    # The first of every output's windows stands for what they share.
+    first = [int(np.flatnonzero(groups == group)[0]) for group in range(int(groups.max(initial=-1)) + 1)]
     whole = {
-        "signal_index": np.repeat(np.arange(len(signals)), [len(s.measured) for s in signals]),
+        "signal_index": np.repeat(groups, [len(s.measured) for s in signals]),
         "instant": np.concatenate([s.instant for s in signals]),
         "applied": np.concatenate([s.load for s in signals]),
         "measured": np.concatenate([s.measured for s in signals]),
@@ -133,13 +145,17 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "residual": "measured less computed, in the unit of the signal",
     }
     return {
-        "signal_units": ("signal", [s.unit for s in signals]),
-        "signal_steady": ("signal", [not s.ordered for s in signals]),
-        "noise": ("signal", best.noise, {"long_name": "rms of the residuals, in the unit of the signal"}),
-        "replicate_noise": ("signal", [_replicates(s) for s in signals], {"long_name": "rms of equal readings"}),
-        "signal_samples": ("signal", [len(s.measured) for s in signals]),
-        "signal_correlation": ("signal", best.correlation, {"units": "1", "long_name": "of neighbouring residuals"}),
-        "independent_share": ("signal", best.weights, {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
+        "signal_units": ("signal", [signals[k].unit for k in first]),
+        "signal_steady": ("signal", [not signals[k].ordered for k in first]),
+        "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
+        "replicate_noise": (
+            "signal",
+            [_replicates(signals[k]) for k in first],
+            {"long_name": "rms of equal readings"},
+        ),
+        "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
+        "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
+        "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),
         **{name: ("sample", values, {"long_name": names[name]}) for name, values in whole.items()},
     }
 
@@ -180,8 +196,13 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: str | Path, problem
     recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
     lines = ["# What an identification has found; intervals at 95 %.", tomli_w.dumps({"extends": name}).strip(), ""]
     for key, value, low, high, unit in zip(
-        problem.keys, *(result[each].values for each in ("estimate", "lower", "upper", "units")), strict=True
+        problem.keys[: problem.asked],
+        *(result[each].values for each in ("estimate", "lower", "upper", "units")),
+        strict=True,
     ):
+        if key.startswith("recordings."):
+            lines.append(f"# {key} = {float(value):.6g}, {_end(float(low))} to {_end(float(high))} {unit}")
+            continue
         plain, index = split(key)
         ends = f"{_end(float(low))} to {_end(float(high))}"
         what = "" if unit == "1" else f" {unit}"

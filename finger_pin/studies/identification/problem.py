@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,17 +15,45 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 
-# Step of differences where there are no slopes, of the range of a parameter.
-_STEP = 1e-5
 #: What may be found of an output itself, besides the scenario's numbers.
 OF_OUTPUTS = ("offset", "scale", "delay")
 
 
-class Model(Protocol):
-    """A recording beside a scenario."""
+@dataclass(frozen=True)
+class Own:
+    """A number of a recording's own that is found beside the parameters, such as where a joint starts."""
 
-    def compute(self, scenario: Scenario) -> list[Array]:
+    key: str
+    low: float
+    high: float
+    start: float
+
+
+#: Maps values to a scenario, and to the numbers that belong to a recording, by key.
+At = Callable[[Array], tuple[Scenario, dict[str, float]]]
+
+
+class Model(Protocol):
+    """A recording, or a part of it, beside a scenario."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario with the recording's inputs."""
+
+    @property
+    def own(self) -> tuple[Own, ...]:
+        """What is to be found for it alone."""
+
+    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return what the scenario says of every output, shape (m,) each."""
+
+    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+        """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
+
+
+def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
+    """Return the offset, scale or delay of an output that is being found."""
+    return own.get(f"recordings.{recording}.{output}.{what}", default)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,26 +114,49 @@ class Problem:
     best: tuple[float, Array] = (math.inf, np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Check that every key allows its bounds."""
-        if self.held:
-            self.scenario = Family(self.scenario, tuple(self.held)).at(list(self.held.values()))
-        self.family = Family(self.scenario, self.keys)
+        """Check that every key allows its bounds; numbers of the recordings' own join the parameters."""
+        self.asked = len(self.keys)
+        self._slopes: tuple[Array, list[Array]] | None = None
+        further = [own for model in self.models for own in model.own if own.key not in self.keys]
+        self.keys = (*self.keys, *(own.key for own in further))
+        self.low = np.append(self.low, [own.low for own in further])
+        self.high = np.append(self.high, [own.high for own in further])
+        outputs = {f"{s.recording}.{s.name}" for s in self.signals}
+        self._numbers = np.array([k for k, key in enumerate(self.keys) if not key.startswith("recordings.")], dtype=int)
+        for key in self.keys[: self.asked]:
+            name, _, what = key.removeprefix("recordings.").rpartition(".")
+            if key.startswith("recordings.") and not (name in outputs and what in OF_OUTPUTS):
+                allowed = f"must be recordings.NAME.variable.label and .{', .'.join(OF_OUTPUTS)}; there are"
+                raise InputError(f"identify.parameters.{key}", f"{allowed} {', '.join(sorted(outputs))}")
+        keys = tuple(self.keys[k] for k in self._numbers)
+
+        def family(scenario: Scenario) -> Family:
+            if self.held:
+                scenario = Family(scenario, tuple(self.held)).at(list(self.held.values()))
+            return Family(scenario, keys)
+
+        self._families = [family(model.scenario) for model in self.models]
         self.logarithmic = self.low > 0.0
-        for k, key in enumerate(self.keys):
-            alone = Family(self.scenario, (key,))
+        for k, key in zip(self._numbers, keys, strict=True):
+            alone = Family(self._families[0].scenario, (key,))
             for bound in (self.low[k], self.high[k]):
                 try:
                     alone.at([float(bound)])
                 except InputError as error:
                     raise InputError(f"identify.parameters.{key}", error.allowed, float(bound)) from None
+        known = dict(zip(keys, self._families[0].values, strict=True)) | {own.key: own.start for own in further}
+        neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
+        middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
+        own_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
+        start = [float(v) if isinstance(v, int | float) else m for v, m in zip(own_values, middle, strict=True)]
+        self.start: Array = self.to_search(np.clip(start, self.low, self.high))
 
     @property
-    def start(self) -> Array:
-        """The scenario's own numbers, within the bounds, transformed; the middle where it has none."""
-        middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
-        own = zip(self.family.values, middle, strict=True)
-        values = [float(value) if isinstance(value, int | float) else other for value, other in own]
-        return self.to_search(np.clip(values, self.low, self.high))
+    def groups(self) -> NDArray[np.intp]:
+        """The number of the output that every signal is of: windows of one share its noise."""
+        names = [f"{signal.recording}.{signal.name}" for signal in self.signals]
+        order = list(dict.fromkeys(names))
+        return np.array([order.index(name) for name in names], dtype=np.intp)
 
     def to_search(self, values: Array) -> Array:
         """Return values as they are searched for: logarithms of what is positive."""
@@ -126,28 +177,46 @@ class Problem:
         if self.stop():
             raise Stopped
         self.evaluations += 1
-        scenario = self.family.at(self.values(z).tolist())
-        computed = [each for model in self.models for each in model.compute(scenario)]
+        values = self.values(z)
+        computed = [
+            each for model, at in zip(self.models, self._places(), strict=True) for each in model.compute(*at(values))
+        ]
         residuals = [s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)]
-        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)))
+        if not all(np.isfinite(e).all() for e in residuals):
+            return [np.full(len(e), np.inf) for e in residuals]
+        objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups)
         if objective < self.best[0]:
             self.best = (objective, z.copy())
         return residuals
 
     def slopes(self, z: Array) -> list[Array]:
         """Return the derivatives of the residuals by z, shape (m, p) each."""
-        low, high = self.box
-        columns = []
-        for k in range(len(z)):
-            step = _STEP * (high[k] - low[k])
-            ends = []
-            for way in (1.0, -1.0):
-                moved = z.copy()
-                moved[k] = np.clip(z[k] + way * step, low[k], high[k])
-                ends.append((moved[k], self.residuals(moved)))
-            (right, up), (left, down) = ends
-            columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
-        return [np.stack([column[s] for column in columns], axis=1) for s in range(len(self.signals))]
+        if self._slopes is not None and np.array_equal(self._slopes[0], z):
+            return self._slopes[1]
+        if self.stop():
+            raise Stopped
+        values = self.values(z)
+        sizes = np.where(self.logarithmic, values, self.high - self.low)
+        found = [
+            each
+            for model, at in zip(self.models, self._places(), strict=True)
+            for each in model.slopes(at, values, sizes)
+        ]
+        self.evaluations += 2 * len(z)
+        stretch = np.where(self.logarithmic, values, 1.0)
+        slopes = [-each[s.rows] * stretch for each, s in zip(found, self.signals, strict=True)]
+        self._slopes = (z.copy(), slopes)
+        return slopes
+
+    def _places(self) -> list[At]:
+        def of(family: Family) -> At:
+            def at(values: Array) -> tuple[Scenario, dict[str, float]]:
+                numbers = {key: float(v) for key, v in zip(self.keys, values, strict=True) if key[:11] == "recordings."}
+                return family.at(values[self._numbers].tolist()), numbers
+
+            return at
+
+        return [of(family) for family in self._families]
 
     def subset(self, kept: Sequence[NDArray[np.bool_]]) -> Problem:
         """Return the problem with some of the samples of every signal."""
@@ -155,14 +224,22 @@ class Problem:
             Signal(s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.ordered)
             for s, k in zip(self.signals, kept, strict=True)
         ]
-        return Problem(self.scenario, self.keys, self.low, self.high, self.models, signals, self.held, self.stop)
+        asked = slice(0, self.asked)
+        bounds = (self.keys[asked], self.low[asked], self.high[asked])
+        return Problem(self.scenario, *bounds, self.models, signals, self.held, self.stop)
 
 
-def minus_twice_likelihood(residuals: Sequence[Array], weights: Array) -> float:
-    """Return the sum of w n log(SSE / n), least where the likelihood is greatest; a noise for each signal."""
-    terms = (w * len(e) * math.log(max(float(np.mean(e * e)), 1e-300)) for e, w in _some(residuals, weights))
-    return sum(terms)
+def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return how many independent samples every group of signals has, and their mean square."""
+    count, squares = np.zeros((2, int(groups.max(initial=-1)) + 1))
+    for e, w, group in zip(residuals, weights, groups, strict=True):
+        count[group] += w * len(e)
+        squares[group] += w * float(e @ e)
+    return count, squares / np.maximum(count, 1e-300)
 
 
-def _some(residuals: Sequence[Array], weights: Array) -> Iterator[tuple[Array, float]]:
-    return ((e, float(w)) for e, w in zip(residuals, weights, strict=True) if len(e))
+def minus_twice_likelihood(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> float:
+    """Return the sum of w n log(SSE / n), least where the likelihood is greatest; a noise for each group of signals."""
+    count, square = pooled(residuals, weights, groups)
+    there = count > 0.0
+    return float(np.sum(count[there] * np.log(np.maximum(square[there], 1e-300))))

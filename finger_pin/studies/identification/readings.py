@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,8 +10,11 @@ from finger_pin.analysis.steady import steady_state
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.studies.identification.problem import At, Own, own_number
 from finger_pin.studies.identification.recordings import Recording
 
+# Change of a number that slopes are taken by, of its size or its range.
+_CHANGE = 1e-5
 _OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current")
 
 
@@ -21,6 +24,8 @@ class SteadyReadings:
     Attributes:
         recording: What was read.
         load: The pull at the entrance of the canals, shape (m, a), N.
+        scenario: Whose states they are.
+        own: Nothing is to be found for them alone.
     """
 
     def __init__(self, recording: Recording, scenario: Scenario) -> None:
@@ -29,7 +34,8 @@ class SteadyReadings:
         Raises:
             InputError: If one names nothing that the scenario has, or the tension of a tendon is missing.
         """
-        self.recording, finger = recording, scenario.finger
+        self.recording, self.scenario, finger = recording, scenario, scenario.finger
+        self.own: tuple[Own, ...] = ()
         self._entry = f"identify.recordings.{recording.name}"
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)
@@ -54,12 +60,34 @@ class SteadyReadings:
                 raise InputError(f"{self._entry}.outputs.{name}", f"a steady state has {', '.join(_OUTPUTS)}")
             self._outputs.append((variable, self._place(f"outputs.{name}", label, places.get(variable, tendons))))
 
-    def compute(self, scenario: Scenario) -> list[Array]:
+    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return what the scenario says of every output, shape (m,) each."""
         held = self.recording.settings.at_rest
         found = steady_state(scenario.finger, self.load, self.recording.speed, self._position, held)
         by_name = {"tendon_tension": found.tension, "tendon_friction": found.friction, "motor_current": found.current}
-        return [by_name[variable][:, place] for variable, place in self._outputs]
+        name = self.recording.name
+        return [
+            own_number(own, name, output, "scale", 1.0) * by_name[variable][:, place]
+            + own_number(own, name, output, "offset")
+            for output, (variable, place) in zip(self.recording.outputs, self._outputs, strict=True)
+        ]
+
+    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+        """Return the derivatives of what is computed by the values, shape (m, p) for each output; by differences."""
+        columns = []
+        for k, size in enumerate(_CHANGE * sizes):
+            ends = []
+            for change in (size, -size):
+                moved = values.copy()
+                moved[k] += change
+                try:
+                    ends.append((moved[k], self.compute(*at(moved))))
+                except InputError:
+                    # At the edge of what is allowed there is one side only.
+                    ends.append((values[k], self.compute(*at(values))))
+            (right, up), (left, down) = ends
+            columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
+        return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
     def _place(self, where: str, label: str, names: Sequence[str]) -> int:
         if label not in names:

@@ -1,0 +1,235 @@
+"""Recorded motions: a scenario moved by what was recorded of its inputs, and what it does at the recorded times."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.stepper import in_threads
+from finger_pin.core.textbook import Trajectory
+from finger_pin.description.loading import read_scenario
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.simulation.recorded import Recording as Arrays
+from finger_pin.simulation.recording import Motions, record
+from finger_pin.simulation.running import Setup, Steps
+from finger_pin.studies.identification.problem import At, Own, own_number
+from finger_pin.studies.identification.recordings import Recording
+
+# Where the inputs of a motion go in a scenario, by variable.
+_INPUTS = {
+    "tendon_command": ("controller", "tensions"),
+    "joint_reference": ("reference", "joints"),
+    "fingertip_force": ("environment", "fingertip_force_signal"),
+}
+# How far a start that is to be found may be from where it was recorded, rad.
+_NEAR = 0.3
+# Samples at a window's start that its position and velocity are read from.
+_FIRST = 9
+# Change of a number that slopes are taken by, of its size or its range; the same steps are taken again.
+_CHANGE = 1e-7
+# Where slopes so taken are wilder than so many ranges of the signal, a larger change and steps of their own serve.
+_WILD, _COARSE = 30.0, 1e-3
+
+
+class RecordedMotion:
+    """A motion, or a window of one, beside a scenario.
+
+    Attributes:
+        recording: What was recorded.
+        rows: Which of its rows, shape (m,).
+        scenario: Moved by the recorded inputs.
+        own: Numbers of its own that are to be found: where its joints start.
+    """
+
+    def __init__(self, recording: Recording, scenario: Scenario, rows: NDArray[np.intp], window: int = 0) -> None:
+        """Put the inputs into the scenario.
+
+        Raises:
+            InputError: If an input names nothing that the scenario has, or a start cannot be reached.
+        """
+        self.recording, self.rows = recording, rows
+        self._entry = f"identify.recordings.{recording.name}"
+        self._times = recording.time[rows] - recording.time[rows[0]]
+        self.own: tuple[Own, ...] = ()
+        table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
+        self._put_inputs(table, scenario)
+        first = float(recording.time[rows[0]])
+        settings = {"duration": float(self._times[-1]), "sample_rate": 1.0 / float(self._times[-1])}
+        table["simulation"] = {**table.get("simulation", {}), **settings}
+        table["simulation"]["start_time"] = scenario.simulation.start_time + first
+        self._put_start(table, scenario, window)
+        self.scenario = read_scenario(table)
+        self._last: tuple[Any, list[Array], Steps | None] | None = None
+
+    def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
+        """Return what the scenario does at the recorded times, shape (m,) for each output; not a number if it fails."""
+        computed, steps = self._run(scenario, own)
+        self._last = ((scenario, dict(own)), computed, steps)
+        return computed
+
+    def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
+        """Return the derivatives of what is computed by the values, shape (m, p) for each output.
+
+        Args:
+            at: Maps values to a scenario and the numbers of this motion.
+            values: Where, shape (p,).
+            sizes: How large changes of the values are, shape (p,).
+        """
+        here = at(values)
+        if self._last is None or self._last[0] != here or self._last[2] is None:
+            self.compute(*here)
+        assert self._last is not None
+        steps = self._last[2]
+        if steps is None:
+            return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
+        base, _ = self._run(*here, steps)
+        free = self._last[1]
+        ranges = [float(np.ptp(each)) for each in free]
+
+        def changed(k: int, part: float, on: Steps | None, from_: list[Array]) -> list[Array]:
+            moved, change = values.copy(), part * float(sizes[k])
+            moved[k] += change
+            try:
+                there = at(moved)
+            except InputError:
+                moved[k] -= 2.0 * change
+                there = at(moved)
+            if there == here:
+                return [np.zeros(len(each)) for each in from_]
+            found, _ = self._run(*there, on)
+            return [(f - b) / (moved[k] - values[k]) for f, b in zip(found, from_, strict=True)]
+
+        def column(k: int) -> list[Array]:
+            found = changed(k, _CHANGE, steps, base)
+            wild = any(
+                not np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size
+                for each, size in zip(found, ranges, strict=True)
+            )
+            if wild:
+                # Of a motion that hunts, what counts is the mean trend.
+                found = changed(k, _COARSE, None, free)
+            return [np.nan_to_num(each, nan=0.0) for each in found]
+
+        columns = in_threads(column, range(len(values)))
+        return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
+
+    def _run(
+        self, scenario: Scenario, own: Mapping[str, float], steps: Steps | None = None
+    ) -> tuple[list[Array], Steps | None]:
+        starts = {key.rpartition(".")[2]: value for key, value in own.items() if key in {o.key for o in self.own}}
+        if starts:
+            initial = scenario.simulation.initial
+            assert initial is not None
+            moved = initial.model_copy(update={"position": {**initial.position, **starts}})
+            scenario = scenario.model_copy(
+                update={"simulation": scenario.simulation.model_copy(update={"initial": moved})}
+            )
+        try:
+            setup = Setup.of(scenario)
+            trajectory = setup.integrate(steps=steps)
+            failed = bool(trajectory.failure)
+        except IntegrationError:
+            failed = True
+        if failed:
+            return [np.full(len(self.rows), np.nan) for _ in self.recording.outputs], None
+        found = self._outputs(setup, trajectory, own)
+        ends = [each for _, each, _ in trajectory.islands] or [trajectory.breakpoints]
+        return found, ends
+
+    def _outputs(self, setup: Setup, trajectory: Trajectory, own: Mapping[str, float]) -> list[Array]:
+        """Return the outputs at the recorded times, with their own offsets, scales and delays."""
+        name, settings, found = self.recording.name, self.recording.settings.outputs, []
+        delays = {key: each.delay + own_number(own, name, key, "delay") for key, each in settings.items()}
+        seen = {delay: self._seen(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
+        for key, delay in delays.items():
+            scale, offset = own_number(own, name, key, "scale", 1.0), own_number(own, name, key, "offset")
+            found.append(np.asarray(scale * self._one(seen[delay], key) + offset))
+        return found
+
+    def _seen(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> Arrays:
+        """Return the variables of the outputs with a delay, at the instants that they are of."""
+        names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
+        times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
+        motions = Motions(setup.loop, trajectory, times)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return record(setup.scenario, motions, trajectory, setup.method, tuple(names))
+
+    def _one(self, found: Arrays, name: str) -> Array:
+        """Return one column of a variable, by its labels."""
+        variable, _, label = name.partition(".")
+        values, (dims, *_) = found[variable], found.variables[variable]
+        for axis, dim in reversed(list(enumerate(dims))[1:]):
+            labels = [str(each) for each in found[dim]]
+            if label not in labels:
+                allowed = f"there is no {label}; there are {', '.join(labels)}"
+                raise InputError(f"{self._entry}.outputs.{name}", allowed)
+            values = np.take(values, labels.index(label), axis=axis)
+        return values
+
+    def _put_inputs(self, table: dict[str, Any], scenario: Scenario) -> None:
+        for name, values in self.recording.inputs.items():
+            variable, _, label = name.partition(".")
+            if variable not in _INPUTS:
+                raise InputError(f"{self._entry}.inputs.{name}", f"a motion is given {', '.join(_INPUTS)}")
+            section, group = _INPUTS[variable]
+            entries = table.setdefault(section, {})
+            if variable == "tendon_command" and entries.get("kind") != "tensions":
+                kept = {key: entries[key] for key in ("minimum_tension",) if key in entries}
+                entries = table[section] = {"kind": "tensions", **kept}
+            delay = self.recording.settings.inputs[name].delay
+            times = (self.recording.time - delay + scenario.simulation.start_time).tolist()
+            samples = {"kind": "samples", "times": times, "values": values.tolist()}
+            finger, dot, own = label.partition(".")
+            into = entries.setdefault(group, {})
+            if dot:
+                into.setdefault(finger, {})[own] = samples
+            else:
+                into[label] = samples
+
+    def _put_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:
+        kind = self.recording.settings.start
+        if kind == "rest":
+            return
+        positions, velocities = {}, {}
+        for name, values in self.recording.outputs.items():
+            variable, _, joint = name.partition(".")
+            if variable == "joint_position" and joint in scenario.finger.joints:
+                there = self.rows[:_FIRST][np.isfinite(values[self.rows[:_FIRST]])]
+                if not len(there):
+                    continue
+                degree = 1 if len(there) > 3 else 0
+                line = np.polyfit(self.recording.time[there] - self.recording.time[self.rows[0]], values[there], degree)
+                positions[joint], velocities[joint] = float(line[-1]), float(line[0]) if degree else 0.0
+        if not positions:
+            raise InputError(f"{self._entry}.start", "needs joint_position among the outputs", kind)
+        for joint, angle in positions.items():
+            low, high = scenario.finger.joints[joint].range
+            if not low - 0.2 <= angle <= high + 0.2:
+                allowed = (
+                    f"cannot be reached: {joint} begins at {angle:.3g} rad, and its range is {low:.3g} to {high:.3g}"
+                )
+                raise InputError(f"{self._entry}.start", allowed)
+        initial = table["simulation"].setdefault("initial", {})
+        initial["position"] = {**initial.get("position", {}), **positions}
+        initial["velocity"] = {**initial.get("velocity", {}), **velocities}
+        if kind == "found":
+            prefix = f"recordings.{self.recording.name}.start.{window}"
+            self.own = tuple(
+                Own(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle) for joint, angle in positions.items()
+            )
+
+
+def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:
+    """Return the rows of the windows that a recording is cut into, each with two rows at least."""
+    length = recording.settings.window
+    whole = np.arange(len(recording.time))
+    if length is None:
+        return [whole]
+    number = np.floor(recording.time / length * (1.0 + 1e-12)).astype(int)
+    return [rows for rows in (whole[number == k] for k in np.unique(number)) if len(rows) > 1]
