@@ -142,7 +142,7 @@ class Prepared:
         apart = bool(scenario.environment.objects)
         tight = accuracy or (TIGHTER if apart else TIGHT)
         found, trajectory = self._made(_tight(scenario, tight), initial, stop)
-        steps = None if apart else [ends for _, ends, _ in trajectory.islands] or [trajectory.breakpoints]
+        steps = None if apart else [each.times for each in trajectory.islands] or [trajectory.breakpoints]
 
         def again(moved: Sequence[float]) -> Recording:
             return self._made(_tight(self.scenario(moved), tight), initial, stop, steps)[0]

@@ -139,7 +139,7 @@ class RecordedMotion:
         if failed:
             return [np.full(len(self.rows), np.nan) for _ in self.recording.outputs], None
         found = self._outputs(setup, trajectory, own)
-        ends = [each for _, each, _ in trajectory.islands] or [trajectory.breakpoints]
+        ends = [each.times for each in trajectory.islands] or [trajectory.breakpoints]
         return found, ends
 
     def _outputs(self, setup: Setup, trajectory: Trajectory, own: Mapping[str, float]) -> list[Array]:
@@ -156,7 +156,7 @@ class RecordedMotion:
         """Return the variables of the outputs with a delay, at the instants that they are of."""
         names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
-        motions = Motions(setup.loop, trajectory, times)
+        motions = Motions(setup.loop, trajectory, times, tuple(names))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return record(setup.scenario, motions, trajectory, setup.method, tuple(names))
 
