@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.binding import bound
 from finger_pin.core.charts import place_all
+from finger_pin.core.compilation import Unit
 from finger_pin.core.control import Control
 from finger_pin.core.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.islands import Island
@@ -115,6 +116,7 @@ class Part:
         # for last.
         self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
         self._blocks: list[NDArray[np.uint8]] = []
+        self._at = 0
         self._advance = core.advance
 
     def room(self, count: int) -> Record:
@@ -128,11 +130,14 @@ class Part:
 
     def advance(self, end: float, record: Record | None = None) -> tuple[int, int]:
         """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
-        into = self._nothing if record is None else record
+        block, unit = self.ready(record)
+        return unit(block, end), int(self._taken[0])
+
+    def ready(self, record: Record | None = None) -> tuple[int, Unit]:
+        """Return the address of what compiled code is to advance, and the unit that does; into a record if given."""
         self._taken[0] = 0
-        self._place(into)
-        status = self._advance(self._blocks[-1].ctypes.data, end)
-        return status, int(self._taken[0])
+        self._place(self._nothing if record is None else record)
+        return self._at, self._advance
 
     def _place(self, record: Record) -> None:
         """Put a record where compiled code finds it, with the loops of motors if any run, and the knots if any."""
@@ -151,6 +156,7 @@ class Part:
             knotted = Knotted(self.knots, passed, stretch.ctypes.data, self._advance.address, given)
             self._blocks += [passed.view(np.uint8), bound(knotted, KNOTTED)]
             self._advance = advance_knotted
+        self._at = int(self._blocks[-1].ctypes.data)
 
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
         """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""

@@ -22,6 +22,9 @@ from finger_pin.core.tables import Tables, build_tables
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 
+#: Of every island: whether it minds forces at tips, its loops of motors, its knots, and arrays that steps change.
+Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
+
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 
 _Item = TypeVar("_Item")
@@ -206,19 +209,28 @@ class Stepper:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds islands of its own."""
-        return (
-            Stepper,
-            self._made_of,
-            [(part.tables.loaded, part.drives, part.knots, part.moment) for part in self.parts],
-        )
+        return Stepper, self._made_of, self.moments
 
-    def __setstate__(self, state: list[Any]) -> None:
+    def __setstate__(self, state: Moments) -> None:
         """Go on from where another one stood that was made alike."""
-        for index, (loaded, drives, knots, moment) in enumerate(state):
+        self.resume(state)
+
+    @property
+    def moments(self) -> Moments:
+        """Where it stands: all that steps change and later ones depend on; a copy."""
+        return [
+            (part.tables.loaded, part.drives, part.knots, tuple(each.copy() for each in part.moment))
+            for part in self.parts
+        ]
+
+    def resume(self, moments: Moments) -> None:
+        """Go on from where it, or one that was made alike, once stood."""
+        for index, (loaded, drives, knots, moment) in enumerate(moments):
             if loaded != self.parts[index].tables.loaded:
                 self.parts[index] = self.parts[index].with_loads(loaded)
             part = self.parts[index]
             part.drives, part.knots = drives, knots
+            part.work.paths.asleep[:] = 0
             for own, other in zip(part.moment, moment, strict=True):
                 own[...] = other
 

@@ -80,6 +80,7 @@ class Finger:
         if isinstance(description, HandDescription):
             description = description.joined()
         self.description = description
+        self._made_with = rigid_body, rows, objects
         self.paths: Routes | None = None
         if description.tree is None:
             self.rigid_body = rigid_body or build_rigid_body(description)
@@ -178,6 +179,13 @@ class Finger:
         joined, body, shown = on_model(description, model, joints, tip_frame, configuration, base_axis, visuals)
         finger = cls(joined, body)
         finger.visuals = shown
+        return finger
+
+    def changed(self, description: FingerDescription) -> Finger:
+        """Return the finger that another description makes, with the rigid body, rows and objects that were given."""
+        rigid_body, rows, objects = self._made_with
+        finger = Finger(description, rigid_body, rows, objects)
+        finger.visuals = self.visuals
         return finger
 
     @property

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import math
-import numbers
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,15 +16,21 @@ from finger_pin.control.compiled import core_signal
 from finger_pin.control.guides import Guides
 from finger_pin.control.own import Samples
 from finger_pin.control.reference import Reference
+from finger_pin.core.batch import advance_together
 from finger_pin.core.control import held_control
 from finger_pin.core.evaluation import CompiledFinger
 from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.description.family import Family
+from finger_pin.description.hand import HandDescription
+from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import nearest
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import nearest, validate
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
+from finger_pin.simulation.starting import numbers
 from finger_pin.simulation.told import Told
 
 if TYPE_CHECKING:
@@ -44,7 +52,7 @@ class Simulator:
 
     def __init__(
         self,
-        finger: Finger,
+        finger: Finger | FingerDescription | HandDescription | str | Path,
         position: ArrayLike | None = None,
         *,
         method: str = "Rodas5P",
@@ -57,7 +65,7 @@ class Simulator:
         takes half as long and errs by about 1e-3 rad.
 
         Args:
-            finger: The finger.
+            finger: The finger, or what `Finger` takes: a description, a name, or the path of a file.
             position: theta at the start, shape (n,), rad; by default the middle of the ranges.
             method: A compiled method.
             rtol: Relative tolerance.
@@ -74,34 +82,88 @@ class Simulator:
         for name, value in (("rtol", rtol), ("atol_scale", atol_scale)):
             if not 0.0 < value <= 0.1:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
-        limiter = finger.stroke_limiter
-        start = 0.5 * (limiter.lower + limiter.upper) if position is None else position
-        self.finger = finger
+        self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
+        self._family: Family | None = None
+        self._build(finger if isinstance(finger, Finger) else Finger(finger))
+        limiter = self.finger.stroke_limiter
+        self._posture = 0.5 * (limiter.lower + limiter.upper)
+        if position is not None:
+            self._posture = numbers("position", position, self._posture.shape)
+        self._begin(self._at(self._posture), 0.0)
+
+    def _build(self, finger: Finger) -> None:
+        """Build what steps a finger; `_begin` says from where."""
+        self.finger, mechanism, settings = finger, finger.mechanism, self._settings
+        control, self._guides = held_control(mechanism.channels, mechanism.coordinates), Guides.of(finger, 0.0)
+        if self._guides is not None:
+            control = control._replace(guide=core_signal(self._guides.signal))
+        rest, tableau = finger.rest_state(np.zeros(len(finger.routing.joints))), TABLEAUS[settings["method"]]()
+        atol = settings["atol_scale"] * finger.layout.scales()
+        self._stepper = Stepper(mechanism, control, rest, tableau, settings["rtol"], atol)
+        self._fresh = self._stepper.moments
         self._compiled = CompiledFinger(finger)
-        self._tension = np.zeros(finger.mechanism.channels)
-        mechanism = finger.mechanism
-        x = finger.rest_state(_numbers("position", start, (len(finger.routing.joints),)))
-        control, guides = held_control(mechanism.channels, mechanism.coordinates), Guides.of(finger, 0.0)
-        if guides is not None:
-            x, control = guides.place(finger, x), control._replace(guide=core_signal(guides.signal))
+        # Which of the inputs are tensions.
+        self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
+
+    def _at(self, position: Array) -> Array:
+        """Return the packed state at rest in a posture; refuse one where bodies overlap."""
+        finger, x = self.finger, self.finger.rest_state(position)
+        if self._guides is not None:
+            x = self._guides.place(finger, x)
         if finger.surroundings is not None:
             state = finger.layout.unpack(x)
             assert state.object_pose is not None
             finger.surroundings.check(state.position, state.object_pose)
-        self._stepper = Stepper(
-            mechanism,
-            control,
-            x,
-            TABLEAUS[method](),
-            rtol,
-            atol_scale * finger.layout.scales(),
-        )
-        tips = len(mechanism.body.tips)
+        return x
+
+    def _begin(self, x: Array, time: float) -> None:
+        """Go on from a state at a time, with a new record and nothing held."""
+        tips = len(self.finger.mechanism.body.tips)
+        self._tension = np.zeros(self.finger.mechanism.channels)
         self._force = self._unloaded = np.zeros(3 if tips == 1 else (tips, 3))
-        self._told = Told(self._stepper.copy())
-        # Which of the inputs are tensions.
-        self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
-        self._settings = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
+        # Not even what was loaded once is remembered.
+        self._stepper.resume(self._fresh)
+        self._stepper.restart(x, time)
+        self._told = Told(self._stepper)
+
+    def reset(self, initial: State | ArrayLike | None = None) -> State:
+        """Begin anew at time zero, with a new record; return the state then.
+
+        Args:
+            initial: The packed state, shape (size,), the state by name, or theta, shape (n,), rad, for rest there; by
+                default where the simulator began.
+
+        Raises:
+            InputError: If it has another size, or a number is not finite; nothing has changed then.
+        """
+        if isinstance(initial, State):
+            initial = self.finger.layout.pack(initial)
+        if initial is None:
+            x = self._at(self._posture)
+        elif np.shape(initial) == self._posture.shape:
+            x = self._at(numbers("initial", initial, self._posture.shape))
+        else:
+            x = numbers("initial", initial, (self.finger.layout.size,))
+        self._begin(x, 0.0)
+        return self.state
+
+    def set_parameters(self, values: Mapping[str, Any]) -> None:
+        """Give the finger other numbers, and go on from the same state at the same time, with a new record.
+
+        Args:
+            values: By dotted key, as of `load_finger`, such as ``{"finger.tendon_friction.coulomb": 0.1}``.
+
+        Raises:
+            InputError: Naming the entry that is wrong, or if the finger had another state; nothing has changed then.
+        """
+        if self._family is None or self._family.keys != tuple(values):
+            self._family = Family(_alone(self.finger.description), tuple(values))
+        changed = self.finger.changed(self._family.at([*values.values()]).finger)
+        if changed.layout.names != self.finger.layout.names:
+            raise InputError("values", "make a finger with another state: make another simulator of it")
+        x, time = self.x, self.time
+        self._build(changed)
+        self._begin(x, time)
 
     @property
     def time(self) -> float:
@@ -118,8 +180,8 @@ class Simulator:
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
-        self._stepper.restart(_numbers("x", value, (self.finger.layout.size,)))
-        self._told = Told(self._stepper.copy())
+        self._stepper.restart(numbers("x", value, (self.finger.layout.size,)))
+        self._told = Told(self._stepper)
 
     @property
     def state(self) -> State:
@@ -140,23 +202,36 @@ class Simulator:
                 then.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        command = _numbers("tension", tension, self._tension.shape)
+        self._hold(*self._checked(tension, dt, fingertip_force))
+        status = self._stepper.advance(self._stepper.time + dt)
+        self._keep()
+        return self._reached(status)
+
+    def _checked(self, tension: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
+        command, force = numbers("tension", tension, self._tension.shape), self._unloaded
         if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
             raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
-        if not isinstance(dt, numbers.Real) or not 0.0 < dt < math.inf:
+        if not isinstance(dt, Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
-        force, stepper = self._unloaded, self._stepper
         if fingertip_force is not None:
-            force = _numbers("fingertip_force", fingertip_force, force.shape)
+            force = numbers("fingertip_force", fingertip_force, force.shape)
+        return command, force
+
+    def _hold(self, command: Array, force: Array) -> None:
         if force is not self._force:
-            stepper.load(force)
+            self._stepper.load(force)
         self._tension, self._force = command, force
-        stepper.hold(command)
-        status = stepper.advance(stepper.time + dt)
-        self._told.add(stepper.time, command, force)
+        self._stepper.hold(command)
+
+    def _keep(self) -> None:
+        self._told.add(self._stepper.time, self._tension, self._force)
+
+    def _reached(self, status: int) -> State:
+        """Return the state after a step, unless it failed."""
+        stepper = self._stepper
         if status:
             raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), _ADVICE)
-        return self.state
+        return self.finger.layout.unpack(stepper.x)
 
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:
         """Return what has been run so far, as `simulate` does: for figures, the viewer and `save`.
@@ -179,7 +254,7 @@ class Simulator:
         """Return all signals at the present state, under the tensions and force of the last step."""
         return self._compiled.evaluate(self.x, self._tension, self._force)
 
-    def copy(self) -> Simulator:
+    def clone(self) -> Simulator:
         """Return an independent simulator in the same condition: both go on bit by bit alike."""
         twin = copy.copy(self)
         twin._compiled = CompiledFinger(self.finger)
@@ -188,15 +263,46 @@ class Simulator:
         return twin
 
 
-def _numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    wanted = f"must be {' times '.join(map(str, shape))} numbers"
-    try:
-        numbers = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(name, wanted, value) from None
-    if numbers.shape != shape:
-        raise InputError(name, f"{wanted}, not an array of shape {numbers.shape}")
-    # Of a few numbers Python asks sooner than NumPy.
-    if not all(map(math.isfinite, numbers.ravel().tolist())):
-        raise InputError(name, "must be finite", numbers.tolist())
-    return numbers
+def step_many(
+    simulators: Sequence[Simulator],
+    tensions: Sequence[ArrayLike],
+    dt: float,
+    fingertip_forces: Sequence[ArrayLike] | None = None,
+) -> list[State]:
+    """Advance many simulators by a time, side by side in threads; return their states then.
+
+    Each does bit by bit what `Simulator.step` does. There is no Python between the steps.
+
+    Args:
+        simulators: All different ones.
+        tensions: Of each what `Simulator.step` takes.
+        dt: s.
+        fingertip_forces: Likewise; none by default.
+
+    Raises:
+        InputError: If there are not as many of each, a simulator stands there twice, or an argument is wrong; nothing
+            has moved then.
+        IntegrationError: If the integrator of one cannot go on; the others have stepped.
+    """
+    count = len(simulators)
+    forces: Sequence[ArrayLike | None] = [None] * count if fingertip_forces is None else fingertip_forces
+    for name, given in (("tensions", tensions), ("fingertip_forces", forces)):
+        if len(given) != count:
+            raise InputError(name, f"must be {count}, one per simulator", len(given))
+    if len({id(each) for each in simulators}) < count:
+        raise InputError("simulators", "must differ: one stands there twice; use clone")
+    acting = [one._checked(inputs, dt, own) for one, inputs, own in zip(simulators, tensions, forces, strict=True)]
+    for simulator, (command, force) in zip(simulators, acting, strict=True):
+        simulator._hold(command, force)
+    steppers = [simulator._stepper for simulator in simulators]
+    statuses = advance_together(steppers, [stepper.time + dt for stepper in steppers])
+    for simulator in simulators:
+        simulator._keep()
+    return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]
+
+
+def _alone(description: FingerDescription) -> Scenario:
+    """Return a scenario in which nothing but a finger or a hand is of account."""
+    table: dict[str, Any] = {"name": description.name, "controller": {"kind": "tensions"}}
+    hand = description.hand
+    return validate(Scenario, table | ({"finger": description} if hand is None else {"hand": hand}), ())

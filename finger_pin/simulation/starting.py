@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,3 +88,22 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
             parts[part] = np.zeros(0)
     parts |= last_touching(finger, last)
     return finite_vector("initial", finger.layout.pack(State(**parts)), finger.layout.size)
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return an argument as finite numbers of a shape; a copy.
+
+    Raises:
+        InputError: If it is anything else; ``name`` names the argument.
+    """
+    wanted = f"must be {' times '.join(map(str, shape))} numbers"
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(name, wanted, value) from None
+    if found.shape != shape:
+        raise InputError(name, f"{wanted}, not an array of shape {found.shape}")
+    # Of a few numbers Python asks sooner than NumPy.
+    if not all(map(math.isfinite, found.ravel().tolist())):
+        raise InputError(name, "must be finite", found.tolist())
+    return found

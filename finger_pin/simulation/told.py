@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from array import array
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -34,16 +35,19 @@ _SAME = 1e-9
 
 
 class Told:
-    """The steps of a simulator since a start, in the order in which they were made.
+    """The steps of a simulator since a start, in the order in which they were made."""
 
-    Attributes:
-        start: A copy of the stepper then.
-    """
-
-    def __init__(self, start: Stepper) -> None:
-        """Begin with no steps."""
-        self.start = start
+    def __init__(self, stepper: Stepper) -> None:
+        """Begin with no steps, where a stepper stands that goes on meanwhile."""
+        self._stepper, self._moments = stepper, stepper.moments
         self._numbers = array("d")
+
+    @property
+    def start(self) -> Stepper:
+        """A copy of the stepper as it stood at the start."""
+        start = self._stepper.copy()
+        start.resume(self._moments)
+        return start
 
     def add(self, end: float, inputs: Array, force: Array) -> None:
         """Keep a step: when it ended, s, and what was held during it: inputs (u,), and forces (3,) or (f, 3), N."""
@@ -52,7 +56,7 @@ class Told:
 
     def copy(self) -> Told:
         """Return the same steps, to go on from independently."""
-        twin = Told(self.start)
+        twin = copy.copy(self)
         twin._numbers = self._numbers[:]
         return twin
 
@@ -72,7 +76,8 @@ class Told:
             raise InputError("result", "is of steps, and there are none yet: call step")
         tips = finger.mechanism.body.tips
         steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
-        knots, joints = np.append(self.start.time, steps[:, 0]), len(finger.routing.joints)
+        stepper = self.start
+        knots, joints = np.append(stepper.time, steps[:, 0]), len(finger.routing.joints)
         inputs, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
         tension, channels = inputs.copy(), finger.actuators.voltages
         tension[:, channels] = 0.0
@@ -87,7 +92,7 @@ class Told:
         scenario = validate(Scenario, table, ())
         check_memory(scenario.simulation, finger)
         if reference is None:
-            posture = finger.layout.unpack(self.start.x).position
+            posture = finger.layout.unpack(stepper.x).position
             resting = Signal.held(knots[[0, -1]], posture[None])
             reference = SignalReference(resting, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
         loop = replace(
@@ -98,7 +103,6 @@ class Told:
             dynamics=CompiledFinger(finger),
             drives=GivenVoltages(channels, Signal.held(knots, inputs[:, channels])) if len(channels) else None,
         )
-        stepper = self.start.copy()
         again = _Repeated(stepper, knots, inputs, force)
         trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, held=again)
         # Rounding must not take a sample to the other side of a step's end, where other tensions act.

@@ -25,6 +25,11 @@ def finger() -> fp.Finger:
     return fp.Finger(fp.load_finger("ub"))
 
 
+@pytest.fixture
+def simulator(finger: fp.Finger) -> Simulator:
+    return Simulator(finger, START)
+
+
 def walk(simulator: Simulator, steps: int, seed: int = 0) -> np.ndarray:
     random = np.random.default_rng(seed)
     return np.array([simulator.step(TENSION * random.uniform(0.5, 1.5, 4), 1e-3).position for _ in range(steps)])
@@ -61,7 +66,7 @@ def test_the_same_steps_give_the_same_bits(finger: fp.Finger) -> None:
 def test_a_copy_goes_on_bit_by_bit_and_leaves_the_original_alone(finger: fp.Finger) -> None:
     simulator = Simulator(finger, START)
     walk(simulator, 10)
-    twin, before = simulator.copy(), simulator.x
+    twin, before = simulator.clone(), simulator.x
     ahead = walk(twin, 10, seed=1)
     np.testing.assert_array_equal(simulator.x, before)
     np.testing.assert_array_equal(walk(simulator, 10, seed=1), ahead)
@@ -186,3 +191,60 @@ def test_what_holds_addresses_refuses_to_be_copied_alone(finger: fp.Finger) -> N
     for each in (part, part.model):
         with pytest.raises(TypeError, match="holds addresses"):
             copy.deepcopy(each)
+
+
+def test_a_reset_begins_bit_by_bit_as_a_new_one_does(simulator: Simulator) -> None:
+    start = [0.1, 0.3, 0.3, 0.2]
+    fresh = fp.Simulator(simulator.finger, start)
+    simulator.step(np.full(4, 3.0), 0.01, [0.1, 0.0, -0.2])
+    simulator.reset(start)
+    assert simulator.time == 0.0
+    for _ in range(3):
+        assert np.array_equal(
+            fresh.finger.layout.pack(fresh.step(np.full(4, 2.0), 0.01)),
+            simulator.finger.layout.pack(simulator.step(np.full(4, 2.0), 0.01)),
+        )
+    assert fresh.result().equals(simulator.result())
+
+
+def test_a_reset_goes_to_any_state_that_is_given_and_refuses_others(simulator: Simulator) -> None:
+    state = simulator.step(np.full(4, 2.0), 0.01)
+    x = simulator.x
+    simulator.step(np.full(4, 4.0), 0.01)
+    for initial in (x, state):
+        simulator.reset(initial)
+        assert np.array_equal(simulator.x, x)
+    with pytest.raises(fp.InputError, match="initial"):
+        simulator.reset(x[:-1])
+    assert np.array_equal(simulator.x, x)
+
+
+def test_other_parameters_make_the_finger_that_is_read_with_them(simulator: Simulator) -> None:
+    simulator.step(np.full(4, 2.0), 0.01)
+    key, value = "finger.tendon_friction.coulomb", 0.03
+    other = fp.Simulator(fp.Finger(fp.load_finger("ub", {key: value})))
+    other.x = simulator.x
+    simulator.set_parameters({key: value})
+    simulator.step(np.full(4, 3.0), 0.01)
+    # At times of their own, each as far on as the other.
+    other.step(np.full(4, 3.0), 0.01)
+    assert np.allclose(other.x, simulator.x, rtol=0.0, atol=1e-9)
+    assert other.finger.tendons.surface.tolist() == simulator.finger.tendons.surface.tolist()
+    before = simulator.x
+    with pytest.raises(fp.InputError, match="must be at least 0"):
+        simulator.set_parameters({key: -1.0})
+    assert np.array_equal(simulator.x, before) and simulator.finger.tendons.surface[0] == value
+
+
+def test_many_simulators_step_together_bit_by_bit_as_one_by_one(simulator: Simulator) -> None:
+    rng = np.random.default_rng(2)
+    together = [simulator.clone() for _ in range(5)]
+    alone = [each.clone() for each in together]
+    for _ in range(4):
+        tensions = rng.uniform(0.0, 5.0, (5, 4))
+        states = fp.step_many(together, tensions, 0.01)
+        for one, tension, state in zip(alone, tensions, states, strict=True):
+            assert np.array_equal(one.finger.layout.pack(one.step(tension, 0.01)), one.finger.layout.pack(state))
+    assert together[3].result().equals(alone[3].result())
+    with pytest.raises(fp.InputError, match="stands there twice"):
+        fp.step_many([simulator, simulator], np.ones((2, 4)), 0.01)

@@ -74,7 +74,7 @@ def test_a_state_put_in_begins_a_new_result_and_a_copy_has_the_steps_of_both(fin
     simulator = pushed(fp.Simulator(finger, START), 5, seed=2)
     simulator.x = finger.rest_state(START)
     pushed(simulator, 5, seed=3)
-    twin = pushed(simulator.copy(), 5, seed=4)
+    twin = pushed(simulator.clone(), 5, seed=4)
     np.testing.assert_allclose(simulator.result().time[[0, -1]], [0.01, 0.02], rtol=1e-12)
     np.testing.assert_array_equal(simulator.result().joint_position[0], START)
     result = twin.result(sample_rate=500.0)
