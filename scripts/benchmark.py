@@ -19,7 +19,17 @@ from finger_pin.commands.console import noted, print_text
 from finger_pin.commands.options import Output, wrong
 
 PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "scikit-sundae")
-STAGES = ("work-precision", "step-interface", "joints", "hand", "contact", "mujoco", "many-runs", "main-job")
+STAGES = (
+    "work-precision",
+    "step-interface",
+    "joints",
+    "hand",
+    "contact",
+    "mujoco",
+    "prepared",
+    "many-runs",
+    "main-job",
+)
 
 
 def benchmark(
@@ -70,9 +80,9 @@ def chosen(names: str) -> tuple[str, ...]:
 
 def stage(name: str) -> Any:
     """Return the module of a stage."""
-    from benchmarks import chains, contacts, hands, many, mujoco_loop, processes, stepping, work_precision
+    from benchmarks import chains, contacts, hands, many, mujoco_loop, prepared, processes, stepping, work_precision
 
-    modules = (work_precision, stepping, chains, hands, contacts, mujoco_loop, many, processes)
+    modules = (work_precision, stepping, chains, hands, contacts, mujoco_loop, prepared, many, processes)
     return dict(zip(STAGES, modules, strict=True))[name]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from benchmarks.prepared import lines
 from benchmarks.targets import Target
 from benchmarks.work_precision import OURS
 from finger_pin.views.plots.lines import series
@@ -28,6 +29,7 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
         ("hand", _hand),
         ("contact", _contact),
         ("mujoco", _mujoco),
+        ("prepared", _prepared),
         ("many-runs", _many),
         ("main-job", _main_job),
     ):
@@ -145,6 +147,14 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:
         ]
         head = ("MuJoCo's integrator", "step", "error", "rollout's", "ours", "Python loop", "rollout")
         yield from table((*head, "loop / ours", "rollout / ours"), rows)
+
+
+def _prepared(study: Mapping[str, Any]) -> Iterator[str]:
+    yield "a prepared scenario that records angles and tensions: processor time, ms"
+    head = ("scenario", "integration", "run", "simulate", "10 ms: steps", "run", "simulate", "load")
+    yield from table(head, list(lines(study)))
+    times = ", ".join(f"{name} {1e6 * value:.3g}" for name, value in study["simulator"].items())
+    yield f"a simulator, in steps of 20 ms at 1e-3 rad, us: {times}"
 
 
 def _many(study: Mapping[str, Any]) -> Iterator[str]:

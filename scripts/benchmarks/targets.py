@@ -57,6 +57,8 @@ def targets(stages: Mapping[str, Any]) -> list[Target]:
         found.append(target("step interface at 1 kHz, with controller", step["real_time_factor"], ">=", 20.0, "x"))
     if stages.get("hand"):
         found += _hand(stages["hand"])
+    if stages.get("prepared"):
+        found += _prepared(stages["prepared"])
     if stages.get("many-runs"):
         many = stages["many-runs"]
         found.append(target("two threads, many runs", many["speed_up"], ">=", 1.9, "x"))
@@ -110,3 +112,15 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[Target]:
             label = f"MuJoCo, {words}, {measure} error {study['limit']:g} rad"
             yield target(f"{label}: Python loop", min(row["loop_over_ours"] for row in mine), ">=", 4.0, "x")
             yield target(f"{label}: rollout", min(row["rollout_over_ours"] for row in mine), ">=", 1.0, "x")
+
+
+def _prepared(study: Mapping[str, Any]) -> Iterator[Target]:
+    fig6, simulator = study["runs"]["fig6"], study["simulator"]
+    beside = 1e3 * (fig6["short run"] - fig6["short steps"])
+    yield target("prepared run of 10 ms beside its steps", beside, "<=", 2.0, "ms")
+    yield target("simulate of 10 ms", 1e3 * fig6["short simulate"], "<=", 6.0, "ms")
+    slowest = max(times["load"] for times in study["runs"].values())
+    yield target("a scenario that was read before", 1e3 * slowest, "<=", 3.0, "ms")
+    share = fig6["simulate"] / fig6["integration"] - 1.0
+    yield target("fig6, signals and account over integration", share, "<=", 1.0 / 3.0, "")
+    yield target("a simulator's step of 20 ms at 1e-3 rad", 1e6 * simulator["step"], "<=", 60.0, "us")

@@ -153,6 +153,8 @@ def stages():
     compared = {"version": "3", "scenario": "fig6", "duration": 8.0, "limit": 1e-3}
     compared |= {"ours": {"worst": {"method": "Rodas4", "rtol": 0.1}}, "rows": [row | {"rollout_over_ours": 10.0}]}
     joint = {"states": 5, "wall_time": 0.1, "real_time_factor": 20.0, "steps": 9, "time_per_step": 1e-5}
+    spent = ("integration", "run", "simulate", "short steps", "short run", "short simulate", "load")
+    prepared = {"runs": {"fig6": dict.fromkeys(spent, 1e-3)}, "simulator": {"step": 7e-5}}
     job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
     return {
         "work-precision": {"fig6": study, "stick_slip": study},
@@ -168,6 +170,7 @@ def stages():
         },
         "contact": {"scenarios": {"press": study}, "mujoco": [compared]},
         "mujoco": compared,
+        "prepared": prepared,
         "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}
         | {"speed_up_without_start": None},
         "main-job": job | {"later": 3.0, "later_processor_time": 3.0, "later_memory": 2**21},
@@ -196,6 +199,8 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["MuJoCo, lumped mass, worst error 0.001 rad: Python loop"] is True
     assert verdicts["hand over one finger, integration"] is False
     assert verdicts["hand, two threads, integration"] is True
+    assert verdicts["prepared run of 10 ms beside its steps"] is True
+    assert verdicts["a simulator's step of 20 ms at 1e-3 rad"] is False
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out
     assert "pass" in output and "FAIL" in output and "Rodas5P" in output

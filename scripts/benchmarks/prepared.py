@@ -1,0 +1,107 @@
+"""A prepared scenario: what a run costs beside its integration, in processor time on one core."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+import finger_pin as fp
+from benchmarks.store import Store, say
+from finger_pin.simulation.running import Setup
+
+SCENARIOS = ("fig6", "stick_slip", "servo", "press", "hand")
+#: What the prepared runs record.
+RECORDED = ("joint_position", "tendon_tension")
+_ROUNDS, _QUICK_ROUNDS, _SHORT = 7, 2, 0.01
+
+
+def measure(store: Store) -> dict[str, Any]:
+    """Return the times of whole runs, of short ones, and of a simulator's steps, s."""
+    rounds = _QUICK_ROUNDS if store.quick else _ROUNDS
+    found = {}
+    for name in SCENARIOS:
+        found[name] = store.part(f"prepared-{name}", lambda name=name: _runs(name, rounds, store.quick))
+    return {"runs": found, "simulator": store.part("prepared-simulator", lambda: _simulator(rounds))}
+
+
+def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
+    duration = 0.2 if quick else fp.load_scenario(name).simulation.duration
+    scenario = fp.load_scenario(name, {"simulation.duration": duration})
+    prepared = fp.prepare(scenario, ["simulation.duration"], RECORDED)
+    brief = prepared.scenario([_SHORT])
+    times = _processor_time(
+        {
+            "simulate": lambda: fp.simulate(scenario),
+            "run": lambda: prepared.run(),
+            "integration": lambda: Setup.of(scenario).integrate(),
+            "load": lambda: fp.load_scenario(name),
+        },
+        rounds,
+    )
+    # What is short is dearer to time than to do.
+    times |= _processor_time(
+        {
+            "short simulate": lambda: fp.simulate(brief),
+            "short run": lambda: prepared.run([_SHORT]),
+            "short steps": _Steps(Setup.of(brief)),
+        },
+        4 * rounds,
+    )
+    say(f"  {name}: simulate {times['simulate']:.3g} s, run {times['run']:.3g} s")
+    return times
+
+
+class _Steps:
+    """The steps of a run alone, made again and again from its start."""
+
+    def __init__(self, setup: Setup) -> None:
+        motions = setup.integrate().islands
+        self._parts = [(each.part, each) for each in motions]  # type: ignore[attr-defined]
+
+    def __call__(self) -> None:
+        for part, motion in self._parts:
+            part.restart(motion.start, motion.attitude, 0.0)
+            part.advance(_SHORT)
+
+
+def _simulator(rounds: int) -> dict[str, float]:
+    """Return the times of a simulator on steps of 20 ms at 1e-3 rad, s."""
+    sim = fp.Simulator("ub", [0.0, 0.4, 0.5, 0.35], method="Rodas4", rtol=1e-3, atol_scale=1e-3)
+    tension, period, many = np.array([1.0, 1.0, 4.4, 3.1]), 0.02, 64
+    # Tensions that change at every step, as a policy's do.
+    tensions = iter(tension * np.random.default_rng(0).uniform(0.9, 1.1, (100_000, 4)))
+    x, worlds = sim.x, [sim.clone() for _ in range(many)]
+    jobs: dict[str, Callable[[], Any]] = {
+        "step": lambda: sim.step(next(tensions), period),
+        "set x": lambda: setattr(sim, "x", x),
+        "signals": sim.signals,
+        "reset": sim.reset,
+        "set_parameters": lambda: sim.set_parameters({"finger.tendon_friction.coulomb": 0.12}),
+    }
+    for _ in range(10):
+        jobs["step"]()
+    times = _processor_time(jobs, 20 * rounds)
+    together = _processor_time({"": lambda: fp.step_many(worlds, [next(tensions) for _ in worlds], period)}, rounds)
+    return times | {"step_many, per world": together[""] / many}
+
+
+def _processor_time(jobs: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
+    """Return the least processor time of every job, s; the jobs take turns."""
+    least = dict.fromkeys(jobs, math.inf)
+    for _ in range(rounds):
+        for name, job in jobs.items():
+            began = time.process_time()
+            job()
+            least[name] = min(least[name], time.process_time() - began)
+    return least
+
+
+def lines(study: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of the table of runs: milliseconds of processor time."""
+    for name, times in study["runs"].items():
+        parts = ("integration", "run", "simulate", "short steps", "short run", "short simulate", "load")
+        yield (name, *(f"{1e3 * times[part]:.3g}" for part in parts))
