@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.overriding import from_here, override
+from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.reading import Table, resolve_signals
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, find_field, validate
@@ -59,6 +60,16 @@ class Family:
             override(from_here({name: probe}, set(Scenario.model_fields)), self._table(), Path())
             if "*" not in name and find_field(Scenario, name.split(".")) is None:
                 self._anew({name: probe})
+
+    @classmethod
+    def of_finger(cls, description: FingerDescription, keys: Sequence[str]) -> Family:
+        """Return the family of a scenario in which nothing but a finger or a hand is of account.
+
+        Raises:
+            InputError: If there is no such key.
+        """
+        hand, table = description.hand, {"name": description.name, "controller": {"kind": "tensions"}}
+        return cls(validate(Scenario, table | ({"hand": hand} if hand else {"finger": description}), ()), keys)
 
     def at(self, values: Sequence[Any]) -> Scenario:
         """Return the scenario with values at the keys, in their order.

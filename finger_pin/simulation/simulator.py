@@ -24,8 +24,7 @@ from finger_pin.description.family import Family
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import nearest, validate
+from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
@@ -157,7 +156,7 @@ class Simulator:
             InputError: Naming the entry that is wrong, or if the finger had another state; nothing has changed then.
         """
         if self._family is None or self._family.keys != tuple(values):
-            self._family = Family(_alone(self.finger.description), tuple(values))
+            self._family = Family.of_finger(self.finger.description, tuple(values))
         changed = self.finger.changed(self._family.at([*values.values()]).finger)
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
@@ -299,10 +298,3 @@ def step_many(
     for simulator in simulators:
         simulator._keep()
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]
-
-
-def _alone(description: FingerDescription) -> Scenario:
-    """Return a scenario in which nothing but a finger or a hand is of account."""
-    table: dict[str, Any] = {"name": description.name, "controller": {"kind": "tensions"}}
-    hand = description.hand
-    return validate(Scenario, table | ({"finger": description} if hand is None else {"hand": hand}), ())

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from benchmarks.prepared import lines
+from benchmarks import prepared
 from benchmarks.targets import Target
 from benchmarks.work_precision import OURS
 from finger_pin.views.plots.lines import series
@@ -152,7 +152,7 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:
 def _prepared(study: Mapping[str, Any]) -> Iterator[str]:
     yield "a prepared scenario that records angles and tensions: processor time, ms"
     head = ("scenario", "integration", "run", "simulate", "10 ms: steps", "run", "simulate", "load")
-    yield from table(head, list(lines(study)))
+    yield from table(head, list(prepared.lines(study)))
     times = ", ".join(f"{name} {1e6 * value:.3g}" for name, value in study["simulator"].items())
     yield f"a simulator, in steps of 20 ms at 1e-3 rad, us: {times}"
 

@@ -158,7 +158,8 @@ def test_where_the_integrator_cannot_go_on_it_names_time_and_state(finger: fp.Fi
 def test_a_deep_copy_and_a_pickle_go_on_bit_by_bit_alike_and_leave_the_original_alone(name: str) -> None:
     scenario = fp.load_scenario(name)
     finger = fp.Finger(scenario.finger, objects=scenario.environment.objects)
-    simulator = fp.Simulator(finger, rtol=1e-4, atol_scale=1e-4)
+    start = finger.layout.unpack(fp.prepare(scenario).start).position
+    simulator = fp.Simulator(finger, start, rtol=1e-4, atol_scale=1e-4)
     command = np.full(finger.mechanism.channels, 2.0)
     for _ in range(3):
         simulator.step(command, 1e-3)
