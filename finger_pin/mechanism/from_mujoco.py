@@ -15,6 +15,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mujoco_flags import obeyed
 from finger_pin.mechanism.mujoco_names import Names, Table, distinct, entry_name, quaternion
 from finger_pin.mechanism.mujoco_rest import Rest
 from finger_pin.mechanism.mujoco_shapes import Shapes
@@ -65,7 +66,8 @@ class _Reader:
     """Reads a model, element by element."""
 
     def __init__(self, mujoco: Any, model: Any) -> None:
-        self.mujoco, self.model = mujoco, model
+        self.mujoco, self.model = mujoco, obeyed(mujoco, model)
+        model = self.model
         if model.ntendon == 0:
             raise InputError("model", "has no tendons")
         self.rest = Rest(mujoco, model)
@@ -241,8 +243,8 @@ class _Reader:
                 "by_length": by_length,
                 "by_speed": by_speed,
             }
-            if model.actuator_ctrllimited[i]:
-                found[i]["input_range"] = model.actuator_ctrlrange[i].tolist()
+            if model.actuator_ctrllimited[self.rest.control(i)]:
+                found[i]["input_range"] = model.actuator_ctrlrange[self.rest.control(i)].tolist()
             if model.actuator_forcelimited[i]:
                 found[i]["force_range"] = model.actuator_forcerange[i].tolist()
         names = distinct("actuator", [model.actuator(i).name for i in found])
@@ -255,12 +257,14 @@ class _Reader:
         if (
             model.actuator_trntype[i] != types.mjtTrn.mjTRN_TENDON
             or model.actuator_biastype[i] != types.mjtBias.mjBIAS_NONE
-            or not model.actuator_ctrllimited[i]
+            or not model.actuator_ctrllimited[self.rest.control(i)]
             or model.actuator_forcelimited[i]
             or model.wrap_type[model.tendon_adr[at]] == types.mjtWrap.mjWRAP_JOINT
         ):
             return False
-        exerted = model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[i]
+        exerted = (
+            model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[self.rest.control(i)]
+        )
         return bool(np.all(exerted <= 0.0) and np.any(exerted))
 
     def _pulled(self) -> Table:

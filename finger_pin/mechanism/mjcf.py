@@ -89,10 +89,18 @@ def to_mjcf(
             has been imported.
 
     Raises:
-        InputError: If a joint has no link, the posture has the wrong size, or the time step is not positive.
+        InputError: If it is no finger or hand, it has a tree of bodies or a joint without a link, the posture has the
+        wrong size, or the time step is not positive.
     """
     if isinstance(description, HandDescription):
         description = description.joined()
+    if not isinstance(description, FingerDescription):
+        allowed = "must be a finger or hand, such as fp.load_finger(name), fp.load_hand(name) or scenario.finger"
+        raise InputError("description", allowed, type(description).__name__)
+    if description.tree is not None:
+        raise InputError(
+            "finger.tree", "has bodies in place of links: a hand read from MuJoCo has its own MJCF already"
+        )
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)

@@ -24,9 +24,8 @@ LEAST_LOSS = 1e-6
 #: (14c), and of a fixed tendon over one joint that is pulled by what drives the joint.
 TENDON, PIN, MASS, LINK = range(4)
 #: What elements of a friction carry, in order.
-LENGTH, RATIO, KIND, COULOMB, STATIC, STIFFNESS, VISCOUS, STRIBECK, FLOOR, EXPONENT, MICRO, DRAG, OFFSET, HEAD = range(
-    14
-)
+LENGTH, RATIO, KIND, COULOMB, STATIC, STIFFNESS, VISCOUS, STRIBECK = range(8)
+FLOOR, EXPONENT, MICRO, DRAG, OFFSET, SHARE, HEAD = range(8, 15)
 #: Entries of `act`: first the bristles of all, then, by kind, as many with which the solver's last forces load each.
 LOADS = (1, 3, 0, 1)
 #: What of each friction stands in `plugin_state`.
@@ -46,6 +45,9 @@ class Friction:
         law: coulomb, static, stiffness, viscous, stribeck_velocity, floor, stribeck_exponent, micro_damping, drag,
             curvature_offset.
         more: What bends or loads it: whether it is a joint, its name, and a number.
+        share: Of a `LINK`, how much of the joint's drive it takes: one over the number of tendons that pull the same
+        way;
+            negative where another one pulls the other way, so that it is slack while that is driven.
     """
 
     kind: int
@@ -55,6 +57,7 @@ class Friction:
     ratio: float
     law: tuple[float, ...]
     more: tuple[tuple[bool, str, float], ...] = ()
+    share: float = 0.0
 
     @property
     def of_joint(self) -> bool:
@@ -71,7 +74,7 @@ class Friction:
         own = "joint" if self.of_joint else "tendon"
         yield own, self.name, float(HEAD + len(self.more))
         yield ("joint" if self.row_of_joint else "tendon"), self.row, self.ratio
-        for value in (float(self.kind), *self.law):
+        for value in (float(self.kind), *self.law, self.share):
             yield own, self.name, value
         for of_joint, name, value in self.more:
             yield ("joint" if of_joint else "tendon"), name, value

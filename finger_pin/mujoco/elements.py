@@ -20,12 +20,13 @@ from finger_pin.mechanism.mujoco_friction import (
     LINK,
     OFFSET,
     RATIO,
+    SHARE,
     STATIC,
     STRIBECK,
     VISCOUS,
 )
 from finger_pin.mujoco.loads import between, spring, turn_of_path
-from finger_pin.mujoco.memory import compiled, integers, numbers
+from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, numbers
 
 _coefficient, _capstan, _least = compiled(friction_coefficient), compiled(capstan_coefficient), compiled(friction_level)
 
@@ -39,18 +40,21 @@ def tendon(
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)
     if int(p[KIND]) == LINK:
-        pull += about[integers(m, at.jnt_dofadr)[row]] / p[RATIO]
+        drive = about[integer_in(m, at.jnt_dofadr, row)] * abs(p[SHARE]) / p[RATIO]
+        pull += drive if p[SHARE] > 0.0 else min(drive, 0.0)
     tension = abs(pull) + held
     # Against what pulls: of a pulled tendon its length's speed is negative when it is wound in.
     way = 1.0 if pull > 0.0 else -1.0
-    speed = numbers(d, of.ten_velocity)[tendon]
+    speed = number_in(d, of.ten_velocity, tendon)
     loss = way * (force + p[VISCOUS] * speed)
     delivered = max(tension - loss, 0.0)
     bend, level = p[OFFSET], p[FLOOR]
     if tension > 0.0 or abs(force) > p[FLOOR] or p[DRAG] > 0.0:
         bend += _turn(m, d, at, of, kinds, e, tendon)
         least = _capstan(p[COULOMB], bend)
-        coefficient = _coefficient(speed, least, p[STATIC] * least, p[STRIBECK], p[EXPONENT])
+        coefficient = least
+        if p[STATIC] > 1.0:
+            coefficient = _coefficient(speed, least, p[STATIC] * least, p[STRIBECK], p[EXPONENT])
         level = max(_least(tension + delivered, coefficient, 0.0) + p[DRAG], p[FLOOR])
     for k in range(HEAD, int(p[LENGTH])):
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
@@ -62,7 +66,7 @@ def tendon(
 @compiled
 def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> Any:
     """Return the angle by which a path turns besides its offset, (15) or along its points, rad."""
-    if tendon >= 0 and integers(d, of.ten_wrapnum)[tendon] > 0:
+    if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
     p, objects, found = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e:], 0.0
     places, types = integers(m, at.jnt_qposadr), integers(m, at.tuple_objtype)[e:]
@@ -80,7 +84,7 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
         integers(m, at.tuple_objid)[e:],
         integers(m, at.tuple_objtype)[e:],
     )
-    speed, load = numbers(d, of.qvel)[integers(m, at.jnt_dofadr)[objects[0]]], 0.0
+    speed, load = number_in(d, of.qvel, integer_in(m, at.jnt_dofadr, objects[0])), 0.0
     dofs, tension = integers(m, at.jnt_dofadr), 0.0
     for k in range(HEAD, int(p[LENGTH])):
         if types[k] == kinds.of_tendon:
@@ -98,14 +102,16 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
 @compiled
 def pin(m: Any, d: Any, at: Any, of: Any, e: Any, outside: Any, reactions: Any) -> Any:
     """Return speed, level, most, load and turn of a joint's pin: (9b), (17)."""
-    p, joint = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e]
-    dof = integers(m, at.jnt_dofadr)[joint]
-    speed, load = numbers(d, of.qvel)[dof], reactions[dof]
+    p, joint = numbers(m, at.tuple_objprm)[e:], integer_in(m, at.tuple_objid, e)
+    dof = integer_in(m, at.jnt_dofadr, joint)
+    speed, load = number_in(d, of.qvel, dof), reactions[dof]
     x, y, z = outside[0], outside[1], outside[2]
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)
         load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
-    coefficient = _coefficient(speed, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT])
+    coefficient = p[COULOMB]
+    if p[STATIC] > coefficient:
+        coefficient = _coefficient(speed, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT])
     return speed, _least(load, coefficient, p[FLOOR]) + p[DRAG], np.inf, load, 0.0
 
 
@@ -113,7 +119,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, outside: Any, reactions: Any) 
 def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
     """Return e_j: from the joint before to this one, or the x axis of what carries it where there is none."""
     parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)
-    anchor, own = numbers(d, of.xanchor), integers(m, at.jnt_bodyid)[joint]
+    anchor, own = numbers(d, of.xanchor), integer_in(m, at.jnt_bodyid, joint)
     body = parent[own]
     while body > 0:
         if count[body] > 0:

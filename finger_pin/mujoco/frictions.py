@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -29,36 +30,38 @@ def frictions(model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str
     found: list[Friction] = []
     first: list[tuple[str, Array]] = []
     for name, (law, named) in tendons.items():
-        if not _held(model, model.tendon(name).id) and not _linked(model, model.tendon(name).id):
+        if not _held(model, model.tendon(name).id) and not _share(model, model.tendon(name).id, list(tendons)):
             if named:
                 raise InputError(
                     f"tendons.{name}", "nothing pulls it: no actuator, spring, limit or equality of tendons"
                 )
             continue
         row, of_joint, ratio = _row(model, name, first)
-        kind = TENDON if _held(model, model.tendon(name).id) else LINK
-        found.append(
-            Friction(kind, name, row, of_joint, ratio, _tendon_law(model, name, law), _crossed(model, name, law))
-        )
+        share = _share(model, model.tendon(name).id, list(tendons))
+        kind = LINK if share else TENDON
+        numbers, crossed = _tendon_law(model, name, law), _crossed(model, name, law)
+        found.append(Friction(kind, name, row, of_joint, ratio, numbers, crossed, share))
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
-            numbers: tuple[float, ...] = (law.coulomb, law.stiction, law.stiffness, law.viscous, law.stribeck_velocity)
+            numbers = (law.coulomb, law.stiction, law.stiffness, law.viscous, law.stribeck_velocity)
             numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, 0.0, 0.0)
             found.append(Friction(PIN, name, name, True, 1.0, numbers))
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
-    return found + _kept(model, found)
+    return _with_loss(model, found)
 
 
-def _kept(model: Any, found: list[Friction]) -> list[Friction]:
-    """Return the constant friction of joints in whose rows tendons act, which the model has and keeps."""
-    pins = {each.name for each in found if each.kind == PIN}
+def _with_loss(model: Any, found: list[Friction]) -> list[Friction]:
+    """Return frictions, the constant one of a joint in whose row tendons act as the drag of the first of these."""
+    rows = {each.row for each in found if each.kind == PIN}
     kept = []
-    for name in dict.fromkeys(each.row for each in found if not each.of_joint and each.row_of_joint):
-        loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
-        if name not in pins and loss > 0.0:
-            kept.append(Friction(PIN, name, name, True, 1.0, (0.0, 0.0, 5.0, 0.0, 0.1, loss, 1.0, 0.0, 0.0, 0.0)))
+    for each in found:
+        if each.row_of_joint and not each.of_joint and each.row not in rows:
+            rows.add(each.row)
+            loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(each.row).id]]) / abs(each.ratio)
+            each = replace(each, law=(*each.law[:8], each.law[8] + loss, *each.law[9:]))
+        kept.append(each)
     return kept
 
 
@@ -71,14 +74,23 @@ def _held(model: Any, tendon: int) -> bool:
     return bool(driven.any() or held.any() or model.tendon_stiffness[tendon] > 0.0 or model.tendon_limited[tendon])
 
 
-def _linked(model: Any, tendon: int) -> bool:
-    """Return whether a fixed tendon runs over one joint alone, which an actuator drives."""
-    kinds = mujoco.mjtTrn
-    over = _coefficients(model, tendon)
-    if np.count_nonzero(over) != 1:
-        return False
+def _share(model: Any, tendon: int, names: list[str]) -> float:
+    """Return how a fixed tendon shares in what drives the only joint that it runs over; see `Friction`.
+
+    Zero of all others, and of those that have an actuator or a spring of their own.
+    """
+    kinds, over = mujoco.mjtTrn, _coefficients(model, tendon)
+    driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
+    if np.count_nonzero(over) != 1 or driven.any() or model.tendon_stiffness[tendon] > 0.0:
+        return 0.0
+    joint = int(np.flatnonzero(over)[0])
     on_joint = (model.actuator_trntype == kinds.mjTRN_JOINT) | (model.actuator_trntype == kinds.mjTRN_JOINTINPARENT)
-    return bool(np.any(on_joint & (model.actuator_trnid[:, 0] == np.flatnonzero(over)[0])))
+    if not np.any(on_joint & (model.actuator_trnid[:, 0] == joint)):
+        return 0.0
+    others = [_coefficients(model, model.tendon(name).id) for name in names]
+    arms = [each[joint] for each in others if np.count_nonzero(each) == 1 and each[joint]]
+    alike = sum(arm * over[joint] > 0.0 for arm in arms)
+    return float((1.0 if alike == len(arms) else -1.0) / alike)
 
 
 def _coefficients(model: Any, tendon: int) -> Array:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.mechanism.mujoco_friction import (
+    FLOOR,
     FORCE,
     KIND,
     LENGTH,
@@ -35,8 +36,20 @@ from finger_pin.mechanism.mujoco_friction import (
     VISCOUS,
 )
 from finger_pin.mujoco.elements import mass, pin, tendon
-from finger_pin.mujoco.loads import contact_loads, driven, held_tension
-from finger_pin.mujoco.memory import compiled, flags, integer, integers, number, numbers, numbers_at, size, words
+from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
+from finger_pin.mujoco.memory import (
+    compiled,
+    flags,
+    integer,
+    integer_in,
+    integers,
+    number,
+    number_in,
+    numbers,
+    numbers_at,
+    size,
+    words,
+)
 
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
 _NOTHING = 1e-12
@@ -52,9 +65,9 @@ def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
     for a in range(size(m, at.nactuator)):
         if plugin[a] != instance:
             continue
-        own = integers(m, at.name_actuatoradr)[a]
+        own = integer_in(m, at.name_actuatoradr, a)
         for t in range(size(m, at.ntuple)):
-            other, k = integers(m, at.name_tupleadr)[t], 0
+            other, k = integer_in(m, at.name_tupleadr, t), 0
             while names[own + k] == names[other + k] and names[own + k] != 0:
                 k += 1
             if names[own + k] == names[other + k]:
@@ -65,7 +78,7 @@ def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
 @compiled
 def signals(m: Any, instance: Any, at: Any) -> Any:
     """Return how many numbers an instance keeps in plugin_state; MuJoCo asks before a model has its tuples."""
-    digits, k, count = flags(m, at.plugin_attr), integers(m, at.plugin_attradr)[instance], 0
+    digits, k, count = flags(m, at.plugin_attr), integer_in(m, at.plugin_attradr, instance), 0
     while digits[k] != 0:
         count, k = 10 * count + digits[k] - 48, k + 1
     return SIGNALS * count
@@ -121,33 +134,44 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
                 # `advance` moves the bristles, with the speed that the step ends with.
                 rate[z] = 0.0
                 rate[x : x + LOADS[kind]] = 0.0
-                # b v, and the micro-damping's sigma_1 z', which may help the motion, as z goes at this speed.
-                stiffness, viscous, micro = values[e + STIFFNESS], values[e + VISCOUS], values[e + MICRO]
-                later = _slid(act[z], speed, level, stiffness, dt)
-                if micro > 0.0 and speed != 0.0:
-                    micro *= (later - act[z]) / (stiffness * speed * dt)
-                moved = stiffness * dt * speed
-                excess = (act[z] + moved - later) * math.exp(-abs(moved) / level)
-                rows[0, row] += ratio * (act[z] - excess + min(micro, 0.0) * speed)
-                rows[1, row] += ratio * ratio * (stiffness * dt + viscous + max(micro, 0.0))
-                rows[2, row] += abs(ratio) * min(max(level, abs(later)) + (viscous + micro) * abs(speed), most)
+                force, drag, limit = _exerted(values[e:], act[z], speed, level, load, dt)
+                rows[0, row] += ratio * force
+                rows[1, row] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
+                rows[2, row] += abs(ratio) * min(limit, most)
             e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
     _write(m, d, at, of, kinds, rows, dt)
 
 
 @compiled
+def _exerted(p: Any, force: Any, speed: Any, level: Any, load: Any, dt: Any) -> Any:
+    """Return F - x, b and what micro-damping adds to it, and the most that a friction exerts."""
+    stiffness, viscous, micro = p[STIFFNESS], p[VISCOUS], p[MICRO]
+    if load == 0.0 and force == 0.0:
+        return 0.0, viscous + micro, level + viscous * abs(speed)
+    moved = stiffness * dt * speed
+    decay, steady = math.exp(-abs(moved) / level), level if speed > 0.0 else -level
+    later = steady + (force - steady) * decay
+    # The micro-damping's sigma_1 z', as z goes at this speed; it may help the motion.
+    if micro > 0.0 and speed != 0.0:
+        micro *= (later - force) / moved
+    excess = (force + moved - later) * decay
+    limit = max(level, abs(later)) + (viscous + micro) * abs(speed)
+    return force - excess + min(micro, 0.0) * speed, viscous + max(micro, 0.0), limit
+
+
+@compiled
 def _entries(m: Any, at: Any, which: Any) -> Any:
     """Return where the elements of a tuple begin and end."""
-    first = integers(m, at.tuple_adr)[which]
-    return first, first + integers(m, at.tuple_size)[which]
+    first = integer_in(m, at.tuple_adr, which)
+    return first, first + integer_in(m, at.tuple_size, which)
 
 
 @compiled
 def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
     """Return where the first friction has its elements, its bristles, its loads and its signals."""
-    bristles = integers(m, at.actuator_actadr)[key & _LOW]
+    bristles = integer_in(m, at.actuator_actadr, key & _LOW)
     loads = bristles + signals(m, instance, at) // SIGNALS
-    return _entries(m, at, key >> 32)[0], bristles, loads, integers(m, at.plugin_stateadr)[instance]
+    return _entries(m, at, key >> 32)[0], bristles, loads, integer_in(m, at.plugin_stateadr, instance)
 
 
 @compiled
@@ -171,13 +195,13 @@ def _write(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> 
         row = which[r] if of_dof else width + which[r]
         if rows[1, row] == 0.0:
             continue
-        speed = numbers(d, of.qvel)[row] if of_dof else numbers(d, of.ten_velocity)[which[r]]
+        speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
         before, held = resistance[r], 1.0 / (rows[1, row] * dt)
         aref[r] = -speed / dt - held * rows[0, row]
         resistance[r], weight[r] = held, 1.0 / held
         most[r] = max(rows[2, row], _NOTHING)
         if islands:
-            s = integers(d, of.map_efc2iefc)[r]
+            s = integer_in(d, of.map_efc2iefc, r)
             numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, 1.0 / held
             numbers(d, of.iefc_frictionloss)[s] = most[r]
         if dual:
@@ -191,8 +215,8 @@ def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -
     # As mj_isSparse: automatic is sparse from 60 degrees of freedom on.
     if how == kinds.dense or (how != kinds.sparse and size(m, at.nv) < 60):
         return r * (nefc + 1)
-    k = integers(d, of.efc_AR_rowadr)[r]
-    while integers(d, of.efc_AR_colind)[k] != r:
+    k = integer_in(d, of.efc_AR_rowadr, r)
+    while integer_in(d, of.efc_AR_colind, k) != r:
         k += 1
     return k
 
@@ -204,17 +228,22 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
     _, end = _entries(m, at, key >> 32)
     values, objects, types = numbers(m, at.tuple_objprm), integers(m, at.tuple_objid), integers(m, at.tuple_objtype)
     states, act = numbers(d, of.plugin_state), numbers(d, of.act)
+    held = held_tensions(m, d, at, of, kinds)
     forces, dt = _row_forces(m, d, at, of, kinds, width), number(m, at.timestep)
     places, pins = np.full(width, -1), False
     e, z, x, place = _start(m, at, key, instance)
     while e < end:
         kind, row = int(values[e + KIND]), objects[e + 1]
-        row = integers(m, at.jnt_dofadr)[row] if types[e + 1] == kinds.of_joint else width + row
+        row = integer_in(m, at.jnt_dofadr, row) if types[e + 1] == kinds.of_joint else width + row
         states[place + FORCE] = forces[row] / values[e + RATIO]
-        speed = _speed(m, d, at, of, objects[e], types[e] == kinds.of_joint)
-        act[z] = _slid(act[z], speed, states[place + LEVEL], values[e + STIFFNESS], dt)
+        if states[place + LOAD] == 0.0 and abs(act[z]) <= values[e + FLOOR]:
+            # Bristles that nothing presses stand up.
+            act[z] = 0.0
+        else:
+            speed = _speed(m, d, at, of, objects[e + 1], types[e + 1] == kinds.of_joint) * values[e + RATIO]
+            act[z] = _slid(act[z], speed, states[place + LEVEL], values[e + STIFFNESS], dt)
         if kind == TENDON or kind == LINK:
-            act[x] = held_tension(m, d, at, of, kinds, objects[e])
+            act[x] = held[objects[e]]
         elif kind == PIN:
             places[objects[e]], pins = x, True
             act[x : x + 3] = 0.0
@@ -228,10 +257,10 @@ def _speed(m: Any, d: Any, at: Any, of: Any, element: Any, is_joint: Any) -> Any
     """Return the present speed of a joint, or of a tendon's length along its present arms."""
     speeds = numbers(d, of.qvel)
     if is_joint:
-        return speeds[integers(m, at.jnt_dofadr)[element]]
+        return speeds[integer_in(m, at.jnt_dofadr, element)]
     arms, columns, found = numbers(d, of.ten_J), integers(m, at.ten_J_colind), 0.0
-    first = integers(m, at.ten_J_rowadr)[element]
-    for k in range(first, first + integers(m, at.ten_J_rownnz)[element]):
+    first = integer_in(m, at.ten_J_rowadr, element)
+    for k in range(first, first + integer_in(m, at.ten_J_rownnz, element)):
         found += arms[k] * speeds[columns[k]]
     return found
 
@@ -241,7 +270,7 @@ def _row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any) -> Any
     """Return what the solver's rows of friction take, by degree of freedom and tendon."""
     found, ne = np.zeros(width + size(m, at.ntendon)), integer(d, of.ne)
     for r in range(ne, ne + integer(d, of.nf)):
-        row = integers(d, of.efc_id)[r]
-        row += 0 if integers(d, of.efc_type)[r] == kinds.friction_dof else width
+        row = integer_in(d, of.efc_id, r)
+        row += 0 if integer_in(d, of.efc_type, r) == kinds.friction_dof else width
         found[row] = -numbers(d, of.efc_force)[r]
     return found

@@ -11,8 +11,10 @@ from finger_pin.mujoco.memory import (
     compiled,
     flags,
     integer,
+    integer_in,
     integers,
     integers_at,
+    number_in,
     numbers,
     numbers_at,
     size,
@@ -47,10 +49,10 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
 @compiled
 def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
     """Return what a tendon's own spring exerts along it, N: negative where it pulls."""
-    stiffness = numbers(m, at.tendon_stiffness)[tendon]
+    stiffness = number_in(m, at.tendon_stiffness, tendon)
     if stiffness == 0.0:
         return 0.0
-    length, rest = numbers(d, of.ten_length)[tendon], numbers(m, at.tendon_lengthspring)
+    length, rest = number_in(d, of.ten_length, tendon), numbers(m, at.tendon_lengthspring)
     return stiffness * (max(rest[2 * tendon] - length, 0.0) + min(rest[2 * tendon + 1] - length, 0.0))
 
 
@@ -71,7 +73,7 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     Of a wrap both tangent points are in the path. The chord between them makes half the arc's angle with either
     tangent.
     """
-    first, count = integers(d, of.ten_wrapadr)[tendon], integers(d, of.ten_wrapnum)[tendon]
+    first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
     point, of_wrap, found = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
     x0, y0, z0, known = 0.0, 0.0, 0.0, False
     for k in range(first, first + count - 1):
@@ -89,17 +91,18 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
 
 
 @compiled
-def held_tension(m: Any, d: Any, at: Any, of: Any, kinds: Any, tendon: Any) -> Any:
-    """Return what limits and equalities exert along a tendon, N, by the solver's last forces."""
+def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
+    """Return what limits and equalities exert along tendons, N, by the solver's last forces."""
     kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
     couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
-    found = 0.0
+    found = np.zeros(size(m, at.ntendon))
     for r in range(integer(d, of.nefc)):
-        if kind[r] == kinds.limit_tendon and which[r] == tendon:
-            found += abs(force[r])
+        if kind[r] == kinds.limit_tendon:
+            found[which[r]] += abs(force[r])
         elif kind[r] == kinds.equality and couples[which[r]] == kinds.eq_tendon:
-            if first[which[r]] == tendon or second[which[r]] == tendon:
-                found += abs(force[r])
+            found[first[which[r]]] += abs(force[r])
+            if second[which[r]] >= 0:
+                found[second[which[r]]] += abs(force[r])
     return found
 
 
@@ -130,7 +133,7 @@ def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, pl
 def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any, force: Any) -> None:
     """Fill in the force of a contact on its second geom, world frame, N."""
     exerted, frame = numbers(d, of.efc_force), numbers_at(one + contact.frame)
-    dim, kind = integers_at(one + contact.dim)[0], integers(d, of.efc_type)[row]
+    dim, kind = integers_at(one + contact.dim)[0], integer_in(d, of.efc_type, row)
     normal, across, along = exerted[row], 0.0, 0.0
     if kind == kinds.elliptic:
         across, along = exerted[row + 1], exerted[row + 2] if dim > 2 else 0.0

@@ -24,22 +24,59 @@ def _pointer(typing_context: Any, address: Any) -> Any:
     return numba.types.voidptr(address), generate
 
 
+def _loader(kind: Any) -> Any:
+    """Return a function that reads one number at an address: arrays cost more than what is done with their numbers."""
+
+    @_intrinsic
+    def load(typing_context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
+
+        return kind(address), generate
+
+    return load
+
+
+_load_number, _load_int, _load_word = (
+    _loader(each) for each in (numba.types.float64, numba.types.int32, numba.types.int64)
+)
+_load_flag = _loader(numba.types.uint8)
+
+
 @compiled
 def size(owner: Any, offset: Any) -> Any:
     """Return a number of mjtSize, or an address."""
-    return _array(_pointer(owner + offset), 1, np.int64)[0]
+    return _load_word(owner + offset)
 
 
 @compiled
 def integer(owner: Any, offset: Any) -> Any:
     """Return a number of int."""
-    return _array(_pointer(owner + offset), 1, np.int32)[0]
+    return np.int64(_load_int(owner + offset))
 
 
 @compiled
 def number(owner: Any, offset: Any) -> Any:
     """Return a number of mjtNum."""
-    return _array(_pointer(owner + offset), 1, np.float64)[0]
+    return _load_number(owner + offset)
+
+
+@compiled
+def number_in(owner: Any, offset: Any, index: Any) -> Any:
+    """Return a number of an array of mjtNum."""
+    return _load_number(_load_word(owner + offset) + 8 * index)
+
+
+@compiled
+def integer_in(owner: Any, offset: Any, index: Any) -> Any:
+    """Return a number of an array of int."""
+    return np.int64(_load_int(_load_word(owner + offset) + 4 * index))
+
+
+@compiled
+def flag_in(owner: Any, offset: Any, index: Any) -> Any:
+    """Return a number of an array of mjtBool or char."""
+    return _load_flag(_load_word(owner + offset) + index)
 
 
 # Arrays are read as far as an index of MuJoCo's leads, so that their lengths are not asked for.

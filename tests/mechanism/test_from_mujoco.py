@@ -71,6 +71,39 @@ def test_accelerations_are_mujoco_s_without_its_constraints(name):
             np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
 
 
+@pytest.mark.parametrize("flag", ["spring", "damper", "actuation", "frictionloss", "clampctrl"])
+def test_flags_of_a_model_are_obeyed(flag):
+    """Where a flag switches something off in MuJoCo, it is off here: forces at one state."""
+    text = ROUTED.replace('contact="disable"', f'contact="disable" {flag}="disable"')
+    model, random = mujoco.MjModel.from_xml_string(text), np.random.default_rng(5)
+    finger = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH).finger
+    hand, data = fp.Hand(finger), mujoco.MjData(model)
+    data.qpos, data.qvel = [0.2, 0.5, 0.012], 0.3 * random.normal(size=model.nv)
+    data.ctrl = [0.7, 3.0, -1.5]
+    mujoco.mj_forward(model, data)
+    given = [] if flag == "actuation" else inputs(hand, model, data.ctrl)
+    found = hand.evaluate(hand.rest_state(data.qpos, data.qvel), given)
+    np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
+    assert any("disabled" in line for line in finger.tree.left_out) == (flag == "actuation")
+
+
+def test_actuators_that_are_disabled_delayed_or_of_other_kinds_are_listed_and_the_others_keep_their_controls():
+    text = ROUTED.replace("<option ", '<option actuatorgroupdisable="3" ')
+    text = text.replace('name="servo"', 'name="servo" group="3"').replace(
+        'name="pull"', 'name="pull" delay="0.01" nsample="8"'
+    )
+    listed = fp.from_mujoco(mujoco.MjModel.from_xml_string(text)).tree.left_out
+    assert "actuator servo: its group 3 is disabled in the model" in listed
+    assert "actuator pull: its control is delayed" in listed
+    spec = mujoco.MjSpec.from_string(ROUTED)
+    motor = spec.add_actuator(name="dc", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="j2")
+    motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_DCMOTOR, mujoco.mjtBias.mjBIAS_DCMOTOR
+    motor.gainprm[:2], motor.dynprm[:] = (1.0, 0.1), 0.0
+    described = fp.from_mujoco(spec.compile())
+    assert "actuator dc: its gain is not constant, but of kind dcmotor" in described.tree.left_out
+    assert described.tree.actuators["servo"].input_range == (-1.0, 1.0)
+
+
 def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
     model = MODELS["routed"]()
     model.jnt_limited[:] = 0

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from mujoco_models import ROUTED
 
 import finger_pin as fp
 from finger_pin.commands.validation import mujoco_motion
@@ -235,6 +236,16 @@ def test_a_joint_without_a_link_is_an_error_that_names_it():
     with pytest.raises(InputError) as caught:
         to_mjcf(finger.model_copy(update={"joints": joints}))
     assert caught.value.entry == "finger.joints.distal.link"
+
+
+def test_what_is_no_finger_of_links_is_refused_by_name():
+    for given, entry in (
+        (fp.load_scenario("fig6"), "description"),
+        (fp.from_mujoco(mujoco.MjModel.from_xml_string(ROUTED)), "finger.tree"),
+    ):
+        with pytest.raises(InputError) as caught:
+            fp.to_mjcf(given)
+        assert caught.value.entry == entry
 
 
 def test_the_export_needs_no_mujoco():

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound, bound_at
+from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound, bound_at
+from finger_pin.core.compilation import Unit
 
 
 class Inner(NamedTuple):
