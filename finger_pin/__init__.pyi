@@ -5,6 +5,7 @@ from . import learning as learning
 from . import mujoco as mujoco
 from . import studies as studies
 from . import views as views
+from .analysis.linearise import linearise as linearise
 from .description.loading import list_scenarios as list_scenarios
 from .description.loading import load_finger as load_finger
 from .description.loading import load_hand as load_hand

@@ -1,0 +1,60 @@
+"""Linearisation against a mechanism written out, its matrix exponential, and differences of runs."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import finger_pin as fp
+
+STIFFNESS, DRAG = "finger.joints.drum.spring.stiffness", "finger.tendon_friction.drag"
+
+
+@pytest.fixture(scope="module")
+def drum():
+    """A drum held by a tendon of 4 N against its spring of 0.2 N m/rad, at rest at 0.4 rad."""
+    rubbing = {"coulomb": 1e-3, "stiction": 1e-3, "viscous": 2e-3}
+    scenario = fp.load_scenario("canal", {"finger.tendon_friction.coulomb": 0.2, "finger.joint_friction": rubbing})
+    return scenario, fp.Finger(scenario.finger).rest_state(np.array([0.4]))
+
+
+def test_the_matrices_are_those_of_the_equations_written_out(drum):
+    """J theta'' = r (f^a - F^s) - k theta - (c + r^2 b) theta' - T^s, F^s' = s0 r theta', T^s' = s_j theta'."""
+    scenario, x = drum
+    finger = fp.Finger(scenario.finger)
+    found = fp.linearise(scenario, x, [4.0], parameters=[STIFFNESS, DRAG])
+    inertia = finger.rigid_body.mass_matrix(np.array([0.4]))[0, 0]
+    a = np.zeros((4, 4))
+    a[0, 1] = 1.0
+    a[1] = np.array([-0.2, -2e-3, -0.02, -1.0]) / inertia
+    a[2:, 1] = 5e4 * 0.02, 5.0
+    np.testing.assert_allclose(found.A, a, rtol=1e-8, atol=1e-6)
+    np.testing.assert_allclose(found.B[:, 0], [0.0, 0.02 / inertia, 0.0, 0.0], rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(found.E[:, 0], [0.0, -0.4 / inertia, 0.0, 0.0], rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(found.E[:, 1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.rate, 0.0, atol=1e-9)
+    tension = found.sel(output="tendon_tension.T1")
+    np.testing.assert_allclose([*tension.C, *tension.D], [0.0, 0.0, -1.0, 0.0, 1.0], atol=1e-7)
+    np.testing.assert_allclose(found.C.sel(output="fingertip_position.y")[0], 0.04 * np.cos(0.4), rtol=1e-8)
+
+
+def test_the_map_over_a_step_is_the_matrix_exponential_at_rest(drum):
+    scenario, x = drum
+    lin = fp.linearise(scenario, x, [4.0], parameters=[STIFFNESS])
+    step = fp.linearise(scenario, x, [4.0], dt=2e-3, parameters=[STIFFNESS])
+    further = np.concatenate([lin.B.values, lin.E.values], axis=1)
+    whole = expm(2e-3 * np.block([[lin.A.values, further], [np.zeros((2, 6))]]))
+    scale = np.abs(whole[:4]).max(axis=1, keepdims=True)
+    found = np.concatenate([step.A.values, step.B.values, step.E.values], axis=1)
+    np.testing.assert_allclose(found / scale, whole[:4] / scale, atol=2e-5)
+
+
+def test_what_cannot_be_linearised_is_refused(drum):
+    scenario, x = drum
+    for arguments, said in (
+        ((scenario, x[:-1], [4.0]), "must be 4 finite numbers"),
+        ((scenario, x, [4.0], -1.0), "must be above 0"),
+        ((fp.Finger("planar"), np.zeros(9), np.ones(3), None, ["finger.gravity"]), "are those of a scenario"),
+        ((scenario, x, [4.0], None, ["finger.gravity"]), "must be a single number"),
+    ):
+        with pytest.raises(fp.InputError, match=said):
+            fp.linearise(*arguments)
