@@ -132,7 +132,7 @@ class ClosedLoop:
             reference=choose_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
-            palm=PalmPath.of(scenario.hand, start),
+            palm=PalmPath.of(scenario.hand, start, finger),
             guides=Guides.of(finger, start),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
@@ -159,6 +159,8 @@ class ClosedLoop:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
         x = self.finger.rest_state(position, velocity, tension)
+        if self.palm is not None:
+            return self.palm.put(self.finger, x)
         return x if self.guides is None else self.guides.place(self.finger, x)
 
     def compiled(self) -> ClosedLoop:

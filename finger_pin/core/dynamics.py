@@ -166,7 +166,8 @@ def evaluate(model: Any, address: int, time: float) -> None:
     for j in range(size, width):
         work.acceleration[j] = work.torque[j] / tables.lumps[j - size]
     if work.guide.size > 0:
-        signal_derivatives(control.guide, time, 2, work.guide)
+        if control.palm.harmonics.shape[0] == 0:
+            signal_derivatives(control.guide, time, 2, work.guide)
         for j in range(width):
             if tables.guided[j] >= 0:
                 work.acceleration[j] = work.guide[tables.guided[j]]

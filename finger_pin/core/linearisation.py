@@ -193,7 +193,8 @@ def linearise(model: Any, address: int, time: float) -> None:
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
-    signal_derivatives(control.guide, time, 3, work.guide_rate)
+    if control.palm.harmonics.shape[0] == 0:
+        signal_derivatives(control.guide, time, 3, work.guide_rate)
     if tables.loaded:
         tip_forces(control, time, 1, work.force_rate)
     for g in range(tables.groups.shape[0]):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.hand import PathSignal
+from finger_pin.description.hand import Palm, PathSignal
 from finger_pin.description.routing import Array
 from finger_pin.description.surface import MILLIMETRES, SIZES, Surface, check_sizes, sizes_of
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
@@ -37,6 +38,9 @@ class Object(Description):
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1e3, 1e3)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Quaternion x, y, z, w of any length; likewise."
+    )
+    frame: Annotated[Literal["palm", "world"], choice("palm", "world")] = quantity(
+        "palm", unit="1", source="chosen", doc="Where a fixed object stands, also while the palm moves: palm or world."
     )
     mass: Annotated[float, real(0.0, 100.0, above=True, hint=" kg (is it in grams?)")] | None = quantity(
         None, unit="kg", source="design", doc="Of a solid of even density that is free to move; fixed without one."
@@ -74,6 +78,8 @@ class Object(Description):
             raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
         if self.shape == "half_space" and self.mass is not None:
             raise problem("mass", "a half-space is fixed; leave it out", self.mass)
+        if self.frame == "world" and (self.mass is not None or self.path):
+            raise problem("frame", "is for fixed objects: leave out mass and path", self.frame)
         if self.path is not None and self.mass is not None:
             raise problem("path", "is for objects without a mass: what is free to move goes where it is pushed")
         if self.mass is None and (any(self.velocity) or any(self.angular_velocity)):
@@ -121,3 +127,12 @@ class Object(Description):
         across = middle * (3.0 * radius**2 + length**2) / 12.0
         across += ball * (0.4 * radius**2 + length**2 / 4.0 + 3.0 * length * radius / 8.0)
         return across, across, middle * radius**2 / 2.0 + ball * 0.4 * radius**2
+
+
+def check_standing(objects: Mapping[str, Object], palm: Palm) -> None:
+    """Refuse objects that stand in the world around a palm that turns."""
+    turns = any(palm.on_path(name).kind != "sine" or palm.on_path(name).amplitude for name in ("roll", "pitch", "yaw"))
+    for name, each in objects.items():
+        if each.frame == "world" and palm.path is not None and turns:
+            allowed = "is for a palm that does not turn: roll, pitch and yaw of hand.palm.path may have offsets alone"
+            raise problem(f"environment.objects.{name}.frame", allowed, "world")

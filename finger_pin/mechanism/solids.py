@@ -17,6 +17,7 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Placed, rotation
 
 # A link's own z axis runs along it, which is the x axis of its joint.
+_SLIGHT = 1e-9
 _ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
@@ -135,8 +136,11 @@ def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:
     """Return objects; those that move are carried by the joints that `add_free_objects` has made."""
+    joint_of = {name: f"{name}_attitude" for name in objects}
     return [
-        object_solid(name, each, int(body.model.getJointId(f"{name}_attitude")) if each.moves else 0)
+        object_solid(
+            name, each, int(body.model.getJointId(joint_of[name])) if body.model.existJointName(joint_of[name]) else 0
+        )
         for name, each in objects.items()
     ]
 
@@ -160,21 +164,23 @@ def object_solid(name: str, described: Object, joint: int) -> Solid:
     return solid if joint else replace(solid, range=solid.reach)
 
 
-def add_free_objects(body: RigidBody, objects: Mapping[str, Object]) -> RigidBody:
+def add_free_objects(body: RigidBody, objects: Mapping[str, Object], standing: bool = False) -> RigidBody:
     """Return a rigid body with those of some objects that are free or moved as further bodies, after its joints.
+
+    So are those that stand in the world, if the palm moves.
 
     Each is a translation joint with the name of the object, at the origin of the base, and a spherical one, whose name
     ends in ``_attitude``, that carries it.
     """
     model = pin.Model(body.model)
     for name, each in objects.items():
-        if each.moves:
+        if each.moves or (standing and each.frame == "world"):
             place = pin.SE3.Identity()
             moved = model.addJoint(0, pin.JointModelTranslation(), place, name)
             turned = model.addJoint(moved, pin.JointModelSpherical(), place, f"{name}_attitude")
-            # Of one that is moved any will do.
-            moments = np.ones(3) if each.mass is None else each.inertia
-            model.inertias[turned] = pin.Inertia(each.mass or 1.0, np.zeros(3), np.diag(moments))
+            # Of one that is led any will do, if it is too little to count.
+            moments = np.full(3, _SLIGHT) if each.mass is None else each.inertia
+            model.inertias[turned] = pin.Inertia(each.mass or _SLIGHT, np.zeros(3), np.diag(moments))
     extended = RigidBody(model, [model.frames[tip].name for tip in body.tips])
     count = body.model.njoints
     extended.proximal_axes[:count], extended.carriers[:count] = body.proximal_axes, body.carriers

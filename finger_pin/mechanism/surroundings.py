@@ -68,7 +68,7 @@ class Surroundings:
         Raises:
             InputError: If an object has the name of a joint or a shape, or a link has no size.
         """
-        extended, tree = add_free_objects(mechanism.body, objects), description.tree
+        extended, tree = add_free_objects(mechanism.body, objects, mechanism.moved), description.tree
         if tree is not None and placed is not None:
             own = tree_solids(tree, placed, extended)
         else:
@@ -78,7 +78,7 @@ class Surroundings:
                 if name in taken:
                     raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
         solids = [*own, *object_solids(objects, extended)]
-        free = {name: each for name, each in objects.items() if each.moves}
+        free = {name: each for name, each in objects.items() if extended.model.existJointName(f"{name}_attitude")}
         for name, each in free.items():
             if each.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
@@ -95,7 +95,7 @@ class Surroundings:
         rows = [table.spread(places, bodies + lumps) for table in mechanism.rows]
         lumps_of = mechanism.lumps, mechanism.inertia
         guided = np.full(bodies + lumps, -1)
-        led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.path]
+        led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
         for number, first in enumerate(led):
             guided[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
         return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, guided)

@@ -88,6 +88,8 @@ class Variable(NamedTuple):
         units: SI.
         long_name: In words.
         equation: Number of its equation in the paper; empty for none.
+        frame: Whose axes its components are along: ``base``, a palm's if there is one, ``world`` or ``object``; empty
+            for what has no components.
     """
 
     dims: tuple[str, ...]
@@ -95,11 +97,12 @@ class Variable(NamedTuple):
     units: str
     long_name: str
     equation: str = ""
+    frame: str = ""
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Unit, name and equation."""
-        found = {"units": self.units, "long_name": self.long_name}
+        """Unit, name, frame and equation."""
+        found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
         return found | {"equation": f"({self.equation})"} if self.equation else found
 
 
@@ -232,7 +235,17 @@ def variables(loop: ClosedLoop) -> dict[str, Variable]:
         ),
         SHORTFALL: Variable(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
-    return table | _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _more(loop)
+    table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _more(loop)
+    return {name: each._replace(frame=_frame(name, each, loop)) for name, each in table.items()}
+
+
+def _frame(name: str, variable: Variable, loop: ClosedLoop) -> str:
+    """Return the frame of a variable with components: the base's by default."""
+    if not {"axis", "quaternion"} & set(variable.dims):
+        return ""
+    if name.startswith("palm_") or (name == "fingertip_position" and loop.palm is not None):
+        return "world"
+    return "object" if name == "object_angular_velocity" else "base"
 
 
 def _more(loop: ClosedLoop) -> dict[str, Variable]:
