@@ -6,6 +6,7 @@ table of arrays into one block, from which `bound_at` reads them back at no cost
 
 from __future__ import annotations
 
+import ctypes
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
@@ -23,6 +24,7 @@ class Numbers(NamedTuple):
     dimensions: int
 
 
+_DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 Vector = Annotated[Array, Numbers("float64", 1)]
 Matrix = Annotated[Array, Numbers("float64", 2)]
 Layers = Annotated[Array, Numbers("float64", 3)]
@@ -70,16 +72,24 @@ def call(unit: Unit, table: Any, kind: Kind) -> int:
     return unit(block.ctypes.data)
 
 
+def _address(array: NDArray[Any]) -> int:
+    """Return where the numbers of an array lie."""
+    if array.size and array.flags.writeable:
+        # Sooner than NumPy says it itself.
+        return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
+    return int(array.ctypes.data)
+
+
 def _write(value: Any, kind: Any, words: list[int]) -> None:
     if isinstance(kind, Kind):
         for part, own in zip(value, kind.fields.values(), strict=True):
             _write(part, own, words)
     elif isinstance(kind, Numbers):
         fitting = isinstance(value, np.ndarray) and value.ndim == kind.dimensions and value.flags.c_contiguous
-        if not fitting or value.dtype != np.dtype(kind.dtype):
+        if not fitting or value.dtype != _DTYPES[kind.dtype]:
             raise TypeError(f"{value!r} cannot be bound as {kind}")
         # The words of an array: number of items, size of an item, address, sizes, strides.
-        words += (value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+        words += (value.size, value.itemsize, _address(value), *value.shape, *value.strides)
     elif isinstance(value, bool | int) and kind in (int, bool):
         words.append(int(value))
     elif isinstance(value, float) and kind is float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from finger_pin.core.law_code import inlined
 from finger_pin.core.rigid_body import ROTATION
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
+
+_KNOWN: WeakKeyDictionary[Mechanism, Charts] = WeakKeyDictionary()
 
 
 def place(frame: Any, q: Any, body: Any) -> None:
@@ -131,6 +134,12 @@ class Charts:
     @classmethod
     def of(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
+        if mechanism not in _KNOWN:
+            _KNOWN[mechanism] = cls._of(mechanism)
+        return _KNOWN[mechanism]
+
+    @classmethod
+    def _of(cls, mechanism: Mechanism) -> Charts:
         model, width = mechanism.body.model, mechanism.coordinates
         spheres = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
         packed, core = np.ones(mechanism.size, dtype=bool), np.ones(2 * width + mechanism.state_count, dtype=bool)

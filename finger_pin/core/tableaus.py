@@ -8,6 +8,7 @@ in the form that OrdinaryDiffEq.jl publishes.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ def _lower(*rows: list[float]) -> Array:
     return matrix
 
 
+@cache
 def rodas4() -> Tableau:
     """Return Rodas4: 6 stages, order 4(3), cubic interpolant."""
     last = [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950]
@@ -80,6 +82,7 @@ def rodas4() -> Tableau:
     )
 
 
+@cache
 def rodas5p() -> Tableau:
     """Return Rodas5P: 8 stages, order 5(4), quartic interpolant."""
     last = [-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946]

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array, Routing
 from finger_pin.exceptions import InputError
+
+_COUPLINGS: Remembered[PassiveCoupling] = Remembered()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,11 @@ class PassiveCoupling:
         Raises:
             InputError: If two passive tendons would determine the same joint.
         """
+        parts = (routing, tension.tobytes(), stiffness.tobytes())
+        return _COUPLINGS.of(parts, partial(cls._from_routing, routing, tension, stiffness))
+
+    @classmethod
+    def _from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
         size = len(routing.joints)
         rows, followers = [], []
         for index, row in enumerate(routing.coupling[routing.actuated :]):
