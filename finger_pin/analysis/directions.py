@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.tendons import Tendons
+
+# A mean nearer to the origin than this is there: rows of length one cancel but for rounding.
+_TOUCHING = 1e-7
 
 
 def sliding_velocity(tendons: Tendons, velocity: Array) -> Array:
@@ -20,26 +24,40 @@ def sliding_velocity(tendons: Tendons, velocity: Array) -> Array:
 def directions_of_motion(tendons: Tendons, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return every way in which the given joints can move: signs of joints, shape (m, n), and tendons, shape (m, t)."""
     columns = sliding_velocity(tendons, np.eye(len(moving))).T
+    return _ways(columns.tobytes(), columns.shape, tuple(moving.tolist()))
+
+
+# Of the postures of one finger, most have the same.
+@lru_cache(maxsize=16)
+def _ways(columns: bytes, shape: tuple[int, int], moving: tuple[bool, ...]) -> tuple[Array, Array]:
+    speeds, moves = np.frombuffer(columns).reshape(shape), np.array(moving)
     signs, sliding = [], []
-    for chosen in product((1.0, -1.0), repeat=int(moving.sum())):
-        sign = np.zeros(len(moving))
-        sign[moving] = chosen
-        turns = columns * sign
+    for chosen in product((1.0, -1.0), repeat=int(moves.sum())):
+        sign = np.zeros(len(moves))
+        sign[moves] = chosen
+        turns = speeds * sign
         options = [
             [side for side, any_such in ((1.0, (row > 0.0).any()), (-1.0, (row < 0.0).any())) if any_such] or [0.0]
             for row in turns
         ]
         unsure = np.array([len(option) > 1 for option in options])
+        undecided = turns[unsure][:, moves]
+        undecided = undecided / np.linalg.norm(undecided, axis=1, keepdims=True)
         for slide in product(*options):
-            # Speeds x >= 1 exist at which the tendons whose direction the joints leave open slide these ways.
-            rows = -(np.array(slide)[:, None] * turns)[unsure]
-            bounds = [(1.0, None) if moves else (0.0, 0.0) for moves in moving]
-            if unsure.any():
-                # Any positive slack will do, since the speeds may be scaled.
-                lengths = np.abs(rows).sum(axis=1)
-                found = scipy.optimize.linprog(np.ones(len(moving)), rows, -lengths * 1e-6, bounds=bounds)
-                if found.status != 0:
-                    continue
-            signs.append(sign)
-            sliding.append(slide)
+            if _possible(np.array(slide)[unsure, None] * undecided):
+                signs.append(sign)
+                sliding.append(slide)
     return np.array(signs), np.array(sliding)
+
+
+def _possible(turns: Array) -> bool:
+    """Return whether positive speeds x exist with turns @ x > 0, rows of length one.
+
+    They do if and only if no y >= 0 but zero has turns^T y_1 + y_2 = 0 (Gordan, Mathematische Annalen 6, 1873): if the
+    origin is at a distance from all means of these rows and of the unit vectors.
+    """
+    if not len(turns):
+        return True
+    rows = np.concatenate([turns, np.eye(turns.shape[1])])
+    means = np.concatenate([rows.T, np.ones((1, len(rows)))])
+    return float(scipy.optimize.nnls(means, np.eye(len(means))[-1])[1]) > _TOUCHING

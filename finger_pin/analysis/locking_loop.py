@@ -219,6 +219,41 @@ class FrictionLoop:
                 break
         return command
 
+    def greatest_command(self, position: Array, weights: Array, sliding: Array, minimum: Array, weight: Array) -> Array:
+        """Return the largest command of an actuated tendon, shape (m,), N, in k ways of sliding, with n + 1 tendons.
+
+        The balance has one kernel: f = f_0 + l k, delivered by tendons and, of passive ones, the mean. f_hat is f over
+        the shares that arrive, and l the least at which all of it is at f0 or above; without a positive kernel it
+        locks. All ways must slide passive tendons alike.
+
+        Args:
+            position: theta, shape (m, n), rad.
+            weights: s M, signed friction coefficients of the joints, shape (n,), m.
+            sliding: sigma, shape (k, t).
+            minimum: f0, shape (t,), N.
+            weight: G, shape (m, n), N m.
+        """
+        routing, actuated = self.tendons.routing, self.tendons.routing.actuated
+        count, size = len(self.internal), len(position)
+        cases, own = (size, count), np.where(np.arange(count) < actuated, 0.0, sliding[0])
+        arriving = (
+            self._shares(position, np.broadcast_to(own, cases))[:, :, None] * routing.strand_tension(np.eye(count)).T
+        )
+        balance = (routing.strand_coupling.T - weights[:, None] * routing.loads) @ arriving
+        turned, lengths, axes = np.linalg.svd(balance)
+        kernel = axes[:, -1] * np.sign(axes[:, -1].sum(axis=1, keepdims=True))
+        base = np.einsum("mit,mi->mt", axes[:, :-1], np.einsum("mji,mj->mi", turned, weight) / lengths)
+        moves = np.all(kernel > _INSIDE * np.max(kernel, axis=1, keepdims=True), axis=1)
+        found = np.where(moves, 0.0, np.inf)
+        kernel, base, at = kernel[moves], base[moves], position[moves]
+        share = np.ones_like(base)
+        for way in sliding if moves.any() else ():
+            share[:, :actuated] = self._shares(at, np.broadcast_to(way, base.shape))[:, :actuated]
+            least = np.max((minimum * share - base) / kernel, axis=1, keepdims=True)
+            needed = ((base + least * kernel) / share)[:, :actuated]
+            found[moves] = np.maximum(found[moves], needed.max(axis=1))
+        return found
+
     def _shares(self, position: Array, sliding: Array) -> Array:
         """Return the tension of every strand over the command or the mean tension of its tendon, shape (m, s)."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated

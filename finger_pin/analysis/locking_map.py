@@ -25,8 +25,8 @@ class SelfLockingMap(BriefRepr):
     Attributes:
         joints: Names of the joints.
         angles: Of every one of them, shape (a,) and (b,), rad.
-        coefficient: M_crit, shape (a, b), m. It varies only where the friction of a passive tendon does, so for
-            passive tendons whose canals no joint bends it is the same everywhere.
+        coefficient: M_crit, shape (a, b), m. With one tendon more than joints it varies only where the friction of a
+            passive tendon does, so for passive tendons whose canals no joint bends it is the same everywhere.
         tension: Largest tension that the controller commands while the finger moves slowly, under its own friction
             and weight, in the direction that needs most, shape (a, b), N; infinite where it locks.
         tip: Fingertip position, shape (a, b, 3), m, base frame. Of one joint all these lack the second dimension.
@@ -94,20 +94,32 @@ def self_locking_map(
     minimum = expand(minimum_tension, len(routing.tendons))
     loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
     coefficient, tension = np.full(len(flat), np.inf), np.zeros(len(flat))
-    # The friction of actuated tendons scales columns of the balance in f, and leaves where f_i = 0 as it was.
-    passive = np.where(np.arange(len(routing.tendons)) < routing.actuated, 0.0, sliding)
-    locking = np.unique(np.hstack([signs, passive]), axis=0)
-    curved = np.abs(flat) @ routing.curvature_matrix[routing.actuated :].T
+    alone = len(routing.tendons) == len(base) + 1
+    counted = slice(None)
+    if alone:
+        # The friction of actuated tendons scales columns of the balance in f, and leaves where f_i = 0 as it was. With
+        # more tendons not every f is commanded, and what is commanded it shifts.
+        counted = slice(routing.actuated, None)
+    mattering = np.zeros_like(sliding)
+    mattering[:, counted] = sliding[:, counted]
+    locking = np.unique(np.hstack([signs, mattering]), axis=0)
+    curved = np.abs(flat) @ routing.curvature_matrix[counted].T
     _, first_of, same = np.unique(curved.round(12), axis=0, return_index=True, return_inverse=True)
     for case in locking:
         sign = np.broadcast_to(case[: len(base)], flat.shape)
         slide = np.broadcast_to(case[len(base) :], (len(flat), len(routing.tendons)))
         kappa = loop.critical(flat[first_of], sign[first_of], slide[first_of])[0]
         coefficient = np.minimum(coefficient, kappa[same.reshape(-1)])
-    for sign, slide in zip(signs, sliding, strict=True):
-        cases = np.broadcast_to(slide, (len(flat), len(slide)))
-        command = loop.command_to_move(flat, np.broadcast_to(sign * static, flat.shape), cases, minimum, weight)
-        tension = np.maximum(tension, command[:, : routing.actuated].max(axis=1))
+    if alone:
+        for case in locking:
+            ways = sliding[np.all(np.hstack([signs, mattering]) == case, axis=1)]
+            command = loop.greatest_command(flat, case[: len(base)] * static, ways, minimum, weight)
+            tension = np.maximum(tension, command)
+    else:
+        for sign, slide in zip(signs, sliding, strict=True):
+            cases = np.broadcast_to(slide, (len(flat), len(slide)))
+            command = loop.command_to_move(flat, np.broadcast_to(sign * static, flat.shape), cases, minimum, weight)
+            tension = np.maximum(tension, command[:, : routing.actuated].max(axis=1))
     tips = [finger.rigid_body.tip_position(theta) for theta in flat]
     return SelfLockingMap(
         joints=chosen,

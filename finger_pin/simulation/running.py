@@ -191,7 +191,7 @@ def run(
     check_memory(scenario.simulation, loop.finger)
     driving = micro_damping_advice(scenario.finger)
     if driving:
-        warnings.warn(driving, MicroDampingWarning, stacklevel=3)
+        warnings.warn(driving, MicroDampingWarning, stacklevel=5)
     setup = Setup.of(scenario, loop, own, control_period)
     loop = setup.loop
 
@@ -217,7 +217,7 @@ def run(
     margin = _margin(scenario, loop, own)
     close = locking_advice(math.inf if margin is None else margin)
     if close:
-        warnings.warn(close, SelfLockingWarning, stacklevel=3)
+        warnings.warn(close, SelfLockingWarning, stacklevel=5)
     closed = close_account(scenario, first, repeated, recorded)
     trajectory, recording = closed.trajectory, closed.result
     reached = float(trajectory.breakpoints[-1])
@@ -225,7 +225,7 @@ def run(
     slow = ringing(loop, trajectory)
     inaccurate = inaccurate or too_stiff(recording, loop.finger, scenario.simulation.atol_scale)
     if inaccurate:
-        warnings.warn(inaccurate, AccuracyWarning, stacklevel=3)
+        warnings.warn(inaccurate, AccuracyWarning, stacklevel=5)
     if margin is not None:
         recording.attrs["self_locking_margin"] = margin
     if np.isfinite(error):

@@ -158,6 +158,25 @@ def test_map_varies_where_joints_bend_the_canal_of_a_passive_tendon(ub, finger):
     assert np.ptp(bent.coefficient, axis=0).max() < 1e-9
 
 
+def test_the_map_of_a_redundant_finger_has_what_each_posture_has_alone():
+    """Of more tendons than joints and one the friction of actuated ones matters."""
+    radii = [[0.006, 0.0], [-0.004, 0.005], [0.003, -0.006], [-0.005, -0.004], [0.002, 0.007]]
+    tendons = {
+        f"T{k}": {
+            "curvature_offset": 0.5,
+            "crossings": {f"j{j}": {"radius": r, "bends": True} for j, r in enumerate(row)},
+        }
+        for k, row in enumerate(radii)
+    }
+    link = {"length": 0.03, "width": 0.01, "mass": 0.01, "centre_of_mass": 0.015, "transverse_inertia": 1e-6}
+    joints = {f"j{j}": {"range": [-0.5, 1.0], "link": link} for j in range(2)}
+    finger = fp.Finger(fp.FingerDescription.model_validate({"name": "x", "joints": joints, "tendons": tendons}))
+    found = self_locking_map(finger, samples=3)
+    grid = [critical_friction(finger, [a, b]).coefficient for a, b in product(*found.angles)]
+    np.testing.assert_allclose(found.coefficient.ravel(), grid, rtol=1e-9)
+    assert np.ptp(grid) > 0.01 * min(grid)
+
+
 def test_a_finger_beyond_the_critical_coefficient_can_nowhere_be_moved():
     stuck = self_locking_map(fp.Finger(fp.load_finger("ub", STUCK)), samples=3)
     assert stuck.coefficient.max() < stuck.actual

@@ -67,4 +67,5 @@ def test_the_swing_moves_all_joints_their_amplitudes_in_the_directions_that_lock
         SignalReference.from_scenario(swing, routing).at(t).position for t in (0.0, swing.simulation.duration)
     )
     np.testing.assert_allclose(np.abs(end - start), np.deg2rad([16.0, 50.0, 50.0, 35.0]), rtol=1e-6)
-    assert abs(np.sign(end - start) @ [1, 1, -1, -1]) == 4
+    # Abduction may go either way: T1 and T2 are mirror images.
+    assert abs(np.sign(end - start)[1:] @ [1, -1, -1]) == 3
