@@ -6,7 +6,7 @@ import copy
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,6 +20,7 @@ from finger_pin.description.reading import (
     Table,
     as_name,
     as_table,
+    is_path,
     merge,
     read_scenario_file,
     resolve_signals,
@@ -99,9 +100,18 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     Raises:
         InputError: Naming the entry that is wrong.
     """
+    if not overrides and not is_path(str(name)):
+        return _shipped_scenario(str(name))
     overrides = from_here(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
         return _scenario(*read_scenario_file(str(name), Path()), str(name), overrides)
+
+
+@cache
+def _shipped_scenario(name: str) -> Scenario:
+    """Return a scenario that ships; it is frozen, so that all may have the same one."""
+    with _depth_limited("scenario"):
+        return _scenario(*read_scenario_file(name, Path()), name, {})
 
 
 def load_bench(

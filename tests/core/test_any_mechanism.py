@@ -7,10 +7,13 @@ import pytest
 from core_cases import Bound, relative
 from random_mechanisms import kinds_of, random_mechanism, random_states
 
+import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.control import held_control
 from finger_pin.core.evaluation import CompiledMechanism
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import integrate
+from finger_pin.description.family import Family
 from finger_pin.mechanism.mechanism import Mechanism
 
 #: Sixth-order central differences: where to look, in steps, and weights.
@@ -145,3 +148,21 @@ def test_the_textbook_and_the_compiled_integrators_read_the_same_tables():
         assert np.abs(after - before).max() > 1e-4, table.law.name
         for each in compiled:
             np.testing.assert_allclose(each, after, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["fig6", "servo", "press"])
+def test_a_finger_whose_parameters_were_changed_evaluates_alike_in_both(name):
+    """Half of the finger's numbers, drawn anew around what they were, as prepared runs change them."""
+    rng, scenario = np.random.default_rng(3), fp.load_scenario(name)
+    table = scenario.finger.model_dump(mode="python", exclude_none=True)
+    groups = ("tendon_friction", "joint_friction", "passive_tendon", "stroke_limiter")
+    numbers = [(group, each) for group in groups for each, held in table[group].items() if isinstance(held, float)]
+    keys = [f"finger.{group}.{each}" for group, each in numbers if each != "stribeck_exponent" and rng.random() < 0.5]
+    family = Family(scenario, [*keys, "finger.joints.distal.link.length", "finger.joints.medial.link.mass"])
+    before = ClosedLoop.from_scenario(scenario).finger
+    changed = family.at([value * rng.uniform(1.0, 1.2) + 1e-9 for value in family.values])
+    mechanism = ClosedLoop.from_scenario(changed).finger.mechanism
+    x, command = random_states(mechanism, rng, 6), rng.uniform(0.0, 3.0, mechanism.channels)
+    found = CompiledMechanism(mechanism).evaluate(x, command)
+    assert_same(found, mechanism.evaluate(x, command), mechanism)
+    assert relative(found.rate, before.mechanism.evaluate(x, command).rate) > 1e-6
