@@ -47,6 +47,7 @@ from finger_pin.simulation.accuracy import (
 )
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import Motions, record
+from finger_pin.simulation.starting import check_motors
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -91,14 +92,15 @@ class Setup:
             control_period: As for `simulate`.
 
         Raises:
-            InputError: If the method cannot sample, the controller must be sampled, bodies overlap at the start, or a
-                user's own controller answers wrongly.
+            InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
+                a motor turns too fast at the start, or a user's own controller answers wrongly.
         """
         method = scenario.simulation.method
         loop = loop or ClosedLoop.from_scenario(scenario)
-        if loop.start is None and loop.finger.actuators.names:
+        if loop.finger.actuators.names:
             # Before the controller is sampled: then it must not be asked for a start.
             loop = replace(loop, start=loop.initial_state())
+            check_motors(loop.finger, loop.initial_state())
         if loop.finger.surroundings is not None:
             start = loop.finger.layout.unpack(loop.initial_state())
             assert start.object_pose is not None

@@ -151,6 +151,20 @@ def test_a_simulator_records_the_voltages_that_it_was_told_of_either_sign():
     assert float(np.abs(result["energy_residual"]).max()) < 1e-5 * supplied
 
 
+def test_a_start_at_which_a_motor_would_leave_its_supply_is_refused():
+    """At its limit of 1.5 A a motor of 5 V, 3 Ohm and 0.4 N m/A induces 9.5 V at most: 23.75 rad/s."""
+    made = finger(SMOOTH, drive="position")
+    x = made.rest_state([0.0])
+    short = scenario(made, 0.005)
+    for speed, refused in ((23.7, False), (-23.8, True)):
+        made.layout.unpack(x).motor_velocity[:] = speed
+        if refused:
+            with pytest.raises(fp.InputError, match=r"motor servo must turn by at most 23.75 rad/s"):
+                fp.simulate(short, initial=x)
+        else:
+            assert float(abs(fp.simulate(short, initial=x).motor_voltage).max()) <= 5.0 * (1.0 + 1e-9)
+
+
 def test_a_result_of_servos_is_continued_where_it_ended():
     whole = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.06}))
     first = fp.simulate(fp.load_scenario("servo", {"simulation.duration": 0.03}))
