@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import least_squares
+import scipy
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
@@ -93,12 +92,14 @@ def equilibrium(
             return float(np.max(np.abs(acceleration(scale * y) / scale))) - _ARRIVED * begun
 
         arrived.terminal = True  # type: ignore[attr-defined]
-        down = solve_ivp(
+        down = scipy.integrate.solve_ivp(
             lambda _, y: acceleration(scale * y) / scale, (0.0, _LONGEST), places / scale, "Radau", events=arrived,
             rtol=1e-6, atol=1e-9,
         )  # fmt: skip
         # Damped, so that it stays where the finger may rest anywhere.
-        polished = least_squares(lambda y: acceleration(scale * y) / scale, down.y[:, -1], method="lm", xtol=1e-15)
+        polished = scipy.optimize.least_squares(
+            lambda y: acceleration(scale * y) / scale, down.y[:, -1], method="lm", xtol=1e-15
+        )
         nearer = min((down.y[:, -1], polished.x), key=lambda y: np.max(np.abs(acceleration(scale * y) / scale)))
         places = scale * nearer
     left = float(np.max(np.abs(acceleration(places) / scale)))

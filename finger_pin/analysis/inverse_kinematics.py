@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.coupling import PassiveCoupling
@@ -89,7 +89,9 @@ def inverse_kinematics(
     for start in starts:
         # Strictly inside, as bounded least squares want it.
         inside = np.clip(start, low[free] + 1e-6 * span, high[free] - 1e-6 * span)
-        best = least_squares(misses, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        best = scipy.optimize.least_squares(
+            misses, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
+        )
         found.append((float(best.cost), moved @ best.x))
         if np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE:
             break

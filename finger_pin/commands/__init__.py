@@ -7,8 +7,7 @@ import os
 # short command's time.
 gc.set_threshold(2_000_000)
 
-# Matrices are small here: threads of their own take longer to start, and to wait for, than they save. And a process
-# without them can be copied.
+# Matrices are small here: threads of their own take longer to start, and to wait for, than they save.
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import warnings
-from contextlib import ExitStack, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from finger_pin.commands.console import Interrupts, complain, noted, print_text, progress_bar, talks
-from finger_pin.commands.imports import without
 from finger_pin.commands.options import Figures, Format, Quiet, ScenarioName, Settings, folder_name, overrides
-from finger_pin.commands.writing import NotDrawn, Writing
-from finger_pin.exceptions import IntegrationError, Interrupted, ScenarioWarning
+from finger_pin.exceptions import FingerPinError, IntegrationError, Interrupted, ScenarioWarning
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from finger_pin.description.scenario import Scenario
-    from finger_pin.simulation.recorded import Recording
     from finger_pin.simulation.results import ResultFolder
+
+
+class NotDrawn(FingerPinError):
+    """Figures or animation cannot be drawn; the data are kept."""
 
 
 def simulate(
@@ -49,13 +50,7 @@ def simulate(
     if listed:
         print_text(listing())
         return
-    with ExitStack() as stack:
-        interrupts = stack.enter_context(Interrupts())
-        stack.enter_context(without("dask", "xarray"))
-        # Both this process and the one that writes need it.
-        import numpy  # noqa: F401
-
-        writing = stack.enter_context(Writing(figures, format))
+    with Interrupts() as interrupts:
         from finger_pin.description.loading import load_scenario
         from finger_pin.simulation.convergence import tightened
         from finger_pin.simulation.results import ResultFolder
@@ -72,22 +67,22 @@ def simulate(
                 raise problem
             with noted("earlier results are as they were"):
                 with interrupts.patient():
-                    # After an interruption the data are kept, and the views are not drawn: that takes too long.
-                    summary = write(result, folder, writing, drawn=not interrupts.requested)
-                trouble = draw(result, folder, writing, interrupts)
+                    folder.write(result)
+                trouble = draw(result, folder, interrupts, figures, format)
                 problem = (problem or trouble) if interrupts.requested else (trouble or problem)
                 with interrupts.patient():
                     folder.publish()
         if not quiet:
-            print_text(f"{summary}\n\nResults are in {output}")
+            from finger_pin.views.summary import summarize
+
+            print_text(f"{summarize(result)}\n\nResults are in {output}")
         if problem is not None:
             problem.add_note(f"what was computed is in {output}")
             raise problem
         if view:
-            from finger_pin.simulation.recorded import as_dataset
             from finger_pin.views.viewer import view as show
 
-            show(as_dataset(result))
+            show(result)
 
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
@@ -111,9 +106,10 @@ def default_name(scenario: Scenario, settings: list[str], duration: str | None, 
 
 def compute(
     scenario: Scenario, interrupts: Interrupts, quiet: bool, live: bool, check: bool
-) -> tuple[Recording | xr.Dataset | None, BaseException | None]:
+) -> tuple[xr.Dataset | None, BaseException | None]:
     """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did."""
     from finger_pin.simulation.convergence import check_convergence
+    from finger_pin.simulation.recorded import as_dataset
     from finger_pin.simulation.running import run
 
     if live:
@@ -127,12 +123,11 @@ def compute(
         warnings.simplefilter("ignore", ScenarioWarning)
         observe = viewer.observe if viewer else None
         try:
-            result = run(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested)
+            whole = run(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested).dataset()
         except (IntegrationError, Interrupted) as error:
-            return error.result, error
+            return None if error.result is None else as_dataset(error.result), error
         if not check:
-            return result, None
-        whole = result.dataset()
+            return whole, None
         try:
             found = check_convergence(scenario, whole, progress=progress, stop=lambda: interrupts.requested)
             return found.attach(whole), None
@@ -144,46 +139,29 @@ def compute(
     return whole, None
 
 
-def write(result: Recording | xr.Dataset, folder: ResultFolder, writing: Writing, drawn: bool) -> str:
-    """Have the data written, and figures drawn beside if asked; return the summary."""
-    try:
-        writing.start(result, folder, drawn)
-        summary = writing.written()
-        if summary is None:
-            from finger_pin.simulation.recorded import as_dataset
-            from finger_pin.views.summary import summarize
-
-            whole = as_dataset(result)
-            folder.write(whole)
-            summary = summarize(whole)
-        return summary
-    except BaseException:
-        writing.stop()
-        raise
-
-
 def draw(
-    result: Recording | xr.Dataset, folder: ResultFolder, writing: Writing, interrupts: Interrupts
+    result: xr.Dataset, folder: ResultFolder, interrupts: Interrupts, figures: bool, format: str | None
 ) -> BaseException | None:
-    """Draw the animation and wait for the figures, all or none; return what went wrong if anything did."""
+    """Draw animation and figures, all or none; return what went wrong if anything did."""
     try:
         if interrupts.requested:
+            # After an interruption the data are kept, and the views are not drawn: that takes too long.
             raise KeyboardInterrupt
         from finger_pin.views.viewer import write_animation
 
         write_animation(result, folder.stage / "animation.html")
-        writing.wait()
+        if figures:
+            from finger_pin.views.plots import saving
+
+            saving.draw_all(result, folder.stage / "figures", format=format)
     except OSError:
-        writing.stop()
         raise
     except (KeyboardInterrupt, Exception) as error:
         # A result is worth more than its pictures.
-        writing.stop()
         folder.discard_views()
         if isinstance(error, KeyboardInterrupt):
             return error
-        what = str(error) if isinstance(error, NotDrawn) else f"{type(error).__name__}: {error}"
-        return NotDrawn(f"animation and figures cannot be drawn: {what}")
+        return NotDrawn(f"animation and figures cannot be drawn: {type(error).__name__}: {error}")
     return None
 
 

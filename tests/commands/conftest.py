@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from harness import Quick
+from harness import quick_figures
 from wrong_inputs import PLANAR
 
 from finger_pin.commands import application
@@ -37,4 +37,4 @@ def quick(monkeypatch):
         Path(path).write_text("animation")
 
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", write_animation)
-    monkeypatch.setattr("finger_pin.commands.simulate.Writing", Quick)
+    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", quick_figures)

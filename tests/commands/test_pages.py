@@ -16,7 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from harness import Quick
+from harness import quick_figures
 
 import finger_pin as fp
 import finger_pin.studies as studies
@@ -114,7 +114,7 @@ def run_scenario(text, name):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)
-    monkeypatch.setattr("finger_pin.commands.simulate.Writing", Quick)
+    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", quick_figures)
     text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
     for found in SHOWN.finditer(text):
         kind, block, code = found.groups(default="")

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import ALL, Quick, subprocess_of
+from harness import ALL, subprocess_of
 from test_files import contents
 
 import finger_pin as fp
-from finger_pin.commands.writing import NotDrawn
 from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import IntegrationError
 
@@ -87,10 +86,10 @@ def test_where_nothing_was_computed_earlier_results_stay(run, here, quick, monke
 def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monkeypatch):
     assert run("s.toml", "--output", "out")[0] == 0
 
-    def fail(drawing):
-        raise NotDrawn("ValueError: axis limits cannot be NaN")
+    def fail(*arguments, **options):
+        raise ValueError("axis limits cannot be NaN")
 
-    monkeypatch.setattr(Quick, "wait", fail)
+    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", fail)
     code, _, lines = run("s.toml", "--output", "out", "--duration", "0.003")
     assert code == 1
     assert len(lines) == 1
@@ -144,12 +143,12 @@ def test_a_second_signal_ends_at_once_and_leaves_earlier_results(run, here, quic
 
 
 def test_a_signal_while_drawing_keeps_the_trajectory_and_no_half_drawn_figures(run, here, quick, monkeypatch):
-    def slow(drawing):
+    def slow(*arguments, **options):
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(1.0)
         pytest.fail("went on")
 
-    monkeypatch.setattr(Quick, "wait", slow)
+    monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", slow)
     code, _, lines = run("s.toml", "--output", "out")
     assert code == 130
     assert lines == ["simulate.py: interrupted; what was computed is in out"]
@@ -161,13 +160,13 @@ def test_a_full_disk_ends_with_one_line_and_earlier_results_stay(run, here, quic
     assert run("s.toml", "--output", "out")[0] == 0
     before = contents(here)
 
-    def fail(*arguments):
+    def fail(*arguments, **options):
         raise OSError(28, "No space left on device")
 
     if broken == "saving":
         monkeypatch.setattr("finger_pin.simulation.results.save", fail)
     else:
-        monkeypatch.setattr(Quick, "wait", fail)
+        monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", fail)
     code, out, lines = run("s.toml", "--output", "out", "--duration", "0.003")
     assert (code, out, len(lines)) == (1, "", 1)
     assert "No space left on device; earlier results are as they were" in lines[0]
