@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger_pin.core import law_code as at
-from finger_pin.core.binding import Indices, Vector
-from finger_pin.core.compilation import compiled
 from finger_pin.core.control import Control
 from finger_pin.core.islands import find_islands
+from finger_pin.core.jit import Indices, Vector, compiled
 from finger_pin.core.tables import Tables
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 from finger_pin.core.law_code import RATE
 
 # A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.

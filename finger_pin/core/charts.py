@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 from finger_pin.core.law_code import inlined
 from finger_pin.core.rigid_body import ROTATION
 from finger_pin.description.routing import Array

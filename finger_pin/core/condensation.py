@@ -15,9 +15,8 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.core import law_code as at
-from finger_pin.core.binding import call_at
 from finger_pin.core.blocks import extent
-from finger_pin.core.compilation import compiled, compiled_loosely
+from finger_pin.core.jit import call_at, compiled, compiled_loosely
 
 
 @compiled

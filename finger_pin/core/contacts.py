@@ -6,8 +6,7 @@ from typing import Any
 
 from finger_pin.core import law_code as at
 from finger_pin.core.blocks import extent
-from finger_pin.core.compilation import compiled
-from finger_pin.core.law_code import call_value
+from finger_pin.core.jit import call_value, compiled
 from finger_pin.core.paths import passes, push
 from finger_pin.core.tables import END, FIRST
 

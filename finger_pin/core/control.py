@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.binding import Indices, Matrix, Vector
+from finger_pin.core.jit import Indices, Matrix, Vector
 from finger_pin.core.signal import Signal, no_signal
 from finger_pin.description.routing import Array
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
 from finger_pin.core.condensation import solve
+from finger_pin.core.jit import compiled
 
 # Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
 # loop that hunts makes of small errors; with six they are not.

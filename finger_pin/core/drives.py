@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Indices, Kind, Matrix, Vector, bound_at, call_at
-from finger_pin.core.compilation import Unit, compiled
+from finger_pin.core.jit import Indices, Kind, Matrix, Unit, Vector, bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
 from finger_pin.core.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
 

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.binding import call_at
-from finger_pin.core.compilation import compiled
 from finger_pin.core.inputs import inputs, tip_forces
-from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE, call_value
+from finger_pin.core.jit import call_at, call_value, compiled
+from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.signal import signal_derivatives

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 
 
 @compiled

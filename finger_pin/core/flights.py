@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.binding import call_at
 from finger_pin.core.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import call_at, compiled
 from finger_pin.core.law_code import SIDE
 from finger_pin.core.path_tables import LOOKS
 from finger_pin.core.tables import END, FIRST, KINK

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
 from finger_pin.core.control import HELD, SCHEDULED
+from finger_pin.core.jit import compiled
 from finger_pin.core.law_code import inlined
 from finger_pin.core.signal import signal_derivative, signal_derivatives, signal_values
 from finger_pin.core.trigonometry import sine_cosine

@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound_at
-from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.inputs import inputs
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled
 from finger_pin.core.model import MODEL
 
 

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from finger_pin.core.binding import call
 from finger_pin.core.evaluation import Models, book_many
 from finger_pin.core.interpolation import BETWEEN, COMMANDS, Between, Commands, command_many, interpolate_many
+from finger_pin.core.jit import call
 from finger_pin.core.part import Part, Record
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism

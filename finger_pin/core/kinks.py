@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.binding import call_at
-from finger_pin.core.compilation import compiled
 from finger_pin.core.error_norm import step_error
+from finger_pin.core.jit import call_at, compiled
 from finger_pin.core.law_code import SIDE
 from finger_pin.core.tables import END, FIRST, KINK
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.binding import Indices, Kind, Vector, bound_at, call_at
-from finger_pin.core.compilation import Unit
+from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound_at, call_at
 from finger_pin.core.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
 
 # Times it, a positive number becomes the one before it.

@@ -12,7 +12,9 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.compilation import address_of, compiled, intrinsic
+from finger_pin.core.jit import address_of, compiled
+from finger_pin.core.jit import numbers as _numbers
+from finger_pin.core.jit import put as _put
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law, Row, Touch
 
@@ -21,12 +23,6 @@ LENGTH, SPEED, STATE, LOAD, COMMAND, CURVATURE, SIDE, FORCE, RATE, SIGNALS = ran
 # Columns of the table of slopes: the force by l, l', z, z', N, u, phi, then z' by l, l', z, N, u, phi.
 F_LENGTH, F_SPEED, F_STATE, F_RATE, F_LOAD, F_COMMAND, F_CURVATURE = range(7)
 R_LENGTH, R_SPEED, R_STATE, R_LOAD, R_COMMAND, R_CURVATURE, SLOPES = range(7, 14)
-
-#: Called by compiled code: evaluate the law at an address for a range of rows.
-call_value = intrinsic("call_value")
-#: Called by compiled code: fill slopes, or energies and powers, by the law at an address for a range of rows.
-call_filling = intrinsic("call_filling")
-_numbers, _put = intrinsic("numbers"), intrinsic("put")
 
 _RAISE = opcode.opmap["RAISE_VARARGS"]
 # Filled in for every law.
@@ -86,11 +82,9 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
         "_COUNT": len(law.signals),
     }
     twin = FunctionType(template.__code__, world, template.__name__)
-    # What is kept on disk is named after this.
-    twin.__qualname__ = f"{template.__name__}[{function.__module__}.{function.__qualname__}]"
     tables = "CPointer(float64), " * (2 if template in (_value, _contact_value) else 3)
-    kept = function.__module__.startswith("finger_pin.laws.")
-    return address_of(f"void({tables}int64, int64, int64)", twin, kept=kept)
+    shipped = function.__module__.startswith("finger_pin.")
+    return address_of(f"void({tables}int64, int64, int64)", twin, announced=shipped)
 
 
 @compiled

@@ -6,12 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Indices, Matrix, Vector, call_at
 from finger_pin.core.blocks import Blocks, build_blocks
-from finger_pin.core.compilation import compiled
 from finger_pin.core.control import Control
 from finger_pin.core.inputs import input_slopes, tip_forces
-from finger_pin.core.law_code import call_filling
+from finger_pin.core.jit import Indices, Matrix, Vector, call_at, call_filling, compiled
 from finger_pin.core.paths import passes
 from finger_pin.core.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives

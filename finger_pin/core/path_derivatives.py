@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import call_shape, compiled
 from finger_pin.core.law_code import FORCE, LOAD
 from finger_pin.core.path_tables import WRENCH
 from finger_pin.core.paths import add_moment, angle_between, net_wrench, passes, turn_out
 from finger_pin.core.rigid_body import AXIS
-from finger_pin.core.shape_code import call_shape
 from finger_pin.core.spatial import add_force_cross, dot, motion_cross
 
 

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import call_shape, compiled
 from finger_pin.core.law_code import FORCE, SIDE
 from finger_pin.core.path_tables import WRENCH
 from finger_pin.core.rigid_body import AXIS
-from finger_pin.core.shape_code import call_shape
 from finger_pin.core.spatial import dot
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 from finger_pin.core.spatial import add_force_cross, apply_inertia, dot, motion_cross
 from finger_pin.core.trigonometry import sine_cosine
 

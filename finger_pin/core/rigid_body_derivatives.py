@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 from finger_pin.core.rigid_body import (
     AXIS,
     AXIS_CURVE,

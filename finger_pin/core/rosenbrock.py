@@ -6,15 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound_at, call_at
 from finger_pin.core.broad_phase import depart, settle
 from finger_pin.core.charts import rechart
-from finger_pin.core.compilation import Unit, compiled
 from finger_pin.core.condensation import solve
 from finger_pin.core.control import HELD
 from finger_pin.core.drift import carry
 from finger_pin.core.error_norm import step_error, worst
 from finger_pin.core.flights import NOTHING, UNSEEN, survey
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
 from finger_pin.core.kinks import hold, passed, price, release, strayed
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau

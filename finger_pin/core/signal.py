@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Layers, Matrix, Vector
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import Layers, Matrix, Vector, compiled
 from finger_pin.core.law_code import inlined
 from finger_pin.core.trigonometry import sine_cosine
 from finger_pin.laws.quintic import quintic

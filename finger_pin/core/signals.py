@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Kind, Layers, Matrix, Vector, bound_at, call_at
 from finger_pin.core.broad_phase import arrive, glide, settle, wake
 from finger_pin.core.charts import place_bodies
-from finger_pin.core.compilation import Unit, compiled
-from finger_pin.core.law_code import FORCE, call_filling
+from finger_pin.core.jit import Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, call_filling, compiled
+from finger_pin.core.law_code import FORCE
 from finger_pin.core.model import MODEL
 from finger_pin.core.paths import turn_out
 from finger_pin.core.rigid_body import ARMATURE, MOTION, move

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 
 
 @compiled

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Matrix, Vector
+from finger_pin.core.jit import Matrix, Vector
 from finger_pin.description.routing import Array
 
 

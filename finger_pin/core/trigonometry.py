@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.compilation import compiled
+from finger_pin.core.jit import compiled
 
 _QUARTERS = 0.6366197723675814
 # pi / 2 in parts of 33 bits, whose products with small integers are exact.

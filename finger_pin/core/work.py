@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finger_pin.core.binding import Layers, Matrix, Vector
+from finger_pin.core.jit import Layers, Matrix, Vector
 from finger_pin.core.law_code import SLOPES, widest
 from finger_pin.core.path_tables import PathWork, build_path_work
 from finger_pin.core.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS

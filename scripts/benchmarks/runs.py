@@ -13,9 +13,8 @@ import finger_pin as fp
 from benchmarks.timing import clocked
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
-from finger_pin.core.binding import bound_at, call_at
-from finger_pin.core.compilation import Unit
 from finger_pin.core.integrator import integrate_compiled
+from finger_pin.core.jit import Unit, bound_at, call_at
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.textbook import integrate

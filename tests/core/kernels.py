@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 from finger_pin.core import error_norm
-from finger_pin.core.binding import Kind, Matrix, Vector, bound_at, call, call_at
-from finger_pin.core.compilation import Unit
 from finger_pin.core.condensation import solve
+from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call, call_at
 from finger_pin.core.model import MODEL
 from finger_pin.core.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives

@@ -10,11 +10,11 @@ from test_any_mechanism import assert_same
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core import rosenbrock
-from finger_pin.core.binding import bound
 from finger_pin.core.control import held_control, planned_control
 from finger_pin.core.evaluation import CompiledMechanism
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.islands import find_islands
+from finger_pin.core.jit import bound
 from finger_pin.core.signal import Signal
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables

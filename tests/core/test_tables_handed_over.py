@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from finger_pin.core.binding import Indices, Kind, Layers, Matrix, Vector, bound, bound_at
-from finger_pin.core.compilation import Unit
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound, bound_at
 
 
 class Inner(NamedTuple):

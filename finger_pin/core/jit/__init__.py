@@ -1,0 +1,34 @@
+"""Compiled code: the only place that knows the compiler, which is numba.
+
+`functions` compiles, `tables` hands over arguments of the `kinds` there are, `calls` calls what lies at an address, and
+`reach` tells which code on disk still holds. What rests on numba's inside is in `inside`. The rest of the core sees the
+names below.
+"""
+
+from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, numbers, put
+from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely
+from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
+from finger_pin.core.jit.tables import bound, bound_at, call
+
+__all__ = [
+    "IndexTable",
+    "Indices",
+    "Kind",
+    "Layers",
+    "Matrix",
+    "Unit",
+    "Vector",
+    "address_of",
+    "bound",
+    "bound_at",
+    "cache_place",
+    "call",
+    "call_at",
+    "call_filling",
+    "call_shape",
+    "call_value",
+    "compiled",
+    "compiled_loosely",
+    "numbers",
+    "put",
+]

@@ -1,0 +1,83 @@
+"""Calls of functions at an address, and rows of numbers read and written, as compiled code does them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from finger_pin.core.jit.functions import compiled
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
+    """Call the function at an address with the address of a block and a number; return an integer."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        integer = ir.IntType(64)
+        kind = ir.FunctionType(integer, [integer, ir.DoubleType()])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.int64(types.int64, types.int64, types.float64), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _call(_typing: Any, function: Any, words: Any) -> Any:
+    """Call the function at an address with some words: addresses of numbers, and numbers of rows."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        given = [builder.extract_value(arguments[1], index) for index in range(signature.args[1].count)]
+        kind = ir.FunctionType(ir.VoidType(), [each.type for each in given])
+        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, words), generate
+
+
+@compiled
+def call_value(address: int, rows: Any, parameters: Any, begin: int, end: int) -> None:
+    """Evaluate the law at an address for a range of rows."""
+    _call(address, (rows.ctypes.data, parameters.ctypes.data, rows.shape[1], begin, end))
+
+
+@compiled
+def call_filling(address: int, rows: Any, parameters: Any, filled: Any, begin: int, end: int) -> None:
+    """Fill slopes, or energies and powers, by the law at an address for a range of rows."""
+    _call(address, (rows.ctypes.data, parameters.ctypes.data, filled.ctypes.data, rows.shape[1], begin, end))
+
+
+@compiled
+def call_shape(address: int, y: Any, p: Any, out: Any) -> None:
+    """Call the function of a shape at an address with three rows of numbers."""
+    _call(address, (y.ctypes.data, p.ctypes.data, out.ctypes.data))
+
+
+@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+def numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> Any:
+    """Return a tuple of numbers of a table, ``stride`` apart; their count is a constant."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        found, place = ir.Constant(context.get_value_type(signature.return_type), ir.Undefined), arguments[1]
+        for index in range(signature.return_type.count):
+            found = builder.insert_value(found, builder.load(builder.gep(arguments[0], [place])), index)
+            place = builder.add(place, arguments[2])
+        return found
+
+    return types.UniTuple(types.float64, count.literal_value)(table, types.int64, types.int64, count), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
+    """Write a tuple of numbers into a table, ``stride`` apart."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = arguments[1]
+        for index, kind in enumerate(values):
+            value = context.cast(builder, builder.extract_value(arguments[3], index), kind, types.float64)
+            builder.store(value, builder.gep(arguments[0], [place]))
+            place = builder.add(place, arguments[2])
+        return context.get_dummy_value()
+
+    return types.void(table, types.int64, types.int64, values), generate

@@ -1,0 +1,153 @@
+"""Functions compiled, by numba; on disk they are where numba keeps code.
+
+Numba keeps code beside the file that a function stands in, under the function's name, as long as that file is the
+same. It sees neither what a function calls in other files nor which globals it was given: so functions are handed to
+it under a name that tells all that they reach (`reach`), as if they stood in an empty file of the cache's folder.
+Where no folder can be written, everything is compiled anew in each process. What takes its time is said once, as a
+warning of the logger ``finger_pin``, which Python prints on standard error unless logging is set up otherwise.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from functools import cache, cached_property
+from pathlib import Path
+from pickle import UnpicklingError
+from types import FunctionType
+from typing import Any, TypeVar
+
+import numba
+import platformdirs
+
+from finger_pin.core.jit.inside import INTERNAL
+from finger_pin.core.jit.reach import Unknown, reached
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_LOGGER = logging.getLogger("finger_pin")
+
+# Of all that is compiled: IEEE arithmetic is kept, so that NaN stays NaN; only a product and a sum may be fused.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+# Arrays are free to pass only where calls are inlined; nobody calls these functions from outside.
+_INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, **INTERNAL}
+
+
+def compiled(function: _Function) -> _Function:
+    """Return the function compiled, to be called by compiled code only, where it is inlined."""
+    return numba.njit(**_INLINED)(function)  # type: ignore[no-any-return]
+
+
+def compiled_loosely(function: _Function) -> _Function:
+    """Return the function compiled as `compiled` does, with sums in whatever order vector instructions like."""
+    vars(function)["loose"] = True
+    return numba.njit(**_INLINED | {"fastmath": {"contract", "reassoc"}})(function)  # type: ignore[no-any-return]
+
+
+class Unit:
+    """A function of an address and a number that returns an integer, compiled on first use, or found on disk."""
+
+    def __init__(self, function: Callable[[int, float], int]) -> None:
+        """Compile nothing yet."""
+        assert isinstance(function, FunctionType)
+        self._function = function
+
+    @cached_property
+    def address(self) -> int:
+        """Where compiled code finds it."""
+        return address_of("int64(int64, float64)", self._function)
+
+    @cached_property
+    def _call(self) -> Callable[[int, float], int]:
+        return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double)(self.address)
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is found on disk."""
+        named = _named(self._function)
+        return named is not None and _is_kept(named)
+
+    def __call__(self, address: int, number: float = 0.0) -> int:
+        """Call it; other threads may run meanwhile."""
+        return self._call(address, number)
+
+
+# Two threads may ask for the same.
+_lock = threading.RLock()
+_living: list[Any] = []
+
+
+def address_of(signature: str, function: FunctionType, announced: bool = True) -> int:
+    """Return the address of the function compiled for C; it lives as long as the process.
+
+    Args:
+        signature: As numba writes it, of pointers and numbers.
+        function: The function. Nothing tells the caller of an exception: it must raise none.
+        announced: Whether it is said that compiling takes its time.
+    """
+    with _lock:
+        named = _named(function)
+        if announced and not (named and _is_kept(named)):
+            _announce()
+        try:
+            made = numba.cfunc(signature, cache=named is not None, **_OPTIONS)(named or function)
+        except (OSError, EOFError, UnpicklingError) as error:
+            reason = getattr(error, "strerror", None) or repr(error)
+            _say(f"the compile cache {cache_root()} cannot be used: {reason}; the next run compiles again")
+            made = numba.cfunc(signature, **_OPTIONS)(function)
+        _living.append(made)
+        return int(made.address)
+
+
+def cache_root() -> Path:
+    """Return the folder that compiled code is kept in, where it can be."""
+    return Path(os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin"))
+
+
+def cache_place() -> Path | None:
+    """Return the empty file beside which code is kept, or None where nothing can be."""
+    place = cache_root() / "compiled.py"
+    try:
+        if not place.exists():
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.touch()
+    except OSError:
+        return None
+    return place if os.access(place.parent, os.W_OK) else None
+
+
+def _named(function: FunctionType) -> FunctionType | None:
+    """Return the function as numba is to keep it, or None if it cannot be kept."""
+    place = cache_place()
+    try:
+        name = f"{function.__name__}-{reached(function)}"
+    except Unknown:
+        return None
+    if place is None:
+        return None
+    code = function.__code__.replace(co_filename=str(place), co_firstlineno=1)
+    named = FunctionType(code, function.__globals__, name, function.__defaults__, function.__closure__)
+    named.__qualname__ = name
+    return named
+
+
+def _is_kept(named: FunctionType) -> bool:
+    folder = Path(numba.config.CACHE_DIR or cache_root())
+    return any(folder.rglob(f"*{named.__name__}*.nbc"))
+
+
+def _announce() -> None:
+    lasting = cache_place() is not None
+    often = "once for this version" if lasting else f"in every run, as {cache_root()} cannot be written"
+    advice = "" if lasting else "; FINGER_PIN_CACHE_DIR may name another folder"
+    _say(f"Compiling the model, {often}: about half a minute{advice} ...")
+
+
+@cache
+def _say(text: str) -> None:
+    """Warn once in a process, and not in those that a process starts."""
+    if multiprocessing.parent_process() is None:
+        _LOGGER.warning(text)

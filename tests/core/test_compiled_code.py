@@ -1,0 +1,168 @@
+"""Compiled code on disk: it is found again while all that it reaches is the same, and only then."""
+
+import logging
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+import finger_pin as fp
+from finger_pin.core.jit import Unit, compiled, compiled_loosely, functions
+from finger_pin.core.law_code import addresses
+from finger_pin.laws.law import Law
+
+SOURCE = '''
+FACTOR = 2.0
+
+def scale(number):
+    """Scale."""
+    return FACTOR * number
+
+inner = {decorated}(scale)
+
+def double(address, number):
+    return int(inner(number)) + address
+'''
+DECORATED = {"compiled": compiled, "compiled_loosely": compiled_loosely}
+
+
+def unit(change=("", ""), decorated="compiled"):
+    """Return a unit whose source differs in something."""
+    known = {"__name__": __name__, **DECORATED}
+    exec(SOURCE.format(decorated=decorated).replace(*change), known)
+    return Unit(known["double"])
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The folder of the cache, where nothing is yet."""
+    monkeypatch.setenv("FINGER_PIN_CACHE_DIR", str(tmp_path / "new" / "cache"))
+    return tmp_path / "new" / "cache"
+
+
+def code_in(folder):
+    return [path for path in folder.rglob("*") if path.suffix == ".nbc"]
+
+
+def test_code_is_found_again_when_a_comment_or_a_docstring_has_changed(folder):
+    assert not unit().kept
+    assert unit()(1, 21.0) == 43
+    (kept,) = code_in(folder)
+    stamp = kept.stat().st_mtime_ns
+    for change in (("", ""), ("Scale.", "Multiply."), ("FACTOR = 2.0", "\n# How much.\n\nFACTOR = 2.0")):
+        assert unit(change).kept
+        assert unit(change)(1, 21.0) == 43
+    assert code_in(folder) == [kept] and kept.stat().st_mtime_ns == stamp
+
+
+@pytest.mark.parametrize(
+    ("change", "result"),
+    [(("FACTOR = 2.0", "FACTOR = 3.0"), 63), (("FACTOR * number", "FACTOR + number"), 23)],
+    ids=["a constant", "a function that is called"],
+)
+def test_code_is_compiled_anew_when_what_it_reaches_has_changed(folder, change, result):
+    assert unit()(0, 21.0) == 42
+    assert not unit(change).kept
+    assert unit(change)(0, 21.0) == result
+    assert unit()(0, 21.0) == 42
+
+
+def test_code_that_may_reorder_sums_is_other_code(folder):
+    assert unit()(0, 21.0) == unit(decorated="compiled_loosely")(0, 21.0) == 42
+    assert len(code_in(folder)) == 2
+
+
+def test_threads_that_ask_at_once_get_the_same_code(folder):
+    shared = unit()
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(lambda number: shared(0, number), [1.0, 2.0, 3.0, 4.0])) == [2, 4, 6, 8]
+    assert len(code_in(folder)) == 1
+
+
+def test_compiled_arithmetic_keeps_what_is_not_a_number(folder):
+    """An optimiser that may assume finite numbers would make both zero."""
+
+    @Unit
+    def nothing(_address, number):
+        nothing = number - number + 0.0 * number
+        return 1 if nothing == nothing else 0
+
+    assert [nothing(0, number) for number in (float("nan"), float("inf"), 1.0)] == [0, 0, 1]
+
+
+def test_a_law_of_somebody_else_is_compiled_without_a_word_and_kept(folder, said):
+    def force(row, p):
+        return -p[0] * row.length, 0.0
+
+    def slopes(row, p, signals):
+        return (-p[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def account(row, p, force, rate, signals):
+        return (0.5 * p[0] * row.length**2,)
+
+    assert all(addresses(Law("own spring", ("stiffness",), force, slopes, account)))
+    assert said() == [] and len(code_in(folder)) == 3
+
+
+@pytest.fixture
+def said(caplog):
+    # A command that was run without a terminal has silenced it.
+    caplog.set_level(logging.WARNING, logger="finger_pin")
+    functions._say.cache_clear()
+    yield lambda: [record.getMessage() for record in caplog.records]
+    functions._say.cache_clear()
+
+
+def test_the_first_compilation_is_announced_once(folder, said):
+    first, second = unit(), unit(("2.0", "4.0"))
+    assert said() == []
+    assert (first(0, 1.0), second(0, 1.0), unit()(0, 2.0)) == (2, 4, 4)
+    assert said() == ["Compiling the model, once for this version: about half a minute ..."]
+
+
+def test_where_nothing_can_be_kept_code_runs_all_the_same_and_it_is_said_once(tmp_path, monkeypatch, said):
+    """Not even a person who may do anything can make a folder inside a file."""
+    file = tmp_path / "file"
+    file.write_text("not a folder")
+    monkeypatch.setenv("FINGER_PIN_CACHE_DIR", str(file))
+    assert (unit()(0, 21.0), unit()(0, 1.0)) == (42, 2)
+    (line,) = said()
+    assert f"in every run, as {file} cannot be written" in line and "FINGER_PIN_CACHE_DIR" in line
+    assert file.read_text() == "not a folder"
+
+
+def test_code_that_a_broken_disk_has_cut_short_is_compiled_anew(folder, said):
+    assert unit()(0, 21.0) == 42
+    for path in code_in(folder):
+        path.write_bytes(path.read_bytes()[:100])
+    assert unit()(0, 21.0) == 42
+    assert said()[1:] and said()[1].startswith(f"the compile cache {folder} cannot be used: ")
+
+
+def test_a_full_disk_is_named_and_costs_nothing_else(folder):
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))\n"
+        "from finger_pin.core.jit import Unit\n"
+        "@Unit\ndef double(address, number):\n    return int(2.0 * number)\n"
+        "print(double(0, 21.0))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "42\n"
+    assert f"the compile cache {folder} cannot be used: File too large; " in done.stderr
+    assert code_in(folder) == []
+
+
+def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
+    code = "import finger_pin as fp; fp.simulate(fp.load_scenario('fig6', {'simulation.duration': 0.01}))"
+    fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_importing_the_core_compiles_nothing(tmp_path):
+    environment = os.environ | {"FINGER_PIN_CACHE_DIR": str(tmp_path)}
+    code = "import finger_pin.core.signals, finger_pin.core.rosenbrock"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr, list(tmp_path.iterdir())) == ("", "", [])
