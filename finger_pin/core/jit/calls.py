@@ -10,8 +10,11 @@ from numba.extending import intrinsic
 
 from finger_pin.core.jit.functions import compiled
 
+# Callers see another signature than numba's.
+_generated: Any = intrinsic
 
-@intrinsic  # type: ignore[untyped-decorator]
+
+@_generated
 def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
     """Call the function at an address with the address of a block and a number; return an integer."""
 
@@ -23,7 +26,7 @@ def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
     return types.int64(types.int64, types.int64, types.float64), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_generated
 def _call(_typing: Any, function: Any, words: Any) -> Any:
     """Call the function at an address with some words: addresses of numbers, and numbers of rows."""
 
@@ -54,7 +57,7 @@ def call_shape(address: int, y: Any, p: Any, out: Any) -> None:
     _call(address, (y.ctypes.data, p.ctypes.data, out.ctypes.data))
 
 
-@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
+@_generated(prefer_literal=True)
 def numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> Any:
     """Return a tuple of numbers of a table, ``stride`` apart; their count is a constant."""
 
@@ -68,7 +71,7 @@ def numbers(_typing: Any, table: Any, first: Any, stride: Any, count: Any) -> An
     return types.UniTuple(types.float64, count.literal_value)(table, types.int64, types.int64, count), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_generated
 def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
     """Write a tuple of numbers into a table, ``stride`` apart."""
 

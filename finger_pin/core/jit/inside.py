@@ -32,9 +32,9 @@ def _array(kind: Numbers) -> Any:
 class _Fields(AttributeTemplate):  # type: ignore[misc]
     key = Kind
 
-    def generic_resolve(self, table: Kind, name: str) -> Any:
+    def generic_resolve(self, table: Any, name: str) -> Any:  # type: ignore[override]
         """Return the type of a field, None for a name that is none."""
-        kind = table.fields.get(name)
+        kind: Any = table.fields.get(name)
         return _array(kind) if isinstance(kind, Numbers) else _SCALARS.get(kind, kind)
 
 

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from finger_pin.core.jit.functions import Unit
 from finger_pin.core.jit.kinds import Kind, Numbers
 
+# Callers see another signature than numba's.
+_generated: Any = intrinsic
+
 
 def bound(table: Any, kind: Kind) -> NDArray[np.uint8]:
     """Return a block that holds a table for `bound_at`; its arrays must be kept alive as long as the block.
@@ -52,7 +55,7 @@ def _write(value: Any, kind: Any, words: list[int]) -> None:
         raise TypeError(f"{value!r} cannot be bound as {kind}")
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_generated
 def bound_at(_typing: Any, address: Any, kind: Any) -> Any:
     """Return the table at the address of a block that `bound` has filled."""
 
