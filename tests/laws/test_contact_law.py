@@ -86,9 +86,9 @@ def test_value_and_slopes_are_finite_without_normal_force_and_at_rest():
 
 def test_compiled_it_is_what_it_is_in_numpy(drawn):
     touch, p = drawn
-    value, slopes = inlined(CONTACT.value).made, inlined(CONTACT.slopes).made
+    value, slopes = inlined(CONTACT.value), inlined(CONTACT.slopes)
 
-    @numba.njit(_nrt=False)
+    @numba.njit
     def run(seen, p, found, slope):
         touch = Touch(seen[0], seen[1], seen[2], seen[3], seen[4], seen[5], seen[6])
         numbers = (p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])

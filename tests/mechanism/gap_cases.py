@@ -7,14 +7,14 @@ import numpy as np
 from finger_pin.core.law_code import inlined
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 
-_value, _slopes = inlined(PRISM.value).made, inlined(PRISM.slopes).made
+_value, _slopes = inlined(PRISM.value), inlined(PRISM.slopes)
 #: Kinds of parts: whether they have a disc, and a length.
 PARTS = {"point": (0.0, 0.0), "segment": (0.0, 1.0), "disc": (1.0, 0.0), "cylinder": (1.0, 1.0)}
 #: Distances of what lies along a face are too low by this much of a part's length and of its disc's diameter.
 EPSILON = 1e-5 / 4.0
 
 
-@numba.njit(_nrt=False)
+@numba.njit
 def fill(y, p, found, slopes):
     """Fill what the gap finds for many pairs, shape (m, 13), and its slopes, shape (m, 78)."""
     for k in range(y.shape[0]):

@@ -143,7 +143,7 @@ def test_points_in_line_with_the_centre_have_a_path(span):
 @every_case
 def test_compiled_spans_agree(span, side):
     p = numbers(side)
-    compiled_value, compiled_slopes = inlined(span.value).made, inlined(span.slopes).made
+    compiled_value, compiled_slopes = inlined(span.value), inlined(span.slopes)
 
     @numba.njit(error_model="numpy")
     def both(y, p, out, slopes):
