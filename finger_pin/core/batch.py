@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finger_pin.core import rosenbrock as core
-from finger_pin.core.binding import Indices, Kind, Vector, bound_at, call, call_at
-from finger_pin.core.compilation import Unit
+from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound_at, call, call_at
 from finger_pin.core.stepper import Stepper, usable_cores
 
 

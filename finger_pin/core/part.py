@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from finger_pin.core import rosenbrock as core
 from finger_pin.core.charts import place_all
-from finger_pin.core.compilation import Unit
 from finger_pin.core.control import Control
 from finger_pin.core.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.islands import Island
-from finger_pin.core.jit import bound
+from finger_pin.core.jit import Unit, bound
 from finger_pin.core.knots import KNOTTED, Knotted, advance_knotted
 from finger_pin.core.model import BoundModel
 from finger_pin.core.tableaus import Tableau
