@@ -7,6 +7,7 @@ numbers is what compiling quickly depends on.
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from finger_pin.core.jit.functions import Unit
 from finger_pin.core.jit.kinds import Kind, Numbers
 
+_DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
 
@@ -38,15 +40,23 @@ def call(unit: Unit, table: Any, kind: Kind) -> int:
     return unit(block.ctypes.data)
 
 
+def _address(array: NDArray[Any]) -> int:
+    """Return where the numbers of an array lie."""
+    if array.size and array.flags.writeable:
+        # Sooner than NumPy says it itself.
+        return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
+    return int(array.ctypes.data)
+
+
 def _write(value: Any, kind: Any, words: list[int]) -> None:
     if isinstance(kind, Kind):
         for part, own in zip(value, kind.fields.values(), strict=True):
             _write(part, own, words)
     elif isinstance(kind, Numbers):
         fitting = isinstance(value, np.ndarray) and value.ndim == kind.dimensions and value.flags.c_contiguous
-        if not fitting or value.dtype != np.dtype(kind.dtype):
+        if not fitting or value.dtype != _DTYPES[kind.dtype]:
             raise TypeError(f"{value!r} cannot be bound as {kind}")
-        words += (value.ctypes.data, *value.shape)
+        words += (_address(value), *value.shape)
     elif isinstance(value, bool | int) and kind in (int, bool):
         words.append(int(value))
     elif isinstance(value, float) and kind is float:
