@@ -212,3 +212,17 @@ def test_an_offset_and_a_delay_of_an_output_are_found():
     with pytest.raises(fp.InputError, match="must be recordings"):
         wrong = {**parameters, f"{key}.gain": (0.1, 2.0)}
         fp.identify("canal", parameters=wrong, recordings=recordings, **given)
+
+
+def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
+    """At one load they cannot be told apart; a load that varies tells them."""
+    steady = {"kind": "ramp", "time": 0.0, "duration": 0.2, "height": 8.0}
+    rising = {"kind": "ramp", "time": 0.0, "duration": 1.0, "height": 16.0}
+    candidates = {name: {"controller.tensions.T1": each} for name, each in (("held", steady), ("rising", rising))}
+    overrides = {"simulation.duration": 1.0}
+    given = {"parameters": {COULOMB: (0.05, 0.2), DRAG: (0.0, 1.0)}, "outputs": {"tendon_tension.T1": 0.05}}
+    found = fp.propose("canal", candidates, **given, overrides=overrides)
+    assert found.candidate.values[0] == "rising"
+    assert (found.deviation[0] < found.deviation[1]).all() and (found.deviation < [0.0375, 0.25]).all()
+    with pytest.raises(fp.InputError, match="at least one"):
+        fp.propose("canal", {}, **given)

@@ -1,0 +1,96 @@
+"""Which experiment next: of given motions the one that narrows the intervals most, from sensitivities alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger_pin.description.loading import load_scenario
+from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
+from finger_pin.simulation.prepared import prepare
+from finger_pin.simulation.recorded import Recording
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def propose(
+    scenario: str | Path,
+    candidates: Mapping[str, Mapping[str, Any]],
+    parameters: Mapping[str, Sequence[float]],
+    outputs: Mapping[str, float],
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    known: Mapping[str, float] | None = None,
+    rate: float = 100.0,
+) -> xr.Dataset:
+    """Rank motions by what they would determine: D-optimal, the greatest determinant of the information first.
+
+        fp.propose("canal", {"slow": {...}, "fast": {...}}, {"finger.tendon_friction.coulomb": (0.01, 1.0)},
+                   {"tendon_tension.T1": 0.05})
+
+    Args:
+        scenario: Name of a scenario, or path of a file.
+        candidates: By name, the entries in which the motion of each differs.
+        parameters: By dotted key, the least and the greatest value; sure to that much without any motion.
+        outputs: What would be measured, by variable.label, and its noise, SI, rms.
+        overrides: Entries of all of them, such as what is known by now.
+        known: By key, standard deviations that earlier recordings have left, in units of the parameter.
+        rate: Of independent samples, Hz: of a model at 1 kHz only some are.
+
+    Returns:
+        Along ``candidate``, the best first: ``log_determinant``, and by ``parameter`` the ``deviation`` that the motion
+        would leave, together with what is known.
+
+    Raises:
+        InputError: If there are no candidates, or one or an output names nothing that there is.
+    """
+    import xarray as xr
+
+    if not candidates:
+        raise InputError("candidates", "must have at least one entry")
+    keys = list(parameters)
+    low, high = np.array(list(parameters.values()), dtype=float).T
+    # The least that is known: a parameter lies within its bounds.
+    before = np.array([(known or {}).get(key, (b - a) / 4.0) for key, a, b in zip(keys, low, high, strict=True)])
+    variables = tuple(dict.fromkeys(name.partition(".")[0] for name in outputs))
+    found: dict[str, tuple[float, Array]] = {}
+    for name, changed in candidates.items():
+        entries = {**(overrides or {}), "simulation.sample_rate": rate, **changed}
+        run = prepare(load_scenario(scenario, entries), keys, variables).run(sensitivities=True)
+        information = np.diag(1.0 / before**2)
+        for output, noise in outputs.items():
+            slopes = _slopes(run, output)
+            until = run.time < run.attrs["sensitivities_lost"]
+            information = information + slopes[:, until] @ slopes[:, until].T / noise**2
+        scaled = information * np.outer(before, before)
+        found[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
+    order = sorted(found, key=lambda name: -found[name][0])
+    long_name = "of the information over what is known without it"
+    return xr.Dataset(
+        {
+            "log_determinant": (
+                "candidate",
+                [found[name][0] for name in order],
+                {"units": "1", "long_name": long_name},
+            ),
+            "deviation": (("candidate", "parameter"), [found[name][1] for name in order]),
+        },
+        {"candidate": order, "parameter": keys},
+    )
+
+
+def _slopes(run: Recording, output: str) -> Array:
+    """Return the derivatives of an output by the parameters, shape (p, m)."""
+    variable, _, label = output.partition(".")
+    slopes, dims = run.slopes[variable], run.variables[variable][0]
+    for axis, dim in reversed(list(enumerate(dims))[1:]):
+        labels = [str(each) for each in run[dim]]
+        if label not in labels:
+            raise InputError(f"outputs.{output}", f"there is no {label}; there are {', '.join(labels)}")
+        slopes = np.take(slopes, labels.index(label), axis=axis + 1)
+    return slopes
