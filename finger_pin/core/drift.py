@@ -20,42 +20,60 @@ _MOST_SUMS = 64.0
 
 @compiled
 def carry(
-    linear: Any, h: float, gamma: float, joints: int, drift: Any, difference: Any, behind: float, r: Any, u: Any
+    linear: Any, h: float, gamma: float, drift: Any, difference: Any, behind: float, turned: bool, r: Any, u: Any
 ) -> Any:
     """Carry the error so far from the middle of the last step to that of this one, and add that of this one.
 
-    There the linearisation at this step's start is central. One that lags behind reversals damps what vibrates.
+    There the linearisation at this step's start is central. One that lags behind reversals damps what vibrates. Where
+    a step ends at a kink, the error is carried to its end: what comes after, such as a stiff contact, is another flow.
 
     Args:
         linear: Condensed for g = 1 / (h gamma).
         h: Length of the step, s.
         gamma: Of the method.
-        joints: Number of joints.
         drift: The error so far, changed in place, shape (size,).
         difference: That of the step, shape (size,).
         behind: Time from where the error has been carried to, to the start of the step, s.
+        turned: Whether the step ends at a kink.
         r: Scratch, shape (size + 1,).
         u: Scratch, shape (size,).
 
     Returns:
-        Mean square of the joints' part, rad2; time that is left to the end of the step, s.
+        Time that is left to the end of the step, s.
     """
     size, time = drift.size, behind + 0.5 * h
     sums = min(np.ceil(time / (_LONGEST * h)), _MOST_SUMS)
     time = min(time, sums * _LONGEST * h)
     for _ in range(int(sums)):
         _flow(linear, 1.0 / (h * gamma), time / (sums * h * gamma), drift, r, u)
-    total = 0.0
     for c in range(size):
         drift[c] += difference[c]
-    for c in range(joints):
+    if turned:
+        _flow(linear, 1.0 / (h * gamma), 0.5 / gamma, drift, r, u)
+        time += 0.5 * h
+    return behind + h - time
+
+
+@compiled
+def weigh(part: Any, width: int, drift: Any) -> Any:
+    """Return the mean square of some coordinates' errors, rad2 or m2, at most one.
+
+    Beyond a radian the linearised flow says nothing more: their errors, and those of their velocities and of all that
+    is no coordinate, are less then.
+    """
+    total = 0.0
+    for c in part:
         total += drift[c] * drift[c]
-    if not total <= joints:
-        # Beyond a radian the linearised flow says nothing more.
-        for c in range(size):
-            drift[c] = drift[c] / np.sqrt(total / joints) if total < np.inf else 0.0
-        total = 1.0 * joints
-    return total / joints, behind + h - time
+    mean = total / max(part.size, 1)
+    if mean <= 1.0:
+        return mean
+    share = 1.0 / np.sqrt(mean) if mean < np.inf else 0.0
+    for c in part:
+        drift[c] = drift[c] * share if share > 0.0 else 0.0
+        drift[width + c] = drift[width + c] * share if share > 0.0 else 0.0
+    for c in range(2 * width, drift.size):
+        drift[c] = drift[c] * share if share > 0.0 else 0.0
+    return 1.0
 
 
 @compiled

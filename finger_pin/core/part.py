@@ -17,6 +17,7 @@ from finger_pin.core.islands import Island
 from finger_pin.core.jit import Unit, bound
 from finger_pin.core.knots import KNOTTED, Knotted, advance_knotted
 from finger_pin.core.model import BoundModel
+from finger_pin.core.rigid_body import PRISMATIC
 from finger_pin.core.tableaus import Tableau
 from finger_pin.core.tables import Tables
 from finger_pin.core.work import build_work
@@ -67,6 +68,8 @@ class Part:
         attitude: Quaternions of its free bodies, shape (f, 4).
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters.
+        joints: Coordinates whose error is estimated; none of what is moved along paths.
+        objects: Those of free objects, likewise.
         drives: Loops of motors in position drive, which sample on the way; None for none.
         knots: Times at which steps end, s, positive, in order.
     """
@@ -92,6 +95,7 @@ class Part:
         # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
         self.work = build_work(tables, laws, len(control.tension))
         self.model = BoundModel(tables, control, self.work)
+        of_objects, led = object_coordinates(tables), tables.guided[: len(tables.parents)] < 0
         self._bound = core.Integration(
             model=self.model.address,
             tableau=tableau,
@@ -105,8 +109,11 @@ class Part:
             r=np.zeros(len(x) + 1),
             drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
+            joints=np.flatnonzero(~of_objects & led),
+            objects=np.flatnonzero(of_objects & led),
         )
         self._block = bound(self._bound, core.INTEGRATION)
+        self.joints, self.objects = self._bound.joints, self._bound.objects
         place_all(tables, attitude)
         self.tables, self.control, self.tableau = tables, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
@@ -231,6 +238,16 @@ class Part:
             bound.atol,
             bound.memory.copy(),
         )
+
+
+def object_coordinates(tables: Tables) -> NDArray[np.bool_]:
+    """Return which coordinates of the bodies are those of free objects: three that slide, and three that turn."""
+    found = np.zeros(len(tables.parents), dtype=bool)
+    for first in tables.charts:
+        found[first : first + 3] = True
+        if first >= 3 and np.all(tables.kinds[first - 3 : first] == PRISMATIC):
+            found[first - 3 : first] = True
+    return found
 
 
 def failure(part: Part, status: int, names: list[str]) -> str:

@@ -10,7 +10,7 @@ from finger_pin.core.broad_phase import depart, settle
 from finger_pin.core.charts import rechart
 from finger_pin.core.condensation import solve
 from finger_pin.core.control import HELD
-from finger_pin.core.drift import carry
+from finger_pin.core.drift import carry, weigh
 from finger_pin.core.error_norm import step_error, worst
 from finger_pin.core.flights import NOTHING, UNSEEN, survey
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
@@ -20,7 +20,7 @@ from finger_pin.core.tableaus import Tableau
 
 # Entries of the memory that outlives a call.
 TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEPTED, REJECTED, CULPRIT = range(10)
-HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, BEHIND, MEMORY_SIZE = range(10, 17)
+HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, OBJECT_DRIFT, BEHIND, MEMORY_SIZE = range(10, 18)
 DONE, FULL, UNDERFLOW, NOT_FINITE, CREEPING, RUNAWAY = range(6)
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
@@ -48,6 +48,8 @@ class Integration(NamedTuple):
         r: Scratch, shape (size + 1,).
         drift: Estimate of the error so far, shape (size,).
         kinks: Where each row was between the sides of its kink when the step began, shape (K,).
+        joints: Coordinates whose error is estimated.
+        objects: Those of free objects, likewise.
     """
 
     model: int
@@ -62,6 +64,8 @@ class Integration(NamedTuple):
     r: Vector
     drift: Vector
     kinks: Vector
+    joints: Indices
+    objects: Indices
 
 
 class Stretch(NamedTuple):
@@ -148,9 +152,8 @@ def advance(address: int, end: float) -> int:
     times, taken = stretch.times, stretch.taken
     tables, control, tableau = model.tables, model.control, integration.tableau
     rows, kinks, r = model.work.rows, integration.kinks, integration.r
-    joints = max(tables.parents.size, 1)
     x, rtol, atol, memory = integration.x, integration.rtol, integration.atol, integration.memory
-    k, start, reached = integration.k, integration.start, model.state
+    k, start, reached, drift = integration.k, integration.start, model.state, integration.drift
     size, count = x.size, tableau.nodes.size
     exponent = 1.0 / tableau.order
     fresh, whole = True, 0.0
@@ -183,7 +186,7 @@ def advance(address: int, end: float) -> int:
         cut = last and end - time < h
         if last:
             h = end - time
-        error = np.inf
+        error, share = np.inf, 1.0
         outcome = _step(integration, model, time, h, fresh)
         if outcome == 2:
             for c in range(size - 1, -1, -1):
@@ -198,8 +201,9 @@ def advance(address: int, end: float) -> int:
             error = step_error(x, reached, k[count - 1], rtol, atol)
         fresh = False
         if error <= 1.0:
-            share, dear = strayed(tables, rows, kinks), False
+            share, dear = 1.0, False
             if h > 1e-12 * max(1.0, abs(time)):
+                share = strayed(tables, rows, kinks)
                 # A row was held on a side that it has left: what that cost is an error too.
                 if share < 1.0:
                     dear = not price(integration, model, time + h, h, r) <= 1.0
@@ -247,10 +251,15 @@ def advance(address: int, end: float) -> int:
             if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False
-            mean, memory[BEHIND] = carry(
-                model.linear, h, tableau.gamma, joints, integration.drift, k[count - 1], memory[BEHIND], r, model.rate
+            if share < 1.0:
+                # The rest of the step would have been on the other side.
+                for c in range(size):
+                    drift[c] -= 0.5 * (1.0 - share) * r[c]
+            memory[BEHIND] = carry(
+                model.linear, h, tableau.gamma, drift, k[count - 1], memory[BEHIND], share < 1.0, r, model.rate
             )
-            memory[DRIFT] += h * mean
+            memory[DRIFT] += h * weigh(integration.joints, width, drift)
+            memory[OBJECT_DRIFT] += h * weigh(integration.objects, width, drift)
             if tables.touching:
                 settle(tables, rows, model.work.paths, reached[2 * width :])
             for c in range(size):
@@ -270,7 +279,7 @@ def advance(address: int, end: float) -> int:
                 times[taken[0]] = memory[TIME]
                 for c in range(size):
                     stretch.states[taken[0], c] = x[c]
-            rechart(tables, x, integration.attitude)
+            rechart(tables, x, integration.attitude, drift)
             if taken[0] < times.size:
                 for f in range(stretch.attitudes.shape[1]):
                     for c in range(4):

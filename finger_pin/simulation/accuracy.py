@@ -16,6 +16,7 @@ from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenar
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.surroundings import POSE, VELOCITY
 from finger_pin.simulation.recorded import Recording
 
 #: Steps between two looks at a compiled simulation.
@@ -117,6 +118,8 @@ def estimate_error(
 ) -> tuple[float, str]:
     """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
 
+    Of objects it is that of their turns and places, rad and m, where that is larger.
+
     Where the estimate that the integration carried along is large, or the finger is close to self-locking, where the
     linearised flow does not show how far slips go, the run is repeated at a tighter tolerance, and the difference
     counts; or the difference to the coarser one that it replaces.
@@ -137,12 +140,11 @@ def estimate_error(
         tighter = with_tighter(run.scenario, _TIGHTER)
         other, rtol = repeated(tighter, _patient(trajectory, _MOST_LOOKS)), tighter.simulation.rtol
     times = scenario.sample_times()
-    times, joints = times[times <= other.breakpoints[-1]], len(scenario.finger.joints)
+    times = times[times <= other.breakpoints[-1]]
     if len(times) < 2:
         # It was stopped before it could say anything.
         return error, ""
-    difference = (trajectory.interpolate(times) - other.interpolate(times))[:, :joints]
-    error = float(np.sqrt(np.mean(difference**2)))
+    error = _difference(scenario, trajectory.interpolate(times), other.interpolate(times))
     if error <= expected:
         return error, ""
     return error, (
@@ -150,6 +152,20 @@ def estimate_error(
         "The motion is sensitive, as close to self-locking or in a loop that hunts; "
         "try a smaller simulation.rtol and atol_scale"
     )
+
+
+def _difference(scenario: Scenario, one: Array, other: Array) -> float:
+    """Return how far packed states, shape (m, size), differ: of joints or objects, whichever is more; rad or m rms."""
+    joints = len(scenario.finger.joints)
+    found = float(np.sqrt(np.mean((one - other)[:, :joints] ** 2)))
+    moving = sum(each.moves for each in (scenario.environment.objects or {}).values())
+    if not moving:
+        return found
+    poses, others = (x[:, joints : joints + POSE * moving].reshape(len(x), moving, POSE) for x in (one, other))
+    alike = np.abs(np.sum(poses[..., 3:] * others[..., 3:], axis=-1))
+    turns = 2.0 * np.arccos(np.minimum(alike, 1.0))
+    squares = np.sum((poses - others)[..., :3] ** 2, axis=-1) + turns**2
+    return max(found, float(np.sqrt(np.mean(squares) / VELOCITY)))
 
 
 def with_tighter(scenario: Scenario, factor: float) -> Scenario:
