@@ -74,13 +74,14 @@ def _simulator(rounds: int) -> dict[str, float]:
     tension, period, many = np.array([1.0, 1.0, 4.4, 3.1]), 0.02, 64
     # Tensions that change at every step, as a policy's do.
     tensions = iter(tension * np.random.default_rng(0).uniform(0.9, 1.1, (100_000, 4)))
-    x, worlds = sim.x, [sim.clone() for _ in range(many)]
+    # One that is set and reset begins with small steps again: it is another one that is stepped.
+    other, x, worlds = sim.clone(), sim.x, [sim.clone() for _ in range(many)]
     jobs: dict[str, Callable[[], Any]] = {
         "step": lambda: sim.step(next(tensions), period),
-        "set x": lambda: setattr(sim, "x", x),
-        "signals": sim.signals,
-        "reset": sim.reset,
-        "set_parameters": lambda: sim.set_parameters({"finger.tendon_friction.coulomb": 0.12}),
+        "set x": lambda: setattr(other, "x", x),
+        "signals": other.signals,
+        "reset": other.reset,
+        "set_parameters": lambda: other.set_parameters({"finger.tendon_friction.coulomb": 0.12}),
     }
     for _ in range(10):
         jobs["step"]()

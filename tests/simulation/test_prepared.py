@@ -51,6 +51,9 @@ def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
     """The scenario of each number alone; and, of all that can be changed together, everything a run computes with."""
     scenario, together = fp.load_scenario(name), {}
     for key, value in numbers(scenario.model_dump(mode="python", exclude_none=True)):
+        if name == "grasp" and key.startswith("hand."):
+            # The same hand as in `hand`.
+            continue
         given, family = changed(value), Family(scenario, [key])
         try:
             read = fp.load_scenario(name, {key: given})
