@@ -69,8 +69,8 @@ def steady_state(
 def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:
     """Return the motors' currents, shape (m, k): what holds the tendons' torque and slides the gears.
 
-    With s the sign of the speed and T the tendons' torque, tau = T + s level + b w and N = |tau - x T|; the level is
-    linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign.
+    With s the sign of the speed w and T the tendons' torque, tau = T + s level + b w and N = |tau - x T|; the level
+    is linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign.
     """
     base, by_load, more, more_by_load, velocity, exponent, viscous, _, driving, driven = actuators.gearbox
     torque = command[:, actuators.tendons] @ actuators.spools
@@ -79,7 +79,7 @@ def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> A
     way, share = np.sign(speed), stribeck_share(speed, velocity, exponent)
     lost = loss_share(torque, speed, driving, driven) * np.abs(torque)
     dry, slope = base + more * share + lost, by_load + more_by_load * share
-    unheld = (1.0 - actuators.external_weight) * torque
+    unheld = (1.0 - actuators.external_weight) * torque + viscous * speed
     sided = [(side, (dry + slope * side * unheld) / (1.0 - slope * side * way)) for side in (1.0, -1.0)]
     level = np.where(unheld + way * sided[0][1] >= 0.0, sided[0][1], sided[1][1])
     current: Array = (torque + way * level + (0.0 if at_rest else viscous * speed)) / actuators.motor[0]

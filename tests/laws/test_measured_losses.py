@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
+from finger_pin.analysis import steady_state
 from finger_pin.laws.capstan import DRIVEN_TENDON, capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.hysteresis import HYSTERESIS
@@ -68,3 +69,19 @@ def test_the_account_of_a_servo_finger_with_all_of_these_losses_closes():
     exchanged = sum(abs(result[name]).max() for name in result if str(name).startswith("energy_exchanged_"))
     assert abs(result.energy_residual).max() < 1e-4 * exchanged
     assert abs(result.joint_position - plain.joint_position).max() > 1e-3
+
+
+def test_the_current_of_a_servo_that_slides_evenly_balances_its_torques():
+    """Put back into K_t i = T + s level + b w, with the level of the law at N = |K_t i - x T|."""
+    losses = {f"finger.actuators.M1.motor.friction.{way}": share for way, share in (("driving", 0.2), ("driven", 0.1))}
+    finger = fp.load_scenario("servo_bench", losses).finger
+    pull, speed = np.array([[5.0], [5.0], [9.0]]), np.array([0.02, -0.02, 0.05])
+    current = steady_state(finger, pull, speed).current[:, 0]
+    motor, gears = finger.actuators["M1"].motor, finger.actuators["M1"].motor.friction
+    for each, f, v in zip(current, pull[:, 0], speed, strict=True):
+        torque, load, w = motor.constants[0] * each, 0.008 * f, v / 0.008
+        carried = abs(torque - gears.external_weight * load)
+        share = np.exp(-((abs(w) / gears.stribeck_velocity) ** gears.stribeck_exponent))
+        level = gears.coulomb + gears.by_load * carried + (gears.stribeck + gears.stribeck_by_load * carried) * share
+        level += (gears.driving if v > 0.0 else gears.driven) * load
+        assert torque == pytest.approx(load + np.sign(w) * level + gears.viscous * w, rel=2e-4)
