@@ -1,10 +1,10 @@
 """All that rests on numba's inside; `pyproject.toml` caps numba to the versions that this was tried with.
 
-What it saves of the 25 s of processor time that compiling the core took on one machine, and what would replace it:
+What it saves of the processor time of compiling the core, measured in turns on one machine, and what would replace it:
 
 - `_Fields` and `_field` give the fields of a table to compiled code. `numba.extending.overload_attribute` with
-  `numba.carray` does the same and takes 10 s more: it compiles a function for each field of each table.
-- `INTERNAL` leaves out the wrappers through which Python would call a function: 3 s. Without it all is the same.
+  `numba.carray` does the same and takes a fourth more: it compiles a function for each field of each table.
+- `INTERNAL` leaves out the wrappers through which Python would call a function: a twentieth. All else is the same.
 """
 
 from __future__ import annotations
