@@ -26,6 +26,7 @@ STAGES = (
     "hand",
     "contact",
     "mujoco",
+    "mujoco-friction",
     "prepared",
     "many-runs",
     "main-job",
@@ -80,9 +81,10 @@ def chosen(names: str) -> tuple[str, ...]:
 
 def stage(name: str) -> Any:
     """Return the module of a stage."""
-    from benchmarks import chains, contacts, hands, many, mujoco_loop, prepared, processes, stepping, work_precision
+    from benchmarks import chains, contacts, hands, many, mujoco_friction, mujoco_loop, prepared, processes, stepping
+    from benchmarks import work_precision as precision
 
-    modules = (work_precision, stepping, chains, hands, contacts, mujoco_loop, prepared, many, processes)
+    modules = (precision, stepping, chains, hands, contacts, mujoco_loop, mujoco_friction, prepared, many, processes)
     return dict(zip(STAGES, modules, strict=True))[name]
 
 

@@ -5,6 +5,7 @@ MuJoCo resolves defaults, classes and includes; what is read here is its compile
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mujoco_flags import obeyed
 from finger_pin.mechanism.mujoco_names import Names, Table, distinct, entry_name, quaternion
+from finger_pin.mechanism.mujoco_overlay import lay_tendons
 from finger_pin.mechanism.mujoco_rest import Rest
 from finger_pin.mechanism.mujoco_shapes import Shapes
 from finger_pin.mechanism.mujoco_tendons import STOP, TendonReader
@@ -31,7 +33,9 @@ _COUPLED = 0.005
 _HIDDEN = 3
 
 
-def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
+def from_mujoco(
+    model: Any, name: str = "hand", *, tendons: Mapping[str, Mapping[str, Any]] | str | Path | None = None
+) -> FingerDescription:
     """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
 
     Motors that can only pull a tendon through space become tendons of the hand, with friction along their path and
@@ -43,20 +47,28 @@ def from_mujoco(model: Any, name: str = "hand") -> FingerDescription:
     Args:
         model: A `mujoco.MjModel`, or the path of an XML file.
         name: Of the hand.
+        tendons: Tendons to lay over a model that has none, or not all; see `lay_tendons`. The model has to be a file
+            then, or a `mujoco.MjSpec`.
 
     Raises:
-        InputError: If it is neither, MuJoCo refuses the file, the model has no tendons, or it has muscles or ball
-            joints.
+        InputError: If it is neither, MuJoCo refuses the file, or it has muscles, ball joints or nothing that drives it.
     """
     try:
         import mujoco
     except ImportError:
         raise InputError("model", "needs MuJoCo: pip install 'finger-pin[mujoco]'") from None
-    if isinstance(model, str | Path):
+    if isinstance(model, str | Path | mujoco.MjSpec):
         try:
-            model = mujoco.MjModel.from_xml_path(str(model))
+            spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))
+            if tendons is not None:
+                lay_tendons(spec, tendons)
+            model = spec.compile()
         except ValueError as error:
+            if isinstance(error, InputError):
+                raise
             raise InputError(f"model {model}", " ".join(str(error).split())) from None
+    elif tendons is not None:
+        raise InputError("model", "must be a file or a mujoco.MjSpec to lay tendons over it", type(model).__name__)
     if not isinstance(model, mujoco.MjModel):
         raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
     return validate(FingerDescription, _Reader(mujoco, model).table(name), ("finger",))
@@ -68,8 +80,6 @@ class _Reader:
     def __init__(self, mujoco: Any, model: Any) -> None:
         self.mujoco, self.model = mujoco, obeyed(mujoco, model)
         model = self.model
-        if model.ntendon == 0:
-            raise InputError("model", "has no tendons")
         self.rest = Rest(mujoco, model)
         self.names = Names.of(model)
         self.shapes = Shapes(mujoco, model, self.names, self.rest)

@@ -115,7 +115,7 @@ class Rest:
     def _every(self, what: str, attribute: str, has: str, by_dof: bool = False) -> None:
         """List every element whose numbers of an attribute, which older versions lack, are not zero."""
         values = getattr(self.model, attribute, None)
-        if values is None:
+        if values is None or not len(values):
             return
         for i in np.flatnonzero(np.any(np.reshape(values, (len(values), -1)), axis=1)):
             index = self.model.dof_jntid[i] if by_dof else i

@@ -220,13 +220,12 @@ def test_what_is_not_carried_over_is_listed():
     assert list(description.tree.bodies) == ["w"]
 
 
-def test_muscles_ball_joints_and_models_without_tendons_are_refused_by_name():
+def test_muscles_and_ball_joints_are_refused_by_name():
     muscle = f'{FIXED}<actuator><muscle name="biceps" tendon="t" lengthrange="0 1"/></actuator>'
     ball = '<body pos="1 0 0"><joint name="shoulder" type="ball"/><geom size="0.1"/></body>'
     for model, text in (
         (model_of(LINK, muscle), "actuator biceps: is a muscle"),
         (model_of(LINK + ball, FIXED), "joint shoulder: is a ball joint"),
-        (model_of(LINK, ""), "model: has no tendons"),
     ):
         with pytest.raises(fp.InputError, match=text):
             fp.from_mujoco(model)
