@@ -32,7 +32,7 @@ SHORTER = {
     r":6:log": ":2:log",
     r"--samples \d+": "--samples 2",
     r"(cliffs\.py) \d+": r"\1 1",
-    r"(coverage\.py) \d+": r"\1 2",
+    r"(intervals\.py) \d+": r"\1 2",
     r"(validate\.py)( --only \S+)?$": r"\1 --only kinematics",
     r"force_capability\.py$": "force_capability.py ub --posture 0,30,30,20 --limit 15 --force 0,0,1 --view",
     r"conclusions\.py$": "conclusions.py fig6 --only a",
