@@ -13,8 +13,8 @@ class Kinematics:
 
     Attributes:
         tip: p, fingertip position, shape (..., 3), m; of several shape (..., t, 3).
-        tip_velocity: p', shape (..., 3), m/s, of the first.
-        jacobian: J of (6), shape (..., 3, n), of the first.
+        tip_velocity: p', m/s, of the same shape.
+        jacobian: J of (6), shape (..., 3, n); of several (..., t, 3, n).
         directions: e_j, unit vectors along the link proximal to each joint, base frame, shape (..., n, 3).
         kinetic_energy: Shape (...,), J.
         potential_energy: Of gravity, shape (...,), J.

@@ -17,12 +17,13 @@ import numpy as np
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.mjcf_friction import add_friction_elements
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME
+from finger_pin.mechanism.urdf import BASE_FRAME, TENSION_LIMIT, TIP_FRAME, exported
 
 #: Time step, s, of a model without lumped masses.
 TIMESTEP = 1e-4
@@ -61,7 +62,7 @@ _MASSLESS = """
 
 
 def to_mjcf(
-    description: FingerDescription | HandDescription,
+    description: FingerDescription | HandDescription | Scenario,
     *,
     posture: Sequence[float] | None = None,
     timestep: float | None = None,
@@ -76,7 +77,7 @@ def to_mjcf(
     are named as in the URDF. Numbers are written so that reading them gives the same floats.
 
     Args:
-        description: The finger or hand.
+        description: The finger or hand, or the scenario that has it.
         posture: theta of the keyframe ``start``, shape (n,), rad, with the lumped masses where both halves are
             stretched alike; all joints at zero by default.
         timestep: Of MuJoCo, s; by default a step that the lumped masses are stable with.
@@ -85,22 +86,13 @@ def to_mjcf(
             0.1 ms instead of some microseconds.
         shapes: Whether to write the shapes.
         friction: Whether to write law (9) of tendons and joints, with which the model loads only where
-        `finger_pin.mujoco`
-            has been imported.
+            `finger_pin.mujoco` has been imported.
 
     Raises:
         InputError: If it is no finger or hand, it has a tree of bodies or a joint without a link, the posture has the
-        wrong size, or the time step is not positive.
+            wrong size, or the time step is not positive.
     """
-    if isinstance(description, HandDescription):
-        description = description.joined()
-    if not isinstance(description, FingerDescription):
-        allowed = "must be a finger or hand, such as fp.load_finger(name), fp.load_hand(name) or scenario.finger"
-        raise InputError("description", allowed, type(description).__name__)
-    if description.tree is not None:
-        raise InputError(
-            "finger.tree", "has bodies in place of links: a hand read from MuJoCo has its own MJCF already"
-        )
+    description = exported(description)
     tendons = Tendons.from_description(description)
     links = _links(description)
     position = np.zeros(len(links)) if posture is None else np.asarray(posture, dtype=float)

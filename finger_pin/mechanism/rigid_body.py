@@ -179,16 +179,26 @@ class RigidBody:
         return [pin.SE3(each) for each in data.oMi], [still, *(np.asarray(each).reshape(6, -1) for each in twists)]
 
     def tip_position(self, q: Array) -> Array:
-        """Return the fingertip p of (1), shape (3,), m, at joint position q, shape (n,)."""
+        """Return the fingertip p of (1) at q of shape (..., nq), m, base frame.
+
+        Returns:
+            Shape (..., 3); of t tips, as a hand has them, shape (..., t, 3), in the order of `tips`.
+        """
+        if q.ndim > 1:
+            return np.array([self.tip_position(each) for each in q])
         pin.framesForwardKinematics(self.model, self._data, q)
-        return np.array(self._data.oMf[self.tip_frame].translation)
+        return self._of_tips([self._data.oMf[tip].translation for tip in self.tips], 3)
 
     def jacobian(self, q: Array) -> Array:
-        """Return J = dp/dtheta of (6), shape (3, n)."""
-        reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        found = pin.computeFrameJacobian(self.model, self._data, q, self.tip_frame, reference)
+        """Return J = dp/dtheta of (6) at q of shape (nq,): shape (3, n), or (t, 3, n) of t tips."""
+        reference, model, data = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, self.model, self._data
+        found = [pin.computeFrameJacobian(model, data, q, tip, reference) for tip in self.tips]
         # Of a single joint Pinocchio returns a vector.
-        return np.array(found).reshape(6, -1)[:3]
+        return self._of_tips([np.reshape(each, (6, -1))[:3] for each in found], 3, model.nv)
+
+    def _of_tips(self, found: list[Array], *shape: int) -> Array:
+        """Return what was found at the tips, of the given shape each; of one tip without a dimension for it."""
+        return np.array(found).reshape(shape if len(found) == 1 else (len(found), *shape))
 
     def mass_matrix(self, q: Array) -> Array:
         """Return M(theta) by the composite rigid body algorithm, shape (n, n)."""
@@ -268,7 +278,7 @@ class RigidBody:
         jacobian = self.jacobian(q)
         # Pinocchio's kinetic energy is without what turns with the joints' motors.
         kinetic = pin.computeKineticEnergy(self.model, self._data, q, v) + 0.5 * self.model.armature @ (v * v)
-        # Only now is every branch placed: the Jacobian places the fingertip's alone.
+        # Only now is every branch placed: a Jacobian places its own alone.
         directions = self._directions()
         potential = pin.computePotentialEnergy(self.model, self._data, q)
         if base is not None:
@@ -278,10 +288,9 @@ class RigidBody:
             kinetic = pin.computeKineticEnergy(model, data, np.append(pose, q), moving)
             centre = pin.centerOfMass(self.model, self._data, q)
             potential = -self.mass * float(base[12:15] @ centre)
-        pin.framesForwardKinematics(self.model, self._data, q)
-        tips = np.array([self._data.oMf[each].translation for each in self.tips])
-        tip = tips[0] if len(tips) == 1 else tips
-        return Kinematics(tip, jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential))
+        return Kinematics(
+            self.tip_position(q), jacobian @ v, jacobian, directions, np.array(kinetic), np.array(potential)
+        )
 
     def _directions(self) -> Array:
         placements = self._data.oMi

@@ -12,6 +12,7 @@ import pinocchio as pin
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.remembering import Remembered
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
@@ -29,7 +30,7 @@ VELOCITY_LIMIT = 20.0
 _RESERVED = (TIP_FRAME, f"{TIP_FRAME}_fixed", "universe")
 
 
-def to_urdf(description: FingerDescription, drawn: bool = True) -> str:
+def to_urdf(description: FingerDescription | HandDescription | Scenario, drawn: bool = True) -> str:
     """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
 
     Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
@@ -37,12 +38,14 @@ def to_urdf(description: FingerDescription, drawn: bool = True) -> str:
     same floats.
 
     Args:
-        description: The finger, not a hand.
+        description: The finger, or the scenario that has it; not a hand of several.
         drawn: With shapes, and indented. Its motion needs neither.
 
     Raises:
-        InputError: If a joint has no link, or a name that the URDF needs itself.
+        InputError: If it is no finger, it has a tree of bodies or a joint without a link, or a name that the URDF
+            needs itself.
     """
+    description = exported(description)
     if description.hand is not None:
         raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
     links = _links(description)
@@ -67,6 +70,25 @@ def to_urdf(description: FingerDescription, drawn: bool = True) -> str:
     if drawn:
         ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def exported(described: FingerDescription | HandDescription | Scenario) -> FingerDescription:
+    """Return the finger, or a hand's fingers together, of what is to be written as a file of another program.
+
+    Raises:
+        InputError: If it is none of them, or has a tree of bodies.
+    """
+    if isinstance(described, Scenario):
+        described = described.finger
+    if isinstance(described, HandDescription):
+        described = described.joined()
+    if not isinstance(described, FingerDescription):
+        allowed = "must be a finger, hand or scenario, as fp.load_finger(name), or finger.description"
+        raise InputError("description", allowed, type(described).__name__)
+    if described.tree is not None:
+        allowed = "is not written: bodies in place of links; what was read from MuJoCo has its own MJCF"
+        raise InputError("finger.tree", allowed, described.name)
+    return described
 
 
 def effort_limit(description: FingerDescription, joint: str) -> float:

@@ -230,6 +230,12 @@ def test_wrong_options_are_errors_that_name_them(options, entry):
     assert caught.value.entry == entry
 
 
+def test_a_scenario_is_exported_as_its_finger_or_hand_is():
+    assert to_mjcf(fp.load_scenario("fig6")) == to_mjcf(fp.load_finger("ub"))
+    assert to_mjcf(fp.load_scenario("hand")) == to_mjcf(fp.load_hand("ub_hand"))
+    assert to_urdf(fp.load_scenario("fig6")) == to_urdf(fp.load_finger("ub"))
+
+
 def test_a_joint_without_a_link_is_an_error_that_names_it():
     finger = fp.load_finger("planar")
     joints = {**finger.joints, "distal": finger.joints["distal"].model_copy(update={"link": None})}
@@ -238,14 +244,13 @@ def test_a_joint_without_a_link_is_an_error_that_names_it():
     assert caught.value.entry == "finger.joints.distal.link"
 
 
-def test_what_is_no_finger_of_links_is_refused_by_name():
-    for given, entry in (
-        (fp.load_scenario("fig6"), "description"),
-        (fp.from_mujoco(mujoco.MjModel.from_xml_string(ROUTED)), "finger.tree"),
-    ):
+@pytest.mark.parametrize("export", [to_mjcf, to_urdf])
+def test_what_is_no_finger_of_links_is_refused_by_name(export):
+    tree = fp.from_mujoco(mujoco.MjModel.from_xml_string(ROUTED))
+    for given, entry, value in (("ub", "description", "str"), (tree, "finger.tree", tree.name)):
         with pytest.raises(InputError) as caught:
-            fp.to_mjcf(given)
-        assert caught.value.entry == entry
+            export(given)
+        assert (caught.value.entry, caught.value.value) == (entry, value) and "\n" not in str(caught.value)
 
 
 def test_the_export_needs_no_mujoco():

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from finger_pin.description.loading import load_finger
+from finger_pin.description.loading import load_finger, load_hand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.urdf import build_rigid_body
@@ -130,6 +130,21 @@ def test_kinematics_agrees_with_the_single_queries(body):
         np.testing.assert_array_equal(found.jacobian, body.jacobian(q))
         np.testing.assert_allclose(found.tip_velocity, body.jacobian(q) @ v, rtol=0, atol=1e-15)
         np.testing.assert_array_equal(found.directions, body.link_directions(q))
+
+
+def test_all_tips_of_a_hand_are_those_of_its_fingers_in_their_places():
+    hand, rng = load_hand("ub_hand"), np.random.default_rng(7)
+    body, q = build_rigid_body(hand.joined()), rng.uniform(0.0, 1.0, (2, 3, 20))
+    tips, jacobian = body.tip_position(q), body.jacobian(q[1, 2])
+    assert tips.shape == (2, 3, 5, 3) and jacobian.shape == (5, 3, 20)
+    for index, (name, finger) in enumerate(hand.built().items()):
+        placed, own = hand.fingers[name], build_rigid_body(finger)
+        joints = slice(4 * index, 4 * index + 4)
+        expected = placed.rotation @ own.tip_position(q[1, 2, joints]) + placed.position
+        np.testing.assert_allclose(tips[1, 2, index], expected, rtol=0, atol=1e-15)
+        turned = np.zeros((3, 20))
+        turned[:, joints] = placed.rotation @ own.jacobian(q[1, 2, joints])
+        np.testing.assert_allclose(jacobian[index], turned, rtol=0, atol=1e-15)
 
 
 def test_kinematics_keeps_leading_dimensions(body):
