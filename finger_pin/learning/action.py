@@ -84,17 +84,17 @@ class Action:
         arrival = time + self._delay if self._begins or self._waiting else time
         self._waiting.append((arrival, action * self._scale))
 
-    def advance(self, stepper: Stepper, begin: float, end: float) -> int:
-        """Advance over a control period, with actions as they arrive; return the status of the stepper."""
-        while self._waiting and self._waiting[0][0] < end:
-            arrival, value = self._waiting.popleft()
-            arrival = max(arrival, begin)
-            if arrival > begin and self._begins:
-                status = stepper.advance(arrival)
-                if status:
-                    return status
-            self._hold(stepper, arrival, value)
-        return stepper.advance(end)
+    def next_piece(self, stepper: Stepper, begin: float, end: float) -> float:
+        """Hold what has arrived; return until when it acts, s, at most until the end.
+
+        Args:
+            stepper: Where to hold it.
+            begin: Now, s.
+            end: Of the control period, s.
+        """
+        while self._waiting and self._waiting[0][0] <= begin:
+            self._hold(stepper, begin, self._waiting.popleft()[1])
+        return min(self._waiting[0][0], end) if self._waiting else end
 
     def _hold(self, stepper: Stepper, time: float, value: Array) -> None:
         self._begins.append(time)

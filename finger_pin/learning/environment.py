@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
-from finger_pin.learning.world import World, build_spaces, read_action
+from finger_pin.learning.world import World, advance_all, build_spaces, read_action
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,7 +88,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """
         world = self._world
         world.act(read_action(action, self._actions))
-        world.advance()
+        advance_all([world])
         observation, signals = world.observe()
         reward, done = self.task.judge({name: value[None] for name, value in signals.items()}, 1)
         info = world.info(signals)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -27,27 +25,21 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     many threads there are. An episode that is over begins anew at the next step, whose action does not count.
     """
 
-    def __init__(
-        self, num_envs: int, scenario: Scenario | str | Path, *, threads: int | None = None, **task: Any
-    ) -> None:
+    def __init__(self, num_envs: int, scenario: Scenario | str | Path, **task: Any) -> None:
         """Prepare worlds.
 
         Args:
             num_envs: How many.
             scenario: As for `Environment`.
-            threads: That step them; by default as many as there are processors.
             task: As for `Environment`.
 
         Raises:
             InputError: Naming the argument, key or variable that is wrong.
         """
-        for name, value in (("num_envs", num_envs), ("threads", threads)):
-            if value is not None and (not isinstance(value, int | np.integer) or value < 1):
-                raise InputError(name, "must be a whole number above 0", value)
+        if not isinstance(num_envs, int | np.integer) or num_envs < 1:
+            raise InputError("num_envs", "must be a whole number above 0", num_envs)
         task.pop("render_mode", None)
         self.task, self.num_envs = Task(**task), int(num_envs)
-        self._threads = min(int(threads or os.cpu_count() or 1), self.num_envs)
-        self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
         first = World.of(scenario, self.task)
         self._worlds = [first, *(first.twin() for _ in range(self.num_envs - 1))]
         self.single_observation_space, self._single = build_spaces(first, self.task.limits)
@@ -105,7 +97,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
                 world.begin(self._randoms[i])
             else:
                 world.act(commands[i])
-        advance_all([world for i, world in enumerate(self._worlds) if not begun[i]], self._pool, self._threads)
+        advance_all([world for i, world in enumerate(self._worlds) if not begun[i]])
         self._seen, signals = observe_all(self._worlds)
         rewards, done = self.task.judge(signals, self.num_envs)
         over = np.array([world.over for world in self._worlds])
@@ -116,11 +108,6 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             for i, world in enumerate(self._worlds)
         ]
         return self._seen.copy(), rewards, done, over, self._gathered(own)
-
-    def close_extras(self, **_: Any) -> None:
-        """End the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
 
     def _gathered(self, own: list[dict[str, Any]]) -> dict[str, Any]:
         found: dict[str, Any] = {}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import sampled_control
+from finger_pin.core.batch import advance_together
 from finger_pin.core.integrator import integrate_compiled
 from finger_pin.core.stepper import TABLEAUS, Stepper
 from finger_pin.description.family import Family
@@ -43,6 +43,7 @@ class World:
 
     Attributes:
         task: What is asked of the policy.
+        stepper: What moves.
         drawn: What was drawn for the episode: numbers by key, and what the task draws.
         reason: Why the motion cannot go on; empty if it can.
     """
@@ -89,9 +90,9 @@ class World:
         self.action = Action(self.task.action, loop.finger, self.task.duration)
         driven = self.action if self.action.drives is not None else None
         self._loop = replace(loop, controller=self.action, drives=driven)
-        self._stepper = self._stepper_at(loop.initial_state())
+        self.stepper = self._stepper_at(loop.initial_state())
         if self.action.drives is not None:
-            self._stepper.drive(self.action.drives)
+            self.stepper.drive(self.action.drives)
         table = variables(self._loop)
         self._variables = {name: table[name] for name in self.task.variables if name in table}
 
@@ -129,7 +130,7 @@ class World:
         if self._randomisation.keys:
             self._build(self._family.at([self.drawn[key] for key in self._randomisation.keys]))
         self._begun = self._start()
-        self._stepper.restart(self._begun, time=0.0)
+        self.stepper.restart(self._begun, time=0.0)
         task = self.task
         context = {} if task.draw is None else task.draw(random)
         self.context = {name: np.asarray(value, dtype=float) for name, value in context.items()}
@@ -172,15 +173,20 @@ class World:
         """Take an action, which holds from the next period on, or later by its delay."""
         self.action.take(action, self.time)
 
-    def advance(self) -> None:
-        """Go through a control period."""
-        if self.reason:
-            return
+    def next_end(self) -> float:
+        """Hold what acts now, and return until when, s; the time that it has reached where the period is over."""
         end = (self._step + 1) * self.task.period
-        status = self.action.advance(self._stepper, self.time, end)
-        if status:
-            self.reason = self._stepper.failure(status, self._loop.finger.layout.names)
+        now = self.stepper.time
+        return now if self.reason or now >= end else self.action.next_piece(self.stepper, now, end)
+
+    def end_period(self) -> None:
+        """Count a control period."""
         self._step += 1
+
+    def note(self, status: int) -> None:
+        """Take note of how a stepper ended a piece."""
+        if status:
+            self.reason = self.stepper.failure(status, self._loop.finger.layout.names)
 
     def observe(self) -> tuple[Array, dict[str, Array]]:
         """Return what the policy sees, shape (o,), and the truth by name."""
@@ -193,7 +199,7 @@ class World:
         return np.concatenate(seen, dtype=np.float32), signals
 
     def _motions(self) -> Motions:
-        return instant(self._loop, self._stepper.time, self._stepper.x)
+        return instant(self._loop, self.stepper.time, self.stepper.x)
 
     def info(self, signals: Mapping[str, Array]) -> dict[str, Any]:
         """Return what goes beside an observation: privileged variables, and why the motion cannot go on if so."""
@@ -208,7 +214,7 @@ class World:
         """Return the episode so far, integrated again step by step, as a Dataset with its energy account."""
         if not self._step:
             raise InputError("result", "is of steps, and there are none yet: call step")
-        stepper, end = self._stepper_at(self._begun), self._stepper.time
+        stepper, end = self._stepper_at(self._begun), self.stepper.time
         if self.action.drives is not None:
             stepper.drive(self.action.again())
         held = self.action.replayed() if self.action.drives is None else None
@@ -255,18 +261,24 @@ def read_action(action: Any, space: Box) -> Array:
     return np.asarray(np.clip(found, space.low, space.high), dtype=float)
 
 
-def advance_all(worlds: Sequence[World], pool: ThreadPoolExecutor | None, threads: int) -> None:
-    """Advance worlds by a control period, side by side in threads of a pool."""
+def advance_all(worlds: Sequence[World]) -> None:
+    """Advance worlds by a control period, side by side in threads without Python in between.
 
-    def advance(own: Sequence[World]) -> None:
-        for world in own:
-            world.advance()
-
-    if pool is None:
-        advance(worlds)
-    else:
-        # Worlds are handed out in turn: neighbours that begin together do not all go to one thread.
-        list(pool.map(advance, [worlds[at::threads] for at in range(threads)]))
+    Where actions arrive within the period, it has several pieces.
+    """
+    while True:
+        ends = [world.next_end() for world in worlds]
+        due = [(world, end) for world, end in zip(worlds, ends, strict=True) if end > world.stepper.time]
+        if not due:
+            break
+        if len(due) == 1:
+            statuses = [due[0][0].stepper.advance(due[0][1])]
+        else:
+            statuses = advance_together([world.stepper for world, _ in due], [end for _, end in due])
+        for (world, _), status in zip(due, statuses, strict=True):
+            world.note(status)
+    for world in worlds:
+        world.end_period()
 
 
 def observe_all(worlds: Sequence[World]) -> tuple[Array, dict[str, Array]]:
