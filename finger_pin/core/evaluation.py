@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+<<<<<<< HEAD
+=======
+from finger_pin.core.binding import bound, call
+>>>>>>> 2fd9713 (One posture after the other is moved through memory that is bound once)
 from finger_pin.core.charts import Charts
 from finger_pin.core.control import held_control
 from finger_pin.core.jit import call
@@ -250,14 +255,26 @@ class CompiledMechanism:
 
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
+        count, alone = len(np.atleast_2d(position)), np.ndim(position) == 1
+        # One posture after the other is asked for in loops: what is bound once serves them all.
+        motions, block = self._one if count == 1 and base is None else self._bound_motions(count, base)
+        motions.positions[:], motions.velocities[:] = position, velocity
+        motion_many(block.ctypes.data)
+        at = 0 if alone else slice(None)
+        tips = motions.tips[at] if motions.tips.shape[1] != 1 else motions.tips[at][..., 0, :]
+        return Motion(tips.copy(), motions.kinetic[at].copy(), motions.potential[at].copy())
+
+    @cached_property
+    def _one(self) -> tuple[Motions, NDArray[np.uint8]]:
+        return self._bound_motions(1, None)
+
+    def _bound_motions(self, count: int, base: Array | None) -> tuple[Motions, NDArray[np.uint8]]:
+        """Return room for postures, and the block that compiled code finds it by."""
         tables = self._tables
-        shape = (np.atleast_2d(position).shape[0], len(tables.parents))
-        tips, kinetic, potential = np.zeros((shape[0], len(tables.tip_body), 3)), np.zeros(shape[0]), np.zeros(shape[0])
-        given = _rows(position, shape), _rows(velocity, shape)
-        motions = Motions(self._models.model().address, *given, tips, kinetic, potential, _bases(base, shape[0], 0))
-        call(motion_many, motions, MOTIONS)
-        at = 0 if np.ndim(position) == 1 else slice(None)
-        return Motion(tips[at] if tips.shape[1] != 1 else tips[at][..., 0, :], kinetic[at], potential[at])
+        shape = (count, len(tables.parents))
+        filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
+        motions = Motions(self._models.model().address, np.zeros(shape), np.zeros(shape), *filled, _bases(base, count, 0))
+        return motions, bound(motions, MOTIONS)
 
 
 class CompiledFinger:
