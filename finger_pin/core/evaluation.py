@@ -9,13 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-<<<<<<< HEAD
-=======
-from finger_pin.core.binding import bound, call
->>>>>>> 2fd9713 (One posture after the other is moved through memory that is bound once)
 from finger_pin.core.charts import Charts
 from finger_pin.core.control import held_control
-from finger_pin.core.jit import call
+from finger_pin.core.jit import bound, call
 from finger_pin.core.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.model import BoundModel
 from finger_pin.core.signals import MOTIONS, STATES, Motions, States, evaluate_many, motion_many
