@@ -269,7 +269,9 @@ class CompiledMechanism:
         tables = self._tables
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
-        motions = Motions(self._models.model().address, np.zeros(shape), np.zeros(shape), *filled, _bases(base, count, 0))
+        motions = Motions(
+            self._models.model().address, np.zeros(shape), np.zeros(shape), *filled, _bases(base, count, 0)
+        )
         return motions, bound(motions, MOTIONS)
 
 
