@@ -8,7 +8,7 @@ import platform
 import sys
 import time
 from functools import partial
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,18 +19,20 @@ from finger_pin.commands.console import noted, print_text
 from finger_pin.commands.options import Output, wrong
 
 PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "scikit-sundae")
-STAGES = (
-    "work-precision",
-    "step-interface",
-    "joints",
-    "hand",
-    "contact",
-    "mujoco",
-    "mujoco-friction",
-    "prepared",
-    "many-runs",
-    "main-job",
-)
+#: The stages in their order, and the module of each.
+STAGES = {
+    "work-precision": "work_precision",
+    "step-interface": "stepping",
+    "joints": "chains",
+    "hand": "hands",
+    "contact": "contacts",
+    "mujoco": "mujoco_loop",
+    "mujoco-friction": "mujoco_friction",
+    "learning": "learning",
+    "prepared": "prepared",
+    "many-runs": "many",
+    "main-job": "processes",
+}
 
 
 def benchmark(
@@ -81,11 +83,7 @@ def chosen(names: str) -> tuple[str, ...]:
 
 def stage(name: str) -> Any:
     """Return the module of a stage."""
-    from benchmarks import chains, contacts, hands, many, mujoco_friction, mujoco_loop, prepared, processes, stepping
-    from benchmarks import work_precision as precision
-
-    modules = (precision, stepping, chains, hands, contacts, mujoco_loop, mujoco_friction, prepared, many, processes)
-    return dict(zip(STAGES, modules, strict=True))[name]
+    return import_module(f"benchmarks.{STAGES[name]}")
 
 
 def surroundings() -> dict[str, Any]:
