@@ -74,13 +74,16 @@ class IslandMotion:
 
         Args:
             times: Shape (m,), s.
-            force: At all tips, shape (t, 3) or (m, t, 3), N.
+            force: At all tips, shape (t, 3) or (m, t, 3), of one tip (3,) or (m, 3), N.
             base: As for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
         """
         part, (states, attitudes) = self.part, self.interpolate(times)
         commands = np.empty((len(times), len(part.control.tension)))
         call(command_many, Commands(part.model.address, np.array(times), states, commands), COMMANDS)
-        forces = np.broadcast_to(force, (len(times), len(self.mechanism.body.tips), 3))[:, part.island.tips]
+        tips = len(self.mechanism.body.tips)
+        # Of one tip, forces over time have no axis of their own for it.
+        given = force.reshape(-1, 1, 3) if tips == 1 else force
+        forces = np.broadcast_to(given, (len(times), tips, 3))[:, part.island.tips]
         booked, external = book_many(self._models, states, attitudes, commands, forces, base)
         width, bodies = external.shape[1], len(part.tables.parents)
         fingertip = np.sum(external[:, :bodies] * states[:, width : width + bodies], axis=1)

@@ -123,7 +123,6 @@ def lines(study: Mapping[str, Any]) -> Iterator[str]:
     yield f"control steps of {1e3 * _PERIOD:g} ms of Reach, wall time of each, and rms error of the angles"
     for kind, found in study["kinds"].items():
         names = {"one": "one world", "many": f"{study['worlds']} worlds in threads, each"}
-        errors = found["errors"]
         rows = [
             (
                 names.get(name, name),

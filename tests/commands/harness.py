@@ -10,7 +10,8 @@ ALL = {"scenario.toml", "trajectory.nc", "animation.html"}
 
 def quick_figures(result, folder, names=None, format=None):
     """In place of figures."""
-    folder.mkdir()
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     for name in ("fig6", "energy"):
         (folder / f"{name}.png").write_text(name)
 

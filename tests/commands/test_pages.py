@@ -21,7 +21,7 @@ from harness import quick_figures
 import finger_pin as fp
 import finger_pin.studies as studies
 from finger_pin.commands import application
-from finger_pin.description import reading
+from finger_pin.description import loading, reading
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("[fst]*/**/README.md"))]
@@ -69,6 +69,7 @@ def shown(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setattr(reading, "resources", SimpleNamespace(files=lambda package: shipped))
+        forget_what_ships()
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.serving.Viewing.wait", lambda viewing: viewing.close())
         patch.setattr("finger_pin.views.plots.saving.save_figure", not_painted)
@@ -79,6 +80,12 @@ def shown(tmp_path_factory):
         patch.setattr(meshcat, "Visualizer", partial(meshcat.Visualizer, window=silent))
         patch.setattr(webbrowser, "open", lambda url, new: True)
         yield SimpleNamespace(folder=folder, done=set())
+    forget_what_ships()
+
+
+def forget_what_ships():
+    for kept in (reading._shipped_texts, reading._shipped_table, loading._shipped_scenario):
+        kept.cache_clear()
 
 
 def not_moved(result, path, finger=None):
