@@ -38,6 +38,7 @@ from finger_pin.mechanism.mujoco_friction import (
 from finger_pin.mujoco.elements import mass, pin, tendon
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
+    borrowed,
     compiled,
     flags,
     integer,
@@ -114,8 +115,12 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
     values, objects, types = numbers(m, at.tuple_objprm), integers(m, at.tuple_objid), integers(m, at.tuple_objtype)
     dofs, states = integers(m, at.jnt_dofadr), numbers(d, of.plugin_state)
     act, rate, dt = numbers(d, of.act), numbers(d, of.act_dot), number(m, at.timestep)
-    along, about = driven(m, d, at, of, kinds)
-    reactions, rows = np.zeros(width), np.zeros((3, width + len(along)))
+    count = width + size(m, at.ntendon)
+    room = np.zeros(5 * count)
+    # Of every degree of freedom, then of every tendon: what drives it, what presses pins, and three of its row.
+    about, along, reactions = borrowed(room), borrowed(room, width), borrowed(room, count)
+    rows = borrowed(room, 2 * count)
+    driven(m, d, at, of, kinds, along, about)
     # Tendons load pins, and so come before them.
     for turn in range(2):
         e, z, x, place = _start(m, at, key, instance)
@@ -135,11 +140,13 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
                 rate[z] = 0.0
                 rate[x : x + LOADS[kind]] = 0.0
                 force, drag, limit = _exerted(values[e:], act[z], speed, level, load, dt)
-                rows[0, row] += ratio * force
-                rows[1, row] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
-                rows[2, row] += abs(ratio) * min(limit, most)
+                rows[3 * row] += ratio * force
+                rows[3 * row + 1] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
+                rows[3 * row + 2] += abs(ratio) * min(limit, most)
             e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
     _write(m, d, at, of, kinds, rows, dt)
+    # Held until here.
+    room[0] = 0.0
 
 
 @compiled
@@ -193,13 +200,13 @@ def _write(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> 
     for r in range(ne, ne + integer(d, of.nf)):
         of_dof = kind[r] == kinds.friction_dof
         row = which[r] if of_dof else width + which[r]
-        if rows[1, row] == 0.0:
+        if rows[3 * row + 1] == 0.0:
             continue
         speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
-        before, held = resistance[r], 1.0 / (rows[1, row] * dt)
-        aref[r] = -speed / dt - held * rows[0, row]
+        before, held = resistance[r], 1.0 / (rows[3 * row + 1] * dt)
+        aref[r] = -speed / dt - held * rows[3 * row]
         resistance[r], weight[r] = held, 1.0 / held
-        most[r] = max(rows[2, row], _NOTHING)
+        most[r] = max(rows[3 * row + 2], _NOTHING)
         if islands:
             s = integer_in(d, of.map_efc2iefc, r)
             numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, 1.0 / held
@@ -228,9 +235,11 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
     _, end = _entries(m, at, key >> 32)
     values, objects, types = numbers(m, at.tuple_objprm), integers(m, at.tuple_objid), integers(m, at.tuple_objtype)
     states, act = numbers(d, of.plugin_state), numbers(d, of.act)
-    held = held_tensions(m, d, at, of, kinds)
-    forces, dt = _row_forces(m, d, at, of, kinds, width), number(m, at.timestep)
-    places, pins = np.full(width, -1), False
+    dt, count = number(m, at.timestep), width + size(m, at.ntendon)
+    room, pins = np.zeros(2 * count), False
+    forces, places, held = borrowed(room), borrowed(room, count), borrowed(room, count + width)
+    held_tensions(m, d, at, of, kinds, held)
+    _row_forces(m, d, at, of, kinds, width, forces)
     e, z, x, place = _start(m, at, key, instance)
     while e < end:
         kind, row = int(values[e + KIND]), objects[e + 1]
@@ -250,6 +259,8 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
         e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
     if pins:
         contact_loads(m, d, at, of, contact, kinds, places, act)
+    # Held until here.
+    room[0] = 0.0
 
 
 @compiled
@@ -266,11 +277,10 @@ def _speed(m: Any, d: Any, at: Any, of: Any, element: Any, is_joint: Any) -> Any
 
 
 @compiled
-def _row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any) -> Any:
-    """Return what the solver's rows of friction take, by degree of freedom and tendon."""
-    found, ne = np.zeros(width + size(m, at.ntendon)), integer(d, of.ne)
+def _row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any, found: Any) -> None:
+    """Note what the solver's rows of friction take, by degree of freedom and tendon."""
+    ne = integer(d, of.ne)
     for r in range(ne, ne + integer(d, of.nf)):
         row = integer_in(d, of.efc_id, r)
         row += 0 if integer_in(d, of.efc_type, r) == kinds.friction_dof else width
         found[row] = -numbers(d, of.efc_force)[r]
-    return found

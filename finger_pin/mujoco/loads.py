@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from finger_pin.mujoco.memory import (
     compiled,
     flags,
@@ -22,12 +20,11 @@ from finger_pin.mujoco.memory import (
 
 
 @compiled
-def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
-    """Return what actuators exert along tendons, N, and on degrees of freedom, N m or N, within their limits.
+def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any) -> None:
+    """Add what actuators exert along tendons, N, and on degrees of freedom, N m or N, within their limits.
 
     MuJoCo clamps forces after plugins have been asked, so that they are clamped here.
     """
-    along, about = np.zeros(size(m, at.ntendon)), np.zeros(size(m, at.nv))
     kind, target, gear = integers(m, at.actuator_trntype), integers(m, at.actuator_trnid), numbers(m, at.actuator_gear)
     limited, limits = flags(m, at.actuator_forcelimited), numbers(m, at.actuator_forcerange)
     force, output, dof = numbers(d, of.actuator_force), integers(m, at.actuator_outadr), integers(m, at.jnt_dofadr)
@@ -40,10 +37,9 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
         elif kind[i] == kinds.joint or kind[i] == kinds.jointinparent:
             about[dof[target[2 * i]]] += gear[6 * i] * exerted
     limited, limits = flags(m, at.tendon_actfrclimited), numbers(m, at.tendon_actfrcrange)
-    for i in range(len(along)):
+    for i in range(size(m, at.ntendon)):
         if limited[i]:
             along[i] = min(max(along[i], limits[2 * i]), limits[2 * i + 1])
-    return along, about
 
 
 @compiled
@@ -91,11 +87,10 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
 
 
 @compiled
-def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
-    """Return what limits and equalities exert along tendons, N, by the solver's last forces."""
+def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> None:
+    """Add what limits and equalities exert along tendons, N, by the solver's last forces."""
     kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
     couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
-    found = np.zeros(size(m, at.ntendon))
     for r in range(integer(d, of.nefc)):
         if kind[r] == kinds.limit_tendon:
             found[which[r]] += abs(force[r])
@@ -103,35 +98,35 @@ def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any) -> Any:
             found[first[which[r]]] += abs(force[r])
             if second[which[r]] >= 0:
                 found[second[which[r]]] += abs(force[r])
-    return found
 
 
 @compiled
 def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, place: Any, act: Any) -> None:
-    """Add the contact forces on what lies beyond joints, world frame, N: ``place`` says where in act, or is -1."""
+    """Add the contact forces on what lies beyond joints, world frame, N: ``place`` says where in act, or is 0."""
     first = size(d, of.contact)
     parent, carrier = integers(m, at.body_parentid), integers(m, at.geom_bodyid)
     joints, count = integers(m, at.body_jntadr), integers(m, at.body_jntnum)
-    force = np.zeros(3)
     for c in range(integer(d, of.ncon)):
         one = first + c * contact.size
         row, geoms = integers_at(one + contact.efc_address)[0], integers_at(one + contact.geom)
         if row < 0:
             continue
-        _contact_force(d, of, contact, kinds, one, row, force)
+        x, y, z = _contact_force(d, of, contact, kinds, one, row)
         for side in range(2):
             sign, body = 2.0 * side - 1.0, carrier[geoms[side]] if geoms[side] >= 0 else 0
             while body > 0:
                 for j in range(joints[body], joints[body] + count[body]):
-                    if place[j] >= 0:
-                        for i in range(3):
-                            act[place[j] + i] += sign * force[i]
+                    own = int(place[j])
+                    if own > 0:
+                        act[own] += sign * x
+                        act[own + 1] += sign * y
+                        act[own + 2] += sign * z
                 body = parent[body]
 
 
 @compiled
-def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any, force: Any) -> None:
-    """Fill in the force of a contact on its second geom, world frame, N."""
+def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any) -> Any:
+    """Return the force of a contact on its second geom, world frame, N."""
     exerted, frame = numbers(d, of.efc_force), numbers_at(one + contact.frame)
     dim, kind = integers_at(one + contact.dim)[0], integer_in(d, of.efc_type, row)
     normal, across, along = exerted[row], 0.0, 0.0
@@ -143,5 +138,8 @@ def _contact_force(d: Any, of: Any, contact: Any, kinds: Any, one: Any, row: Any
             normal += exerted[row + k]
         across = friction[0] * (exerted[row] - exerted[row + 1])
         along = friction[1] * (exerted[row + 2] - exerted[row + 3]) if dim > 2 else 0.0
-    for i in range(3):
-        force[i] = normal * frame[i] + across * frame[3 + i] + along * frame[6 + i]
+    return (
+        normal * frame[0] + across * frame[3] + along * frame[6],
+        normal * frame[1] + across * frame[4] + along * frame[7],
+        normal * frame[2] + across * frame[5] + along * frame[8],
+    )

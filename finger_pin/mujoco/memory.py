@@ -10,8 +10,9 @@ from numba.extending import intrinsic
 
 _array: Any = numba.carray  # type: ignore[attr-defined]
 _intrinsic: Any = intrinsic
-#: Compiles a function of numbers and addresses; what it divides by zero is infinite, as in NumPy.
-compiled: Any = numba.njit(error_model="numpy")
+#: Compiles a function of numbers and addresses into what calls it, where offsets are constants: else all of them would
+#: be passed at every call. What it divides by zero is infinite, as in NumPy.
+compiled: Any = numba.njit(error_model="numpy", forceinline=True)
 
 
 @_intrinsic
@@ -111,6 +112,15 @@ def words(owner: Any, offset: Any) -> Any:
 def numbers_at(address: Any) -> Any:
     """Return an array of mjtNum that begins at an address."""
     return _array(_pointer(address), _ANY, np.float64)
+
+
+@compiled
+def borrowed(array: Any, first: Any = 0) -> Any:
+    """Return an array's numbers from one on, for its owner to use while it holds it: holders are not counted.
+
+    Counting them, atomically at every call and slice, costs more than most of what is done with the numbers.
+    """
+    return numbers_at(array.ctypes.data + 8 * first)
 
 
 @compiled
