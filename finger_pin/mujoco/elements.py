@@ -36,7 +36,7 @@ def tendon(
     m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
 ) -> Any:
     """Return speed, level, the most that holds it back, tension and turn of a tendon, by (9b), (14), (16)."""
-    p, objects = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e:]
+    p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)
     if int(p[KIND]) == LINK:
@@ -68,8 +68,8 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
     """Return the angle by which a path turns besides its offset, (15) or along its points, rad."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
-    p, objects, found = numbers(m, at.tuple_objprm)[e:], integers(m, at.tuple_objid)[e:], 0.0
-    places, types = integers(m, at.jnt_qposadr), integers(m, at.tuple_objtype)[e:]
+    p, objects, found = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e), 0.0
+    places, types = integers(m, at.jnt_qposadr), integers(m, at.tuple_objtype, e)
     for k in range(HEAD, int(p[LENGTH])):
         if types[k] == kinds.of_joint:
             found += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
@@ -80,9 +80,9 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
 def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -> Any:
     """Return speed, level, most, load and turn of a slide that is a passive tendon's mass: (14c), (16)."""
     p, objects, types = (
-        numbers(m, at.tuple_objprm)[e:],
-        integers(m, at.tuple_objid)[e:],
-        integers(m, at.tuple_objtype)[e:],
+        numbers(m, at.tuple_objprm, e),
+        integers(m, at.tuple_objid, e),
+        integers(m, at.tuple_objtype, e),
     )
     speed, load = number_in(d, of.qvel, integer_in(m, at.jnt_dofadr, objects[0])), 0.0
     dofs, tension = integers(m, at.jnt_dofadr), 0.0
@@ -102,7 +102,7 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
 @compiled
 def pin(m: Any, d: Any, at: Any, of: Any, e: Any, outside: Any, reactions: Any) -> Any:
     """Return speed, level, most, load and turn of a joint's pin: (9b), (17)."""
-    p, joint = numbers(m, at.tuple_objprm)[e:], integer_in(m, at.tuple_objid, e)
+    p, joint = numbers(m, at.tuple_objprm, e), integer_in(m, at.tuple_objid, e)
     dof = integer_in(m, at.jnt_dofadr, joint)
     speed, load = number_in(d, of.qvel, dof), reactions[dof]
     x, y, z = outside[0], outside[1], outside[2]
@@ -129,5 +129,5 @@ def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
             if away > 1e-6:
                 return x / away, y / away, z / away
         body = parent[body]
-    frame = numbers(d, of.xmat)[9 * parent[own] :]
+    frame = numbers(d, of.xmat, 9 * parent[own])
     return frame[0], frame[3], frame[6]

@@ -121,15 +121,18 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
     about, along, reactions = borrowed(room), borrowed(room, width), borrowed(room, count)
     rows = borrowed(room, 2 * count)
     driven(m, d, at, of, kinds, along, about)
-    # Tendons load pins, and so come before them.
+    # Tendons load pins, and so come before them: pins are left for a second turn, from the first one on.
+    e, z, x, place = later = _start(m, at, key, instance)
+    left = False
     for turn in range(2):
-        e, z, x, place = _start(m, at, key, instance)
         while e < end:
             kind, ratio, row = int(values[e + KIND]), values[e + RATIO], objects[e + 1]
             row = dofs[row] if types[e + 1] == kinds.of_joint else width + row
+            if kind == PIN and turn == 0 and not left:
+                left, later = True, (e, z, x, place)
             if (kind == PIN) == (turn == 1):
                 if kind == PIN:
-                    found = pin(m, d, at, of, e, act[x:], reactions)
+                    found = pin(m, d, at, of, e, numbers(d, of.act, x), reactions)
                 elif kind == MASS:
                     found = mass(m, d, at, of, kinds, e, reactions)
                 else:
@@ -138,12 +141,16 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
                 states[place + LEVEL], states[place + LOAD], states[place + TURN] = level, load, bend
                 # `advance` moves the bristles, with the speed that the step ends with.
                 rate[z] = 0.0
-                rate[x : x + LOADS[kind]] = 0.0
-                force, drag, limit = _exerted(values[e:], act[z], speed, level, load, dt)
+                for k in range(x, x + LOADS[kind]):
+                    rate[k] = 0.0
+                force, drag, limit = _exerted(numbers(m, at.tuple_objprm, e), act[z], speed, level, load, dt)
                 rows[3 * row] += ratio * force
                 rows[3 * row + 1] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
                 rows[3 * row + 2] += abs(ratio) * min(limit, most)
             e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
+        if not left:
+            break
+        e, z, x, place = later
     _write(m, d, at, of, kinds, rows, dt)
     # Held until here.
     room[0] = 0.0
@@ -203,13 +210,14 @@ def _write(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> 
         if rows[3 * row + 1] == 0.0:
             continue
         speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
-        before, held = resistance[r], 1.0 / (rows[3 * row + 1] * dt)
+        before, stiff = resistance[r], rows[3 * row + 1] * dt
+        held = 1.0 / stiff
         aref[r] = -speed / dt - held * rows[3 * row]
-        resistance[r], weight[r] = held, 1.0 / held
+        resistance[r], weight[r] = held, stiff
         most[r] = max(rows[3 * row + 2], _NOTHING)
         if islands:
             s = integer_in(d, of.map_efc2iefc, r)
-            numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, 1.0 / held
+            numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, stiff
             numbers(d, of.iefc_frictionloss)[s] = most[r]
         if dual:
             numbers(d, of.efc_AR)[_diagonal(m, d, at, of, kinds, r, nefc)] += held - before

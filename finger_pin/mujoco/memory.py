@@ -85,15 +85,15 @@ _ANY = 1 << 40
 
 
 @compiled
-def numbers(owner: Any, offset: Any) -> Any:
-    """Return an array of mjtNum."""
-    return _array(_pointer(size(owner, offset)), _ANY, np.float64)
+def numbers(owner: Any, offset: Any, first: Any = 0) -> Any:
+    """Return an array of mjtNum from one of them on."""
+    return _array(_pointer(size(owner, offset) + 8 * first), _ANY, np.float64)
 
 
 @compiled
-def integers(owner: Any, offset: Any) -> Any:
-    """Return an array of int."""
-    return _array(_pointer(size(owner, offset)), _ANY, np.int32)
+def integers(owner: Any, offset: Any, first: Any = 0) -> Any:
+    """Return an array of int from one of them on."""
+    return _array(_pointer(size(owner, offset) + 4 * first), _ANY, np.int32)
 
 
 @compiled

@@ -172,8 +172,12 @@ def stages():
         "mujoco": compared,
         "mujoco-friction": {
             "version": "4.0.0",
-            "time": {"plain": 2e-5, "tendons": 2.5e-5},
-            "counts": {"plain": {"frictions": 0, "rows": 24}, "tendons": {"frictions": 44, "rows": 32}},
+            "hands": {
+                "Shadow hand": {
+                    "time": {"plain": 2e-5, "tendons": 2.5e-5},
+                    "counts": {"plain": {"frictions": 0, "rows": 24}, "tendons": {"frictions": 44, "rows": 32}},
+                }
+            },
         },
         "prepared": prepared,
         "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}

@@ -70,6 +70,18 @@ def test_copies_threads_rollouts_binaries_and_pickles_move_alike_to_the_last_bit
     assert all(np.array_equal(each, whole) for each in ends)
 
 
+@pytest.mark.parametrize("persistent", [False, True])
+def test_a_batch_of_simulations_on_threads_moves_as_one_does_to_the_last_bit(model, persistent):
+    batches = pytest.importorskip("mujoco.batch", reason="comes with MuJoCo 4.0")
+    batch = batches.Batch(model, nsim=5, nthread=2, persistent=persistent)
+    starts, found = [0, 20, 40, 60, 80], [batch.bind(name) for name in ("qpos", "qvel", "act")]
+    for k in range(100):
+        batch.bind("ctrl")[:] = [CONTROLS[first + k] for first in starts]
+        batch.step()
+    for i, first in enumerate(starts):
+        assert np.array_equal(np.concatenate([each[i] for each in found]), motion(model, None, first, first + 100))
+
+
 def test_xml_keeps_the_friction_and_the_number_of_controls(model):
     again = mujoco.MjModel.from_xml_string(spec().to_xml())
     assert (again.nu, again.na) == (model.nu, model.na) == (3, 18)
