@@ -11,6 +11,9 @@ from finger_pin.core.jit import call_at, compiled
 from finger_pin.core.law_code import SIDE
 from finger_pin.core.tables import END, FIRST, KINK
 
+# What a kink may add to the states in the step after it, as a share of their own size.
+_ADDED = 0.02
+
 
 @compiled
 def release(tables: Any, rows: Any) -> None:
@@ -69,6 +72,17 @@ def price(integration: Any, model: Any, time: float, h: float, r: Any) -> Any:
     for c in range(size):
         r[c] = h * (model.rate[c] - r[c])
     return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
+
+
+@compiled
+def past_kink(h: float, share: float, cost: float, rtol: float) -> Any:
+    """Return how long the step after a kink may be, s.
+
+    Stiff methods damp what they are too long for, and both of a pair alike, so that the error tells nothing: an impact
+    would be swallowed. The jump of the rates, `cost` over the step, has grown over its last 1 - share. Growing on,
+    j t^2 / 2 with j = cost / ((1 - share) h^2), it may add a share of what the states are themselves.
+    """
+    return h * np.sqrt(2.0 * _ADDED * (1.0 - share) / max(rtol * cost, 1e-300))
 
 
 @compiled

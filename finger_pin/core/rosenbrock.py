@@ -14,7 +14,7 @@ from finger_pin.core.drift import carry, weigh
 from finger_pin.core.error_norm import step_error, worst
 from finger_pin.core.flights import NOTHING, UNSEEN, survey
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
-from finger_pin.core.kinks import hold, passed, price, release, strayed
+from finger_pin.core.kinks import hold, passed, past_kink, price, release, strayed
 from finger_pin.core.model import MODEL
 from finger_pin.core.tableaus import Tableau
 
@@ -186,7 +186,7 @@ def advance(address: int, end: float) -> int:
         cut = last and end - time < h
         if last:
             h = end - time
-        error, share = np.inf, 1.0
+        error, share, cost = np.inf, 1.0, 0.0
         outcome = _step(integration, model, time, h, fresh)
         if outcome == 2:
             for c in range(size - 1, -1, -1):
@@ -206,7 +206,8 @@ def advance(address: int, end: float) -> int:
                 share = strayed(tables, rows, kinks)
                 # A row was held on a side that it has left: what that cost is an error too.
                 if share < 1.0:
-                    dear = not price(integration, model, time + h, h, r) <= 1.0
+                    cost = price(integration, model, time + h, h, r)
+                    dear = not cost <= 1.0
                     memory[EVALUATIONS] += 2
                 elif outcome < 0:
                     share = passed(integration, model, time, h, r)
@@ -275,6 +276,8 @@ def advance(address: int, end: float) -> int:
                 # The step ends at a kink; the one before it says nothing of the next, which may be as long as before.
                 memory[STEP], memory[LAST_STEP] = max(memory[STEP], whole), 0.0
                 whole = 0.0
+            if share < 1.0:
+                memory[STEP] = min(memory[STEP], past_kink(h, share, cost, rtol))
             if taken[0] < times.size:
                 times[taken[0]] = memory[TIME]
                 for c in range(size):

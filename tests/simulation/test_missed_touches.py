@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import finger_pin as fp
 
@@ -95,6 +96,24 @@ def test_a_ball_dropped_on_a_shelf_bounces_back_to_where_it_came_from(tmp_path, 
     expected = 0.1 - 0.5 * 9.81 * np.minimum(since, period - since) ** 2
     assert height.min() > -1e-3
     assert height == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(("stiffness", "mass", "tolerance"), [(1e9, 1e-3, 1e-3), (1e4, 1e-12, 1e-6)])
+def test_no_impact_is_swallowed_however_short(stiffness, mass, tolerance):
+    """Without gravity meanwhile m v dv = -k d (1 + c v) dd, so that v / c - ln(1 + c v) / c^2 is as before."""
+    c, radius, gravity = 2.0, 0.008, 9.81
+    for height in 10.0 ** np.linspace(-3.0, -0.7, 12):
+        fall = np.sqrt(2.0 * gravity * height)
+        kept = fall / c - np.log1p(c * fall) / c**2
+        back = brentq(lambda v, kept=kept: -v / c - np.log1p(-c * v) / c**2 - kept, 0.0, (1.0 - 1e-15) / c)
+        surface = {"stiffness": stiffness, "damping": c}
+        shelf = {"shape": "box", "sides": [0.1, 0.1, 0.02], "position": [0.0, 0.3, -0.01], "surface": surface}
+        ball = {"shape": "sphere", "radius": radius, "mass": mass, "position": [0.0, 0.3, radius + height]}
+        entries = {"environment.objects": {"shelf": shelf, "ball": ball}, "simulation.rtol": tolerance}
+        # Until it is highest.
+        entries["simulation.duration"] = float((fall + back) / gravity)
+        height_after = fp.simulate(fp.load_scenario("fig6", entries)).object_position[-1, 0, 2].item() - radius
+        assert height_after == pytest.approx(back**2 / (2.0 * gravity), rel=1e-2)
 
 
 def test_two_equal_balls_that_meet_head_on_exchange_their_velocities(tmp_path):
