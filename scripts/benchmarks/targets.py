@@ -59,6 +59,8 @@ def targets(stages: Mapping[str, Any]) -> list[Target]:
         found += _hand(stages["hand"])
     if stages.get("prepared"):
         found += _prepared(stages["prepared"])
+    if stages.get("learning"):
+        found += _learning(stages["learning"])
     if stages.get("many-runs"):
         many = stages["many-runs"]
         found.append(target("two threads, many runs", many["speed_up"], ">=", 1.9, "x"))
@@ -124,3 +126,10 @@ def _prepared(study: Mapping[str, Any]) -> Iterator[Target]:
     share = fig6["simulate"] / fig6["integration"] - 1.0
     yield target("fig6, signals and account over integration", share, "<=", 1.0 / 3.0, "")
     yield target("a simulator's step of 20 ms at 1e-3 rad", 1e6 * simulator["step"], "<=", 60.0, "us")
+
+
+def _learning(study: Mapping[str, Any]) -> Iterator[Target]:
+    times = study["kinds"]["smooth"]["times"]
+    yield target("a control step of Reach", 1e6 * times["one"], "<=", 100.0, "us")
+    yield target(f"{study['worlds']} worlds over one", times["one"] / times["many"], ">=", 1.8, "x")
+    yield target("a reset with numbers drawn anew", 1e3 * study["reset"], "<=", 2.0, "ms")

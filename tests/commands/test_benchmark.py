@@ -179,6 +179,11 @@ def stages():
                 }
             },
         },
+        "learning": {
+            "worlds": 8,
+            "kinds": {"smooth": {"times": {"one": 1e-4, "many": 5e-5}, "errors": {"one": 1e-4}}},
+            "reset": 2e-3,
+        },
         "prepared": prepared,
         "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}
         | {"speed_up_without_start": None},
