@@ -122,7 +122,7 @@ def lines(study: Mapping[str, Any]) -> Iterator[str]:
     """Yield the measurements as text."""
     from benchmarks.report import table
 
-    yield f"control steps of {1e3 * _PERIOD:g} ms of Reach, wall time of each, and rms error of the angles of {_COMPARED}"
+    yield f"control steps of {1e3 * _PERIOD:g} ms of Reach: wall time of each, rms error of the angles of {_COMPARED}"
     for kind, found in study["kinds"].items():
         names = {"one": "one world", "many": f"{study['worlds']} worlds in threads, each"}
         rows = [
