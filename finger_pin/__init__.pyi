@@ -15,11 +15,11 @@ from .description.parameters import FingerDescription as FingerDescription
 from .description.scenario import Scenario as Scenario
 from .exceptions import InputError as InputError
 from .exceptions import IntegrationError as IntegrationError
+from .mechanism.exchange.from_mujoco import from_mujoco as from_mujoco
+from .mechanism.exchange.mjcf import to_mjcf as to_mjcf
+from .mechanism.exchange.urdf import to_urdf as to_urdf
 from .mechanism.finger import Finger as Finger
 from .mechanism.finger import Hand as Hand
-from .mechanism.from_mujoco import from_mujoco as from_mujoco
-from .mechanism.mjcf import to_mjcf as to_mjcf
-from .mechanism.urdf import to_urdf as to_urdf
 from .simulation.convergence import check_convergence as check_convergence
 from .simulation.netcdf import load_result as load_result
 from .simulation.netcdf import save as save

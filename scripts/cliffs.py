@@ -12,9 +12,9 @@ from functools import partial
 
 import numpy as np
 import xarray as xr
+from validation.wild_fingers import wild_scenario
 
 import finger_pin as fp
-from finger_pin.commands.validation.wild_fingers import wild_scenario
 
 SLOW, OPEN = 20.0, 1e-5
 

@@ -18,8 +18,8 @@ import pinocchio as pin
 from finger_pin.control.compiled import core_signal
 from finger_pin.control.signal import Signal
 from finger_pin.core.control import held_control
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.hand import PathSignal
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import Link

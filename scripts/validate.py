@@ -1,11 +1,95 @@
-"""The same as ``python -m finger_pin validate``."""
+"""Compare the simulator with independent sources: closed forms, experiments in print, other programs."""
+
+from __future__ import annotations
 
 import sys
+from difflib import get_close_matches
 from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from finger_pin.commands.application import run
+import typer
 
-main = partial(run, "validate")
+from finger_pin.commands.application import run_function
+from finger_pin.commands.console import noted, print_text, talks
+from finger_pin.commands.options import Output, wrong
+
+if TYPE_CHECKING:
+    from validation.report import Family
+
+#: Names on the command line, and the modules in scripts/validation, in the order of the report.
+FAMILIES = {
+    "kinematics": "kinematics",
+    "rigid-body": "rigid_body",
+    "mujoco": "mujoco_motion",
+    "lugre": "lugre",
+    "closed-forms": "closed_forms",
+    "methods": "methods",
+    "order": "order",
+    "symmetry": "symmetry",
+    "stiffness": "stiffness",
+    "energy": "energy",
+}
+
+
+def validate(
+    only: Annotated[str, typer.Option(metavar="NAMES", help=f"Some of {','.join(FAMILIES)}.")] = ",".join(FAMILIES),
+    output: Output = Path("results/validation"),
+) -> int:
+    """Compare the simulator with independent sources, and write a report.
+
+    Closed forms, published experiments, Pinocchio, yourdfpy, MuJoCo, and the simulator against itself.
+
+    Exit codes: 0 every check passed, differs by a known amount, or was skipped because an optional package is not
+    installed; 1 some failed, or the report cannot be written; 2 wrong options; 130 interrupted, nothing written.
+    """
+    names = chosen(only)
+    talks(quiet=False)
+    from validation import report
+    from validation.check import Verdict
+
+    output.mkdir(parents=True, exist_ok=True)
+    with noted("nothing was written"):
+        whole = report.Report.now(measured(names))
+    report.write(whole, output)
+    print_text(f"{report.text(whole)}\n\nThe report is {output / report.PAGE}")
+    return 1 if whole.count(Verdict.FAIL) else 0
+
+
+def chosen(names: str) -> tuple[str, ...]:
+    """Parse names of families with commas between; keep their usual order."""
+    wanted = [name.strip() for name in names.split(",")]
+    for name in wanted:
+        if name not in FAMILIES:
+            near = get_close_matches(name, FAMILIES, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise wrong("--only", f"{name}: no such family; there are {', '.join(FAMILIES)}{hint}")
+    return tuple(name for name in FAMILIES if name in wanted)
+
+
+def measured(names: tuple[str, ...]) -> tuple[Family, ...]:
+    """Return what the named families of checks found; on a terminal, show how far it is."""
+    from validation.check import Section, failed
+    from validation.progress import bar
+    from validation.report import Family
+
+    found: list[Family] = []
+    with bar(len(names)) as advance:
+        for name in names:
+            module = import_module(f"validation.{FAMILIES[name]}")
+            advance(len(found), module.TITLE)
+            about = " ".join((module.__doc__ or "").strip().split("\n\n")[0].split())
+            try:
+                section = module.measure()
+            except Exception as error:
+                # One family that breaks is a failure to report, and no reason to lose the others.
+                section = Section.of([failed(module.TITLE, f"{type(error).__name__}: {error}")])
+            found.append(Family(name, module.TITLE, about, section))
+    return tuple(found)
+
+
+main = partial(run_function, validate)
 
 if __name__ == "__main__":
     sys.exit(main())

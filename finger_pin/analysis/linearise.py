@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.control import held_control
-from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.stepper import Stepper
-from finger_pin.core.tableaus import rodas5p
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import Stepper
+from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.family import Family
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array

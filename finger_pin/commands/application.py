@@ -25,7 +25,6 @@ from finger_pin.commands import (
     self_locking,
     simulate,
     sweep,
-    validate,
 )
 from finger_pin.commands.console import Unsuccessful, complain
 from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, StudyError
@@ -46,7 +45,6 @@ COMMANDS = (
     force_capability.force_capability,
     export.export,
     reproduce.reproduce,
-    validate.validate,
 )
 
 

@@ -85,8 +85,8 @@ def written(described: FingerDescription | HandDescription | Scenario, ending: s
     from finger_pin.description.hand import HandDescription, one_finger
     from finger_pin.description.loading import to_toml
     from finger_pin.description.scenario import Scenario
-    from finger_pin.mechanism.mjcf import to_mjcf
-    from finger_pin.mechanism.urdf import to_urdf
+    from finger_pin.mechanism.exchange.mjcf import to_mjcf
+    from finger_pin.mechanism.exchange.urdf import to_urdf
 
     if ending == ".toml":
         return to_toml(described)

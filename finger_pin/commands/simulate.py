@@ -89,7 +89,7 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model, and say what of the model is not carried over."""
     from finger_pin.description.exercise import exercise
     from finger_pin.description.loading import read_scenario
-    from finger_pin.mechanism.from_mujoco import from_mujoco
+    from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
 
     description = from_mujoco(path, path.stem)
     assert description.tree is not None

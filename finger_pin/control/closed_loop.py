@@ -8,17 +8,17 @@ from typing import Protocol
 import numpy as np
 
 from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.guides import Guides
 from finger_pin.control.hand import HandController
+from finger_pin.control.moved_objects import Guides
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.own import Samples, choose_controller, choose_reference
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
 from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
 from finger_pin.control.signal import Signal
-from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal

@@ -9,8 +9,8 @@ from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.reference import SignalReference
 from finger_pin.control.signal import Signal
-from finger_pin.core import signal as signal_core
 from finger_pin.core.control import Control, held_control, planned_control, scheduled_control
+from finger_pin.core.evaluation import time_functions as signal_core
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 

@@ -10,7 +10,7 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.measurement import MeasuringController, Sensors
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
-from finger_pin.core.stepper import TABLEAUS
+from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario

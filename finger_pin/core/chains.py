@@ -8,7 +8,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from finger_pin.core.rigid_body import ARMATURE, BODY_COLUMNS, CENTRE, INERTIA, MASS, PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.core.evaluation.rigid_body import (
+    ARMATURE,
+    BODY_COLUMNS,
+    CENTRE,
+    INERTIA,
+    MASS,
+    PRISMATIC,
+    ROTATION,
+    TRANSLATION,
+)
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import FREE_JOINTS

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.evaluation.time_functions import Signal, no_signal
 from finger_pin.core.jit import Indices, Matrix, Vector
-from finger_pin.core.signal import Signal, no_signal
 from finger_pin.description.routing import Array
 
 HELD, PLANNED, SCHEDULED = range(3)

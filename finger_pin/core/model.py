@@ -10,12 +10,12 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from finger_pin.core import blocks, condensation, contacts, dynamics, linearisation, path_derivatives, paths
 from finger_pin.core.control import Control
-from finger_pin.core.inputs import move_base
+from finger_pin.core.evaluation import blocks, condensation, contacts, dynamics, linearisation, path_derivatives, paths
+from finger_pin.core.evaluation.inputs import move_base
+from finger_pin.core.evaluation.linearisation import Linear, build_linear
+from finger_pin.core.evaluation.rigid_body import base_power, bias_rate, move
 from finger_pin.core.jit import Kind, Unit, Vector, bound, bound_at
-from finger_pin.core.linearisation import Linear, build_linear
-from finger_pin.core.rigid_body import base_power, bias_rate, move
 from finger_pin.core.tables import Tables
 from finger_pin.core.work import Work
 

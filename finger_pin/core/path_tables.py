@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.chains import Chains
+from finger_pin.core.evaluation.rigid_body import PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.core.rigid_body import PRISMATIC, ROTATION, TRANSLATION
-from finger_pin.core.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.pieces import Leg, Piece
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.chains import Chains, read_chains
+from finger_pin.core.evaluation.law_code import SIGNALS, addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.core.law_code import SIGNALS, addresses
 from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism

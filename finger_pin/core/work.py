@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finger_pin.core.evaluation.law_code import SLOPES, widest
+from finger_pin.core.evaluation.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS
 from finger_pin.core.jit import Layers, Matrix, Vector
-from finger_pin.core.law_code import SLOPES, widest
 from finger_pin.core.path_tables import PathWork, build_path_work
-from finger_pin.core.rigid_body import SPATIAL_LAYERS, SQUARE_LAYERS
 from finger_pin.core.tables import Tables
 from finger_pin.laws.law import ContactLaw, Law
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from finger_pin.control.position_drive import build_drives, loop_period
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
-from finger_pin.core.drives import Drives
-from finger_pin.core.stepper import Stepper
+from finger_pin.core.stepping.drives import Drives
+from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger

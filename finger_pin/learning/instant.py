@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.textbook import Statistics, Trajectory
+from finger_pin.core.stepping.textbook import Statistics, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.simulation.recording import Motions, Variable, variables
 

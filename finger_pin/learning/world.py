@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import sampled_control
-from finger_pin.core.batch import advance_together
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.batch import advance_together
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.family import Family
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array

@@ -17,8 +17,9 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
+from finger_pin.mechanism.exchange.foreign_model import on_model
+from finger_pin.mechanism.exchange.urdf import build_rigid_body
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.foreign_model import on_model
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.kinematics import Motion
@@ -31,7 +32,6 @@ from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
-from finger_pin.mechanism.urdf import build_rigid_body
 
 
 class Finger:

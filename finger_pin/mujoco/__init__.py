@@ -12,7 +12,7 @@ try:
 except ImportError:
     raise InputError("mujoco", "is not installed: pip install 'finger-pin[mujoco]'") from None
 
-from finger_pin.mechanism.mujoco_overlay import lay_tendons
+from finger_pin.mechanism.exchange.mujoco_overlay import lay_tendons
 from finger_pin.mujoco.known_answer import try_known_answer
 from finger_pin.mujoco.signals import Signals, friction
 from finger_pin.mujoco.specification import MujocoWarning, add_friction

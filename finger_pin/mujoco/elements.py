@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.laws.bristle import friction_coefficient, friction_level
 from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.mujoco_friction import (
+from finger_pin.mechanism.exchange.mujoco_friction import (
     COULOMB,
     DRAG,
     EXPONENT,

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.mujoco_friction import LINK, PIN, TENDON, Friction
+from finger_pin.mechanism.exchange.mujoco_friction import LINK, PIN, TENDON, Friction
 
 # Kinds of joints that have one coordinate.
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.mechanism.mujoco_friction import (
+from finger_pin.mechanism.exchange.mujoco_friction import (
     FLOOR,
     FORCE,
     KIND,

@@ -13,7 +13,7 @@ from numba import cfunc, types
 
 from finger_pin.exceptions import InputError
 from finger_pin.laws import bristle, capstan
-from finger_pin.mechanism import mujoco_friction as table
+from finger_pin.mechanism.exchange import mujoco_friction as table
 from finger_pin.mujoco import elements, kernel, loads, memory
 from finger_pin.mujoco.layout import layout
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.mujoco_friction import FORCE, LENGTH, LEVEL, LOAD, NAME, SIGNALS, TURN
+from finger_pin.mechanism.exchange.mujoco_friction import FORCE, LENGTH, LEVEL, LOAD, NAME, SIGNALS, TURN
 from finger_pin.mujoco.registration import register
 
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from finger_pin.exceptions import InputError, ScenarioWarning
-from finger_pin.mechanism.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, Friction
+from finger_pin.mechanism.exchange.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, Friction
 from finger_pin.mujoco.choice import JOINT, TENDON_KEYS, choose
 from finger_pin.mujoco.frictions import frictions
 from finger_pin.mujoco.registration import register

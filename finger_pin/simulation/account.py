@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.textbook import Apart, Trajectory
+from finger_pin.core.stepping.textbook import Apart, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.simulation.energy import Flows, energies, powers

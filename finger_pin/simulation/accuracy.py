@@ -10,7 +10,7 @@ from itertools import count
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.textbook import Stop, Trajectory
+from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario, SimulationSettings
 from finger_pin.exceptions import InputError

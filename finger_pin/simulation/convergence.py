@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.control.own import Samples
 from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
-from finger_pin.core.textbook import Stop
+from finger_pin.control.user_controllers import Samples
+from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
+from finger_pin.simulation.initial_state import own_parts
 from finger_pin.simulation.simulate import simulate
-from finger_pin.simulation.starting import own_parts
 
 if TYPE_CHECKING:
     import xarray as xr

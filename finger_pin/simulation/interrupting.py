@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from types import FrameType
 
-from finger_pin.core.textbook import Stop
+from finger_pin.core.stepping.textbook import Stop
 from finger_pin.exceptions import Interrupted, InterruptedByKeyboard
 from finger_pin.simulation.recorded import Recording
 

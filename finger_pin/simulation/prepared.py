@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepper import TABLEAUS
-from finger_pin.core.textbook import Stop, Trajectory
+from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.family import Family
 from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import Motions, record, variables
 from finger_pin.simulation.running import Setup, Steps, run
 from finger_pin.simulation.sensitivity import TIGHT, TIGHTER, add_slopes
-from finger_pin.simulation.starting import own_parts, packed_state
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ import pinocchio as pin
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
-from finger_pin.core.textbook import Trajectory
+from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -23,9 +23,9 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.contact_variables import contact_coordinates, contact_values, contact_variables
 from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers, stored_names
 from finger_pin.simulation.recorded import Recording
-from finger_pin.simulation.touching import contact_coordinates, contact_values, contact_variables
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR, _TIME = ("time", "motor"), ("time",)

@@ -14,16 +14,16 @@ from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.compiled import compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.own import OwnController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.cvode import integrate_cvode
-from finger_pin.core.encounters import meetings
-from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.stepper import TABLEAUS, Stepper
-from finger_pin.core.textbook import Stop, Trajectory, Watch, integrate
+from finger_pin.control.user_controllers import OwnController
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.stepping.cvode import integrate_cvode
+from finger_pin.core.stepping.encounters import meetings
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario
@@ -45,9 +45,9 @@ from finger_pin.simulation.accuracy import (
     ringing,
     too_stiff,
 )
+from finger_pin.simulation.initial_state import check_motors
 from finger_pin.simulation.recorded import Recording
 from finger_pin.simulation.recording import Motions, record
-from finger_pin.simulation.starting import check_motors
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.

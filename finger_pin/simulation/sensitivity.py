@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from finger_pin.core.stepper import in_threads
+from finger_pin.core.stepping.stepper import in_threads
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.recorded import Recording

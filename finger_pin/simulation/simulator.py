@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.compiled import core_signal
-from finger_pin.control.guides import Guides
-from finger_pin.control.own import Samples
+from finger_pin.control.moved_objects import Guides
 from finger_pin.control.reference import Reference
-from finger_pin.core.batch import advance_together
+from finger_pin.control.user_controllers import Samples
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.control import held_control
-from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.batch import advance_together
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.family import Family
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
@@ -29,8 +29,8 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
-from finger_pin.simulation.starting import numbers
-from finger_pin.simulation.told import Told
+from finger_pin.simulation.initial_state import numbers
+from finger_pin.simulation.step_log import Told
 
 if TYPE_CHECKING:
     import xarray as xr

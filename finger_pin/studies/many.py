@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
-from finger_pin.core.textbook import Stop
+from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning, StudyError

@@ -16,7 +16,7 @@ import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
 from finger_pin.control.reference import SignalReference
-from finger_pin.core.textbook import Stop
+from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest

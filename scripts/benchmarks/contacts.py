@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib.util
 from typing import Any
 
+from validation.mujoco_motion import PRESSING
+
 from benchmarks import mujoco_loop, work_precision
 from benchmarks.store import Store
-from finger_pin.commands.validation.mujoco_motion import PRESSING
 
 _LIMITS = (1e-3, 1e-5)
 _STEPS = (5e-4, 2.5e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 1e-5, 5e-6, 2.5e-6, 1.25e-6)

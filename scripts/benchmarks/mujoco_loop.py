@@ -14,16 +14,16 @@ from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
+from validation.mujoco_motion import EXPRESSIBLE, with_plates
 
 import finger_pin as fp
 from benchmarks.runs import Job, Point, compiled, point, rms, truth
 from benchmarks.store import Store, say
 from benchmarks.timing import clocked
-from finger_pin.commands.validation.mujoco_motion import EXPRESSIBLE, with_plates
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.mjcf import to_mjcf
+from finger_pin.mechanism.exchange.mjcf import to_mjcf
 
 _PERIOD = 1e-3
 # Whether one spring replaces the lumped mass, and the integrator; with the mass "implicitfast" does as "Euler" does.

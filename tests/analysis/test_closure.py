@@ -6,7 +6,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.routed import RoutedController
-from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import ClosureWarning
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validate import FAMILIES, import_module, validate
+from validation import methods, stiffness, symmetry
+from validation.check import Section, Verdict, compare, skipped
+from validation.page import page
+from validation.report import Family, Report, headline, text
 
-from finger_pin.commands.application import run as run_command
-from finger_pin.commands.validate import FAMILIES, import_module
-from finger_pin.commands.validation import methods, stiffness, symmetry
-from finger_pin.commands.validation.check import Section, Verdict, compare, skipped
-from finger_pin.commands.validation.page import page
-from finger_pin.commands.validation.report import Family, Report, headline, text
+from finger_pin.commands.application import run_function
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def run(tmp_path, capsys):
     """Run the script; return exit code, standard output and standard error."""
 
     def run(*arguments):
-        code = run_command("validate", [*arguments, "--output", str(tmp_path / "out")])
+        code = run_function(validate, [*arguments, "--output", str(tmp_path / "out")])
         printed = capsys.readouterr()
         return code, printed.out, printed.err
 
@@ -168,12 +168,12 @@ def test_a_family_that_does_not_exist_is_named_with_the_nearest(run):
 
 def test_every_family_has_a_module_with_a_title(monkeypatch):
     for name in FAMILIES.values():
-        module = import_module(f"finger_pin.commands.validation.{name}")
+        module = import_module(f"validation.{name}")
         assert module.TITLE and module.measure.__doc__
 
 
 def test_where_mujoco_is_missing_its_family_says_so_in_a_line(monkeypatch):
-    from finger_pin.commands.validation import mujoco_motion
+    from validation import mujoco_motion
 
     monkeypatch.setattr(mujoco_motion.importlib.util, "find_spec", lambda name: None)
     (check,) = mujoco_motion.measure().checks

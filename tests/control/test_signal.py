@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from finger_pin.control.signal import Signal
-from finger_pin.core import signal as core
+from finger_pin.core.evaluation import time_functions as core
 from finger_pin.description.signals import ForceSignal, JointReference
 from finger_pin.exceptions import InputError
 

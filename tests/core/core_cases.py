@@ -10,10 +10,10 @@ import pinocchio as pin
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
-from finger_pin.core import rosenbrock
 from finger_pin.core.control import held_control
 from finger_pin.core.model import BoundModel
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
 from finger_pin.core.work import build_work
 from finger_pin.mechanism.state import State

@@ -2,12 +2,12 @@
 
 from typing import NamedTuple
 
-from finger_pin.core import error_norm
-from finger_pin.core.condensation import solve
+from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.evaluation.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
+from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call, call_at
 from finger_pin.core.model import MODEL
-from finger_pin.core.rigid_body import factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
-from finger_pin.core.rigid_body_derivatives import inverse_dynamics_derivatives
+from finger_pin.core.stepping import error_norm
 from finger_pin.core.tables import Tables
 from finger_pin.core.work import Work
 

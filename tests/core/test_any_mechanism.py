@@ -9,10 +9,10 @@ from random_mechanisms import kinds_of, random_mechanism, random_states
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.control import held_control
-from finger_pin.core.evaluation import CompiledMechanism
-from finger_pin.core.stepper import TABLEAUS, Stepper
-from finger_pin.core.textbook import integrate
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.textbook import integrate
 from finger_pin.description.family import Family
 from finger_pin.mechanism.mechanism import Mechanism
 

@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import finger_pin as fp
+from finger_pin.core.evaluation.law_code import addresses
 from finger_pin.core.jit import Unit, compiled, compiled_loosely, functions
-from finger_pin.core.law_code import addresses
 from finger_pin.laws.law import Law
 
 SOURCE = '''
@@ -163,6 +163,6 @@ def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
 
 def test_importing_the_core_compiles_nothing(tmp_path):
     environment = os.environ | {"FINGER_PIN_CACHE_DIR": str(tmp_path)}
-    code = "import finger_pin.core.signals, finger_pin.core.rosenbrock"
+    code = "import finger_pin.core.evaluation.signals, finger_pin.core.stepping.rosenbrock"
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr, list(tmp_path.iterdir())) == ("", "", [])

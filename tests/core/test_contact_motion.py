@@ -5,10 +5,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from finger_pin.core import rosenbrock
 from finger_pin.core.control import held_control
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
 from finger_pin.mechanism.contacts import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism

@@ -9,8 +9,8 @@ import pytest
 from core_cases import BODIES, relative
 
 import finger_pin as fp
-from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.rigid_body import BY_POSITION, BY_VELOCITY, MASS_MATRIX
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.evaluation.rigid_body import BY_POSITION, BY_VELOCITY, MASS_MATRIX
 from finger_pin.core.tables import build_tables
 from finger_pin.core.work import build_work
 from finger_pin.exceptions import InputError

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from core_cases import Case
 from test_core_linearisation import pieces
+from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
-from finger_pin.commands.validation.order import END, mean_order, smooth_motion, step_errors
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core import rosenbrock
-from finger_pin.core.integrator import _Recorder
-from finger_pin.core.part import failure
-from finger_pin.core.stepper import TABLEAUS
+from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping.integrator import _Recorder
+from finger_pin.core.stepping.island_stepper import failure
+from finger_pin.core.stepping.stepper import TABLEAUS
 
 
 @pytest.fixture(scope="module", params=TABLEAUS)

@@ -7,7 +7,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.proportional import ControlSignals, ProportionalController
-from finger_pin.core.stepper import TABLEAUS
+from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.exceptions import IntegrationError, Interrupted
 
 METHODS = tuple(TABLEAUS)
@@ -215,8 +215,8 @@ def test_the_same_simulation_twice_gives_the_same_bits(scenarios, period):
 
 def test_a_failure_of_the_core_tells_time_reason_and_advice_and_keeps_what_was_computed(scenarios, monkeypatch):
     """Whatever the reason: here the integrator is told that its steps have become too short."""
-    from finger_pin.core import rosenbrock
-    from finger_pin.core.part import Part
+    from finger_pin.core.stepping import rosenbrock
+    from finger_pin.core.stepping.island_stepper import Part
 
     advance = Part.advance
 

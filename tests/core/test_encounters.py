@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from test_contact_motion import G, scene
 
-from finger_pin.core.cvode import integrate_cvode
-from finger_pin.core.encounters import meetings
-from finger_pin.core.evaluation import CompiledMechanism
-from finger_pin.core.textbook import integrate
+from finger_pin.core.compiled_finger import CompiledMechanism
+from finger_pin.core.stepping.cvode import integrate_cvode
+from finger_pin.core.stepping.encounters import meetings
+from finger_pin.core.stepping.textbook import integrate
 from finger_pin.description.objects import Object
 
 SPRING = {"stiffness": 1e4, "damping": 0.0, "friction": 0.0}

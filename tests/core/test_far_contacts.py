@@ -6,8 +6,8 @@ import pytest
 from test_contact_motion import G, plane, scene
 
 from finger_pin.core.control import held_control
-from finger_pin.core.law_code import FORCE
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.evaluation.law_code import FORCE
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
 
 HARD = {"stiffness": 1e4, "damping": 1.0, "friction": 0.5}

@@ -5,7 +5,7 @@ import pytest
 from test_contact_motion import scene
 
 from finger_pin.core.control import held_control
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.objects import Object
 
 

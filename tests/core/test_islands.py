@@ -9,14 +9,14 @@ from test_any_mechanism import assert_same
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core import rosenbrock
+from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.control import held_control, planned_control
-from finger_pin.core.evaluation import CompiledMechanism
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.islands import find_islands
+from finger_pin.core.evaluation.time_functions import Signal
 from finger_pin.core.jit import bound
-from finger_pin.core.signal import Signal
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.islands import find_islands
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
 from finger_pin.exceptions import InputError
 from finger_pin.laws.spring import JOINT_SPRING

@@ -6,7 +6,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 
-from finger_pin.core.stepper import TABLEAUS
+from finger_pin.core.stepping.stepper import TABLEAUS
 
 ORDER = {"Rodas4": 4, "Rodas5P": 5}
 

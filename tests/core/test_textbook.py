@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finger_pin.core.textbook import integrate
+from finger_pin.core.stepping.textbook import integrate
 
 METHODS = ("Radau", "BDF", "LSODA")
 

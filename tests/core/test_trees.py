@@ -7,8 +7,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from finger_pin.core.control import held_control
-from finger_pin.core.integrator import integrate_compiled
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.passive_tendon import TENDON_HALF
 from finger_pin.mechanism.mechanism import Mechanism

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from urdf_cases import FINGERS, JOINTS, OTHER_LENGTHS, links_of
+from validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 
-from finger_pin.commands.validation.kinematics import equation_1, planar_tip, read_by_yourdfpy
 from finger_pin.description.loading import list_fingers, load_finger
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.urdf import build_rigid_body, to_urdf
+from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
 
 ROOT = Path(__file__).resolve().parents[2]
 

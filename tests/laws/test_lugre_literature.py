@@ -7,9 +7,8 @@ Control 40(3), 1995, section III and Table I: a mass of 1 kg under a constant no
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-
-from finger_pin.commands.validation import lugre
-from finger_pin.commands.validation.lugre import (
+from validation import lugre
+from validation.lugre import (
     COULOMB,
     EXPONENT,
     LAG,
@@ -21,6 +20,7 @@ from finger_pin.commands.validation.lugre import (
     law,
     move,
 )
+
 from finger_pin.laws import bristle as friction
 
 

@@ -70,7 +70,7 @@ def test_seeds_alone_decide_what_happens(monkeypatch):
     )
     found = []
     for threads in (1, 2):
-        monkeypatch.setattr("finger_pin.core.batch.usable_cores", lambda count=threads: count)
+        monkeypatch.setattr("finger_pin.core.stepping.batch.usable_cores", lambda count=threads: count)
         worlds = VectorEnvironment(3, FIG6, **task)
         seen = [worlds.reset(seed=7)[0]]
         seen += [worlds.step(np.tile(pull, (3, 1)))[0] for pull in [*PULLS, *PULLS]]

@@ -4,7 +4,7 @@ import coal
 import numba
 import numpy as np
 
-from finger_pin.core.law_code import inlined
+from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.mechanism.gaps import PRISM, prism_parameters
 
 _value, _slopes = inlined(PRISM.value), inlined(PRISM.slopes)

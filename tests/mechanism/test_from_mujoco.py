@@ -6,7 +6,7 @@ import pytest
 from mujoco_models import HEAD, MODELS, ROUTED, arms, posture
 
 import finger_pin as fp
-from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario
 

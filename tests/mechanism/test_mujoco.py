@@ -7,14 +7,14 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from mujoco_models import ROUTED
+from validation import mujoco_motion
 
 import finger_pin as fp
-from finger_pin.commands.validation import mujoco_motion
 from finger_pin.description.loading import list_fingers
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.mjcf import to_mjcf
+from finger_pin.mechanism.exchange.mjcf import to_mjcf
+from finger_pin.mechanism.exchange.urdf import to_urdf
 from finger_pin.mechanism.state import State
-from finger_pin.mechanism.urdf import to_urdf
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -254,7 +254,7 @@ def test_what_is_no_finger_of_links_is_refused_by_name(export):
 
 
 def test_the_export_needs_no_mujoco():
-    code = "import sys; import finger_pin.mechanism.mjcf; sys.exit('mujoco' in sys.modules)"
+    code = "import sys; import finger_pin.mechanism.exchange.mjcf; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

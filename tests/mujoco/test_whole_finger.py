@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco_models import ROUTED
+from validation import mujoco_motion
 
 import finger_pin as fp
-from finger_pin.commands.validation import mujoco_motion
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from validation.wild_fingers import wild_scenario
 
 import finger_pin as fp
-from finger_pin.commands.validation.wild_fingers import wild_scenario
 from finger_pin.exceptions import AccuracyWarning, SelfLockingWarning
 from finger_pin.laws.spring import JOINT_SPRING, spring_energy
 from finger_pin.mechanism.rows import Rows

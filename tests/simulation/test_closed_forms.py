@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-
-from finger_pin.commands.validation import closed_forms, symmetry
-from finger_pin.commands.validation.closed_forms import SLIDING, one_joint, slide
+from validation import closed_forms, symmetry
+from validation.closed_forms import SLIDING, one_joint, slide
 
 
 @pytest.mark.parametrize("exponent", [1, 2])

@@ -7,8 +7,8 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
-from finger_pin.core.evaluation import CompiledFinger
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 
 G, MASS, STIFFNESS = 9.81, 0.05, 1e4
 HEIGHT, FREQUENCY = 0.01, 1.0

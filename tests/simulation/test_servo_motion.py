@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import finger_pin as fp
 from finger_pin.core.control import held_control
-from finger_pin.core.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.mechanism.mechanism import Mechanism
 
 sys.path.append(str(Path(__file__).parents[1] / "mechanism"))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from validation.wild_fingers import wild_scenario
 
 import finger_pin as fp
-from finger_pin.commands.validation.wild_fingers import wild_scenario
 
 
 def let_go(floor: float) -> tuple[fp.Scenario, np.ndarray]:

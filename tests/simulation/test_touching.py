@@ -5,9 +5,9 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.evaluation import CompiledFinger
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.exceptions import AccuracyWarning
-from finger_pin.simulation.starting import packed_state
+from finger_pin.simulation.initial_state import packed_state
 from finger_pin.views.summary import summarize
 
 #: A ball that falls on the fingertip, off it, and on the floor.

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.stepper import in_threads
-from finger_pin.core.textbook import Trajectory
+from finger_pin.core.stepping.stepper import in_threads
+from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario

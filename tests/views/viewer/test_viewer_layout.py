@@ -9,7 +9,7 @@ from pages import opened, seek
 import finger_pin as fp
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario, to_toml
-from finger_pin.mechanism.from_mujoco import from_mujoco
+from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
 from finger_pin.views.viewer import write_animation
 
 

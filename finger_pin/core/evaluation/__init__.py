@@ -1,0 +1,1 @@
+"""The right-hand side, its Jacobian and its signals, compiled."""

@@ -1,0 +1,175 @@
+"""Blocks: what the linear systems of a step couple, found anew for every step.
+
+Without contacts a mechanism falls into atoms, such as the fingers of a hand and what lies around. Contacts that are
+closed join atoms to blocks. One that is open is held open during the step: it exerts nothing, whatever moves, and
+each of its states decays on its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finger_pin.core.control import Control
+from finger_pin.core.evaluation import law_code as at
+from finger_pin.core.jit import Indices, Vector, compiled
+from finger_pin.core.stepping.islands import find_islands
+from finger_pin.core.tables import Tables
+
+
+class Blocks(NamedTuple):
+    """Atoms, and the blocks to which contacts join them; N coordinates, K rows, Z states, A atoms.
+
+    Members of all blocks stand in a row, one block after the other; ``*_start`` has where each begins.
+
+    Attributes:
+        atom: Of every coordinate, shape (N,).
+        row_atom: Of every row, shape (K,); -1 for contacts.
+        label: Block of every atom, shape (A,).
+        number: How many blocks there are, shape (1,).
+        coordinate_start, coordinates: Shapes (A + 1,) and (N,).
+        row_start, rows: Of all rows but those of contacts, shapes (A + 1,) and (K,).
+        touch_start, touches: First rows of closed contacts, shapes (A + 1,) and (contacts,).
+        state_start, states: Shapes (A + 1,) and (Z,).
+        place: Of every coordinate in its block, shape (N,).
+        state_place: Of every state in its block, shape (Z,).
+        loose: For the states of contacts that are open, -dz'/dz, shape (Z,); zero for all others.
+        current: The block that is being condensed, shape (1,).
+    """
+
+    atom: Indices
+    row_atom: Indices
+    label: Indices
+    number: Indices
+    coordinate_start: Indices
+    coordinates: Indices
+    row_start: Indices
+    rows: Indices
+    touch_start: Indices
+    touches: Indices
+    state_start: Indices
+    states: Indices
+    place: Indices
+    state_place: Indices
+    loose: Vector
+    current: Indices
+
+
+def build_blocks(tables: Tables, control: Control) -> Blocks:
+    """Return the blocks of tables while nothing touches."""
+    count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
+    states = int(tables.state.max(initial=-1)) + 1
+    atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
+    if tables.touching:
+        islands = find_islands(tables, control, touching=False)
+        atoms = len(islands)
+        for index, island in enumerate(islands):
+            atom[island.coordinates], row_atom[island.rows] = index, index
+        row_atom[tables.touch > 0] = -1
+
+    def room(size: int) -> Any:
+        return np.zeros(size, dtype=np.int64)
+
+    return Blocks(
+        atom=atom,
+        row_atom=row_atom,
+        label=room(atoms),
+        number=np.ones(1, dtype=np.int64),
+        coordinate_start=np.array([0, *[width] * atoms]),
+        coordinates=np.arange(width),
+        row_start=np.array([0, *[count] * atoms]),
+        rows=np.arange(count),
+        touch_start=room(atoms + 1),
+        touches=room(tables.touching // 3),
+        state_start=np.array([0, *[states] * atoms]),
+        states=np.arange(states),
+        place=np.arange(width),
+        state_place=np.arange(states),
+        loose=np.zeros(states),
+        current=room(1),
+    )
+
+
+@compiled
+def extent(blocks: Any, b: int) -> Any:
+    """Return how many coordinates a block has, and columns: r of positions, velocities and states, and time."""
+    width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
+    return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
+
+
+@compiled
+def _join(tables: Any, work: Any, blocks: Any) -> None:
+    """Fill the block of every atom."""
+    paths, label = tables.paths, blocks.label
+    for a in range(label.size):
+        label[a] = a
+    for index in range(work.paths.closed_count[0]):
+        e = work.paths.closed[index]
+        if work.rows[at.SIDE, paths.row[e]] < 0.0:
+            continue
+        for s in range(paths.start[e], paths.start[e + 1]):
+            first, second = label[blocks.atom[paths.at[paths.start[e]]]], label[blocks.atom[paths.at[s]]]
+            if first != second:
+                for a in range(label.size):
+                    if label[a] == max(first, second):
+                        label[a] = min(first, second)
+    # Labels are the least atom of each block: number them.
+    count = 0
+    for a in range(label.size):
+        if label[a] == a:
+            label[a] = count
+            count += 1
+        else:
+            # An earlier atom, which has its number.
+            label[a] = label[label[a]]
+    blocks.number[0] = count
+
+
+@compiled
+def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
+    """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
+    paths = tables.paths
+    for index in range(blocks.touch_start[blocks.number[0]]):
+        for k in range(blocks.touches[index], blocks.touches[index] + 3):
+            for c in range(gain.shape[1]):
+                gain[k, c] = 0.0
+    _join(tables, work, blocks)
+    coordinates = rows = touches = states = 0
+    for s in range(blocks.loose.size):
+        blocks.loose[s] = 0.0
+    for e in range(paths.columns.size):
+        k = paths.row[e]
+        if paths.columns[e] > 1 and work.paths.asleep[k] == 0:
+            blocks.loose[tables.state[k + 1]] = -work.slopes[at.R_LENGTH + 4, k + 1]
+            blocks.loose[tables.state[k + 2]] = -work.slopes[at.R_LENGTH + 5, k + 2]
+    for b in range(blocks.number[0]):
+        for j in range(blocks.atom.size):
+            if blocks.label[blocks.atom[j]] == b:
+                blocks.coordinates[coordinates] = j
+                blocks.place[j] = coordinates - blocks.coordinate_start[b]
+                coordinates += 1
+        for index in range(work.paths.closed_count[0]):
+            e = work.paths.closed[index]
+            k = paths.row[e]
+            if work.rows[at.SIDE, k] < 0.0 or blocks.label[blocks.atom[paths.at[paths.start[e]]]] != b:
+                continue
+            blocks.touches[touches] = k
+            touches += 1
+            for m in range(1, 3):
+                state = tables.state[k + m]
+                blocks.states[states], blocks.loose[state] = state, 0.0
+                blocks.state_place[state] = states - blocks.state_start[b]
+                states += 1
+        for k in range(blocks.row_atom.size):
+            if blocks.row_atom[k] < 0 or blocks.label[blocks.row_atom[k]] != b:
+                continue
+            blocks.rows[rows] = k
+            rows += 1
+            state = tables.state[k]
+            if state >= 0:
+                blocks.states[states] = state
+                blocks.state_place[state] = states - blocks.state_start[b]
+                states += 1
+        blocks.coordinate_start[b + 1], blocks.row_start[b + 1] = coordinates, rows
+        blocks.touch_start[b + 1], blocks.state_start[b + 1] = touches, states

@@ -1,0 +1,208 @@
+"""The attitude of free bodies: angles about three axes since the last step, and a unit quaternion at its start.
+
+Within a step a free body turns about its own x, then y, then z by small angles, whose rates are coordinates as any
+other. After the step the turn goes into the quaternion and the angles begin anew at zero, where their rates are the
+angular velocity in the body's frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.evaluation.rigid_body import ROTATION
+from finger_pin.core.jit import compiled
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.mechanism import Mechanism
+
+_KNOWN: WeakKeyDictionary[Mechanism, Charts] = WeakKeyDictionary()
+
+
+def place(frame: Any, q: Any, body: Any) -> None:
+    """Write the attitude of a quaternion into the placement of the first body that turns, whose z axis is its x axis.
+
+    Args:
+        frame: Rotation of the spherical joint in the body before it, shape (3, 3).
+        q: Quaternion, shape (4,).
+        body: Row of the table of bodies.
+    """
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    along_x = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w))
+    along_y = (2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w))
+    along_z = (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y))
+    for r in range(3):
+        # The frame along x has its axes along -z, y and x.
+        body[ROTATION + 3 * r] = -(frame[r, 0] * along_z[0] + frame[r, 1] * along_z[1] + frame[r, 2] * along_z[2])
+        body[ROTATION + 3 * r + 1] = frame[r, 0] * along_y[0] + frame[r, 1] * along_y[1] + frame[r, 2] * along_y[2]
+        body[ROTATION + 3 * r + 2] = frame[r, 0] * along_x[0] + frame[r, 1] * along_x[1] + frame[r, 2] * along_x[2]
+
+
+def place_all(tables: Any, attitude: Any) -> None:
+    """Place all free bodies by their quaternions, shape (f, 4)."""
+    for f in range(tables.charts.size):
+        place(tables.chart_frames[f], attitude[f], tables.bodies[tables.charts[f]])
+
+
+_place = inlined(place)
+#: `place_all` in compiled code.
+place_bodies = inlined(place_all)
+
+
+@compiled
+def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
+    """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements.
+
+    The ``drift`` of angles and rates, small changes of them, is that of the new ones afterwards.
+    """
+    width = tables.parents.size + tables.lumps.size
+    for f in range(tables.charts.size):
+        i = tables.charts[f]
+        a, b, c = x[i], x[i + 1], x[i + 2]
+        da, db, dc = x[width + i], x[width + i + 1], x[width + i + 2]
+        _turn_drift(a, b, c, da, db, dc, drift[i : i + 3], drift[width + i : width + i + 3])
+        x[width + i] = da * np.cos(b) * np.cos(c) + db * np.sin(c)
+        x[width + i + 1] = db * np.cos(c) - da * np.cos(b) * np.sin(c)
+        x[width + i + 2] = da * np.sin(b) + dc
+        x[i], x[i + 1], x[i + 2] = 0.0, 0.0, 0.0
+        q = attitude[f]
+        _turn(q, 0, a)
+        _turn(q, 1, b)
+        _turn(q, 2, c)
+        size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+        for r in range(4):
+            q[r] /= size
+        _place(tables.chart_frames[f], q, tables.bodies[i])
+
+
+@compiled
+def _turn_drift(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Any, rates: Any) -> None:
+    """Replace small changes of angles and rates by those of the angles that begin anew, and of their rates."""
+    sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
+    # The angular velocity (x, y), as in `rechart`, and how it changes.
+    x, y = da * cb * cc + db * sc, db * cc - da * cb * sc
+    p, q, r = angles[0], angles[1], angles[2]
+    dx = rates[0] * cb * cc + rates[1] * sc - da * sb * cc * q + y * r
+    dy = rates[1] * cc - rates[0] * cb * sc + da * sb * sc * q - x * r
+    dz = rates[0] * sb + rates[2] + da * cb * q
+    # The turn that changes of the angles are, about the body's axes.
+    p, q, r = p * cb * cc + q * sc, q * cc - p * cb * sc, p * sb + r
+    angles[0], angles[1], angles[2] = p, q, r
+    # From the angular velocity at these new angles to their rates.
+    rates[0], rates[1], rates[2] = dx - y * r, dy + x * r, dz - x * q
+
+
+@compiled
+def _turn(q: Any, axis: int, angle: float) -> None:
+    """Replace a quaternion q by q times the turn about one of its own axes."""
+    cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    own, scalar, along, across = q[axis], q[3], q[second], q[third]
+    q[axis] = cosine * own + sine * scalar
+    q[3] = cosine * scalar - sine * own
+    q[second] = cosine * along + sine * across
+    q[third] = cosine * across - sine * along
+
+
+def angular_velocity(angles: Array, rates: Array) -> Array:
+    """Return the angular velocity in the body's frame of turns about its x, y and z axes, shape (..., 3), rad/s."""
+    (_, b, c), (da, db, dc) = np.moveaxis(angles, -1, 0), np.moveaxis(rates, -1, 0)
+    across = da * np.cos(b)
+    return np.stack(
+        [across * np.cos(c) + db * np.sin(c), db * np.cos(c) - across * np.sin(c), da * np.sin(b) + dc], axis=-1
+    )
+
+
+def turned(attitude: Array, angles: Array) -> Array:
+    """Return quaternions (x, y, z, w) after turns about the body's x, y and z axes, shape (..., 4)."""
+    found = attitude
+    for axis in range(3):
+        cosine, sine = np.cos(0.5 * angles[..., axis]), np.sin(0.5 * angles[..., axis])
+        second, third = (axis + 1) % 3, (axis + 2) % 3
+        new = np.empty_like(found)
+        new[..., axis] = cosine * found[..., axis] + sine * found[..., 3]
+        new[..., 3] = cosine * found[..., 3] - sine * found[..., axis]
+        new[..., second] = cosine * found[..., second] + sine * found[..., third]
+        new[..., third] = cosine * found[..., third] - sine * found[..., second]
+        found = new
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Where packed states have quaternions and the core has angles.
+
+    Attributes:
+        plain: Indices in a packed state of what is the same in both, shape (m,).
+        cores: Indices of the same in the core's state, shape (m,).
+        quaternions: First index of every quaternion in a packed state.
+        angles: First index of its angles in the core's state; their rates stand N further.
+        coordinates: N.
+        size: Length of the core's state.
+    """
+
+    plain: NDArray[np.int64]
+    cores: NDArray[np.int64]
+    quaternions: tuple[int, ...]
+    angles: tuple[int, ...]
+    coordinates: int
+    size: int
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> Charts:
+        """Read a mechanism."""
+        if mechanism not in _KNOWN:
+            _KNOWN[mechanism] = cls._of(mechanism)
+        return _KNOWN[mechanism]
+
+    @classmethod
+    def _of(cls, mechanism: Mechanism) -> Charts:
+        model, width = mechanism.body.model, mechanism.coordinates
+        spheres = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
+        packed, core = np.ones(mechanism.size, dtype=bool), np.ones(2 * width + mechanism.state_count, dtype=bool)
+        for joint in spheres:
+            packed[joint.idx_q : joint.idx_q + 4] = False
+            core[joint.idx_v : joint.idx_v + 3] = False
+        return cls(
+            np.flatnonzero(packed),
+            np.flatnonzero(core),
+            tuple(int(joint.idx_q) for joint in spheres),
+            tuple(int(joint.idx_v) for joint in spheres),
+            width,
+            len(core),
+        )
+
+    def to_core(self, x: Array) -> tuple[Array, Array]:
+        """Return the core's state with angles zero, shape (..., size), and unit quaternions, shape (..., f, 4)."""
+        lead = x.shape[:-1]
+        core, attitude = np.zeros((*lead, self.size)), np.zeros((*lead, len(self.quaternions), 4))
+        core[..., self.cores] = x[..., self.plain]
+        for f, at in enumerate(self.quaternions):
+            q = x[..., at : at + 4]
+            attitude[..., f, :] = q / np.linalg.norm(q, axis=-1, keepdims=True)
+        return core, attitude
+
+    def to_packed(self, core: Array, attitude: Array) -> Array:
+        """Return packed states from the core's, shape (..., size), and the quaternions from which angles count."""
+        packed = np.zeros((*core.shape[:-1], len(self.plain) + 4 * len(self.quaternions)))
+        packed[..., self.plain] = core[..., self.cores]
+        shift = len(self.quaternions)
+        for f, (at, i) in enumerate(zip(self.quaternions, self.angles, strict=True)):
+            angles, rates = core[..., i : i + 3], core[..., self.coordinates + i : self.coordinates + i + 3]
+            q = turned(attitude[..., f, :], angles)
+            packed[..., at : at + 4] = q / np.linalg.norm(q, axis=-1, keepdims=True)
+            velocity = self.coordinates + shift + i
+            packed[..., velocity : velocity + 3] = angular_velocity(angles, rates)
+        return packed
+
+    def packed_places(self, core: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return where numbers of the core's state stand in a packed one; angles at their quaternion."""
+        place = np.zeros(self.size, dtype=np.int64)
+        place[self.cores] = self.plain
+        for at, i in zip(self.quaternions, self.angles, strict=True):
+            place[i : i + 3] = at
+        return np.asarray(place[core])

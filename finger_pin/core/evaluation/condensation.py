@@ -1,0 +1,276 @@
+"""The linear systems that an implicit method solves, condensed to one equation per coordinate.
+
+A Rosenbrock stage solves (g - J) u = r. Every row turns its slopes into the change of its force d phi in terms of the
+changes dq and dv of positions and velocities, and of its own r:
+
+    d l = A dq,  d l' = A dv,  d N and d u from the rows before,
+    g dz - dz' = r_z   with  dz' = by l, l', N, u, curvature, and z itself: one division,
+
+and what is left is (g M + dh/dv - sum A^T G_v + (dh/dq - sum A^T G_q) / g) dv = M r_v - ... . All of it is linear in
+r, so the solution is kept as one matrix, and a stage costs one product with it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from finger_pin.core.evaluation import law_code as at
+from finger_pin.core.evaluation.blocks import extent
+from finger_pin.core.jit import call_at, compiled, compiled_loosely
+
+
+@compiled
+def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int, out: Any) -> None:
+    """Fill the change of a weighted sum of earlier forces, times a slope."""
+    for c in range(wide):
+        out[c] = 0.0
+    for e in range(begin, end):
+        weight, source = slope * tables.weights[e], gain[tables.terms[e]]
+        for c in range(wide):
+            out[c] += weight * source[c]
+
+
+@compiled
+def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
+    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
+    tables, control, work, linear = model.tables, model.control, model.work, model.linear
+    load, command, force, slopes = linear.load, linear.command, linear.force, work.slopes
+    blocks = linear.blocks
+    place, own_places = blocks.place, blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+    last = wide - 1
+    for j in range(width):
+        for c in range(wide):
+            force[j, c] = 0.0
+        force[j, last] -= linear.bias_rate[own_places[j]]
+    if tables.loaded:
+        for t in range(tables.tip_body.size):
+            for j in range(width):
+                for r in range(3):
+                    force[j, last] += work.jacobian[t, r, own_places[j]] * work.force_rate[t, r]
+    if tables.touching:
+        blocks.current[0] = b
+        call_at(model.touch, address, g)
+    for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
+        k = blocks.rows[index]
+        row, state = linear.gain[k], tables.state[k]
+        of_length, of_speed, of_curvature = slopes[at.F_LENGTH, k], slopes[at.F_SPEED, k], slopes[at.F_CURVATURE, k]
+        of_load, of_command = slopes[at.F_LOAD, k], slopes[at.F_COMMAND, k]
+        by_load = by_command = 0.0
+        factor = total = 0.0
+        if state >= 0:
+            factor = 1.0 / (g - slopes[at.R_STATE, k])
+            by_load, by_command = factor * slopes[at.R_LOAD, k], factor * slopes[at.R_COMMAND, k]
+            # d phi by z and by z' = g dz - r_z.
+            total = slopes[at.F_STATE, k] + g * slopes[at.F_RATE, k]
+        own = linear.state_gain[max(state, 0)]
+        for c in range(wide):
+            row[c] = 0.0
+        if state >= 0:
+            for c in range(wide):
+                own[c] = 0.0
+        pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.touching and tables.pins[k] >= 0)
+        if pressed and (of_load != 0.0 or by_load != 0.0):
+            _terms(
+                tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load
+            )
+            if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
+                for c in range(width):
+                    load[c] += linear.load_by_position[k, own_places[c]]
+                load[last] += linear.load_by_time[k]
+                if tables.touching:
+                    call_at(model.press, address, float(k))
+            for c in range(wide):
+                row[c] = of_load * load[c]
+            if by_load != 0.0:
+                for c in range(wide):
+                    own[c] = by_load * load[c]
+        fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
+        if fed and (of_command != 0.0 or by_command != 0.0):
+            _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, wide, command)
+            channel = tables.channel[k]
+            if channel >= 0:
+                for c in range(width):
+                    command[c] += control.by_position[channel, own_places[c]]
+                    command[width + c] += control.by_velocity[channel, own_places[c]]
+                command[last] += control.by_time[channel]
+            for c in range(wide):
+                row[c] += of_command * command[c]
+            if by_command != 0.0:
+                for c in range(wide):
+                    own[c] += by_command * command[c]
+        begin, end = tables.arm_start[k], tables.arm_start[k + 1]
+        if state >= 0:
+            by_length, by_speed = factor * slopes[at.R_LENGTH, k], factor * slopes[at.R_SPEED, k]
+            by_curvature = factor * slopes[at.R_CURVATURE, k]
+            for e in range(begin, end):
+                own[place[tables.arm_at[e]]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
+                own[width + place[tables.arm_at[e]]] += by_speed * linear.arm[e]
+            for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
+                own[place[tables.bend_at[e]]] += by_curvature * linear.bend[e]
+            for c in range(wide):
+                row[c] += total * own[c]
+            # The column of r_z itself, without the difference g dz - r_z.
+            itself = 2 * width + blocks.state_place[state]
+            own[itself] += factor
+            row[itself] += factor * (slopes[at.F_STATE, k] + slopes[at.F_RATE, k] * slopes[at.R_STATE, k])
+        elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed):
+            # An idle row, such as a limiter inside its range.
+            continue
+        for e in range(begin, end):
+            row[place[tables.arm_at[e]]] += of_length * linear.measure[e] + of_speed * linear.turning[e]
+            row[width + place[tables.arm_at[e]]] += of_speed * linear.arm[e]
+        for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
+            row[place[tables.bend_at[e]]] += of_curvature * linear.bend[e]
+        for e in range(begin, end):
+            arm, target = linear.arm[e], force[place[tables.arm_at[e]]]
+            for c in range(wide):
+                target[c] += arm * row[c]
+
+
+@compiled
+def _factorise(matrix: Any, size: int, pivots: Any) -> bool:
+    """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
+    for c in range(size):
+        best = c
+        for r in range(c + 1, size):
+            if abs(matrix[r, c]) > abs(matrix[best, c]):
+                best = r
+        pivots[c] = best
+        if not abs(matrix[best, c]) > 0.0:
+            return False
+        if best != c:
+            for k in range(size):
+                matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
+        for r in range(c + 1, size):
+            factor = matrix[r, c] / matrix[c, c]
+            matrix[r, c] = factor
+            for k in range(c + 1, size):
+                matrix[r, k] -= factor * matrix[c, k]
+    return True
+
+
+@compiled
+def _substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
+    """Replace right-hand sides, one a column, by solutions."""
+    for r in range(size):
+        best = pivots[r]
+        if best != r:
+            for c in range(wide):
+                right[r, c], right[best, c] = right[best, c], right[r, c]
+    for r in range(size):
+        for k in range(r):
+            factor = matrix[r, k]
+            for c in range(wide):
+                right[r, c] -= factor * right[k, c]
+    for r in range(size - 1, -1, -1):
+        for k in range(r + 1, size):
+            factor = matrix[r, k]
+            for c in range(wide):
+                right[r, c] -= factor * right[k, c]
+        inverse = 1.0 / matrix[r, r]
+        for c in range(wide):
+            right[r, c] *= inverse
+
+
+@compiled
+def condense(model: Any, address: int, g: float) -> bool:
+    """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
+    linear, blocks = model.linear, model.linear.blocks
+    for s in range(blocks.loose.size):
+        linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
+    for b in range(blocks.number[0]):
+        if not _condense_block(model, address, g, b):
+            return False
+    return True
+
+
+@compiled
+def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
+    """Fill the rows of the solution that belong to a block."""
+    linear, blocks = model.linear, model.linear.blocks
+    places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+    states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+    whole = linear.mass.shape[0]
+    width, wide = extent(blocks, b)
+    _gains(model, address, g, b, width, wide)
+    force, velocity, reduced = linear.force, linear.velocity, linear.reduced
+    inverse = 1.0 / g
+    for i in range(width):
+        at_row = places[i]
+        of_mass, of_position, of_velocity = linear.mass[at_row], linear.by_position[at_row], linear.by_velocity[at_row]
+        for j in range(width):
+            by_position = (of_position[places[j]] - force[i, j]) * inverse
+            reduced[i, j] = g * of_mass[places[j]] + of_velocity[places[j]] - force[i, width + j] + by_position
+            velocity[i, j] = -by_position
+            velocity[i, width + j] = of_mass[places[j]]
+        for c in range(2 * width, wide):
+            velocity[i, c] = force[i, c]
+        if model.tables.guided[at_row] >= 0:
+            # v' is given as a function of time.
+            for j in range(width):
+                reduced[i, j] = 0.0
+            for c in range(wide):
+                velocity[i, c] = 0.0
+            reduced[i, i], velocity[i, width + i] = g, 1.0
+            velocity[i, wide - 1] = model.work.guide_rate[model.tables.guided[at_row]]
+    if not _factorise(reduced, width, linear.pivots):
+        return False
+    _substitute(reduced, width, linear.pivots, velocity, wide)
+    solution = linear.solution
+    for i in range(width):
+        position, moving = solution[places[i]], solution[whole + places[i]]
+        for c in range(wide):
+            moving[c] = velocity[i, c]
+            position[c] = velocity[i, c] * inverse
+        position[i] += inverse
+    # Gains multiply dq = (r_q + dv) / g and dv.
+    for s in states:
+        own, row = linear.state_gain[s], solution[2 * whole + s]
+        for c in range(width):
+            row[c] = own[c] * inverse
+            row[width + c] = 0.0
+        for c in range(2 * width, wide):
+            row[c] = own[c]
+        for j in range(width):
+            factor = own[j] * inverse + own[width + j]
+            if factor != 0.0:
+                for c in range(wide):
+                    row[c] += factor * velocity[j, c]
+    return True
+
+
+@compiled_loosely
+def solve(linear: Any, r: Any, u: Any) -> None:
+    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i."""
+    blocks, right, solution = linear.blocks, linear.right, linear.solution
+    whole = linear.mass.shape[0]
+    if blocks.touches.size == 0:
+        # One block for good, all in its order.
+        for i in range(u.size):
+            row, value = solution[i], 0.0
+            for c in range(r.size):
+                value += row[c] * r[c]
+            u[i] = value
+        return
+    for s in range(linear.loose.size):
+        u[2 * whole + s] = linear.loose[s] * r[2 * whole + s]
+    for b in range(blocks.number[0]):
+        places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+        states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+        width, wide = extent(blocks, b)
+        for c in range(width):
+            right[c], right[width + c] = r[places[c]], r[whole + places[c]]
+        for c in range(states.size):
+            right[2 * width + c] = r[2 * whole + states[c]]
+        right[wide - 1] = r[r.size - 1]
+        for i in range(wide - 1):
+            if i < width:
+                at_row = places[i]
+            elif i < 2 * width:
+                at_row = whole + places[i - width]
+            else:
+                at_row = 2 * whole + states[i - 2 * width]
+            row, value = solution[at_row], 0.0
+            for c in range(wide):
+                value += row[c] * right[c]
+            u[at_row] = value

@@ -1,0 +1,113 @@
+"""Contacts, of three rows and two states each: what they exert, and their part in the systems of `condensation`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from finger_pin.core.evaluation import law_code as at
+from finger_pin.core.evaluation.blocks import extent
+from finger_pin.core.evaluation.paths import passes, push
+from finger_pin.core.jit import call_value, compiled
+from finger_pin.core.tables import END, FIRST
+
+
+@compiled
+def exert_contacts(tables: Any, v: Any, z: Any, work: Any) -> None:
+    """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
+    rows, asleep = work.rows, work.paths.asleep
+    for g in range(tables.groups.shape[0]):
+        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        for k in range(begin, end if begin < tables.touching else begin, 3):
+            if asleep[k]:
+                continue
+            for m in range(k, k + 3):
+                speed = 0.0
+                for e in range(tables.arm_start[m], tables.arm_start[m + 1]):
+                    speed += work.arm[e] * v[tables.arm_at[e]]
+                rows[at.LENGTH, m], rows[at.SPEED, m] = work.paths.length[m], speed
+                if m > k:
+                    rows[at.STATE, m] = z[tables.state[m]]
+            call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)
+    push(tables, work)
+    for index in range(work.paths.closed_count[0]):
+        k = tables.paths.row[work.paths.closed[index]]
+        for e in range(tables.arm_start[k], tables.arm_start[k + 3]):
+            work.torque[tables.arm_at[e]] += work.arm[e] * rows[at.FORCE, tables.arm_row[e]]
+
+
+@compiled
+def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out: Any) -> None:
+    """Add the change of a contact's gap, speed and slips, with a weight each."""
+    place = linear.blocks.place
+    for m in range(3):
+        by_length, by_speed = (weights[0] if m == 0 else 0.0), weights[m + 1]
+        for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
+            j = place[tables.arm_at[e]]
+            out[j] += by_length * linear.measure[e] + by_speed * linear.turning[e]
+            out[width + j] += by_speed * linear.arm[e]
+
+
+@compiled
+def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width: int, wide: int) -> None:
+    """Fill the gains of the three rows of a contact and of its two states, in the columns of its block."""
+    slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
+    first, second = tables.state[k + 1], tables.state[k + 2]
+    # (g - A) dz = r_z + B (what the contact sees): A is two by two.
+    a, b = g - slopes[at.R_LENGTH + 4, k + 1], -slopes[at.R_LENGTH + 5, k + 1]
+    c, d = -slopes[at.R_LENGTH + 4, k + 2], g - slopes[at.R_LENGTH + 5, k + 2]
+    inverse = 1.0 / (a * d - b * c)
+    for i in range(2):
+        by_first, by_second = (inverse * d, -inverse * b) if i == 0 else (-inverse * c, inverse * a)
+        own = linear.state_gain[first if i == 0 else second]
+        for column in range(wide):
+            own[column] = 0.0
+        weights = (
+            by_first * slopes[at.R_LENGTH, k + 1] + by_second * slopes[at.R_LENGTH, k + 2],
+            by_first * slopes[at.R_LENGTH + 1, k + 1] + by_second * slopes[at.R_LENGTH + 1, k + 2],
+            by_first * slopes[at.R_LENGTH + 2, k + 1] + by_second * slopes[at.R_LENGTH + 2, k + 2],
+            by_first * slopes[at.R_LENGTH + 3, k + 1] + by_second * slopes[at.R_LENGTH + 3, k + 2],
+        )
+        _add_inputs(tables, k, weights, linear, width, own)
+        own[2 * width + state_place[first]] += by_first
+        own[2 * width + state_place[second]] += by_second
+    for m in range(3):
+        row = linear.gain[k + m]
+        of_first, of_second = slopes[4, k + m], slopes[5, k + m]
+        for column in range(wide):
+            row[column] = of_first * linear.state_gain[first, column] + of_second * linear.state_gain[second, column]
+        weights = slopes[0, k + m], slopes[1, k + m], slopes[2, k + m], slopes[3, k + m]
+        _add_inputs(tables, k, weights, linear, width, row)
+        for e in range(tables.arm_start[k + m], tables.arm_start[k + m + 1]):
+            arm, target = linear.arm[e], linear.force[place[tables.arm_at[e]]]
+            if arm != 0.0:
+                for column in range(wide):
+                    target[column] += arm * row[column]
+
+
+@compiled
+def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
+    """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
+    blocks = linear.blocks
+    b = blocks.current[0]
+    width, wide = extent(blocks, b)
+    for index in range(blocks.touch_start[b], blocks.touch_start[b + 1]):
+        _contact_gains(tables, g, blocks.touches[index], work, linear, width, wide)
+
+
+@compiled
+def add_pushes(tables: Any, work: Any, k: int, linear: Any) -> None:
+    """Add to the change of a pin's load that of the forces of the closed contacts of its block."""
+    paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
+    _, wide = extent(blocks, blocks.current[0])
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
+        passing = passes(paths, e, tables.pins[k])
+        if passing == 0.0 or work.rows[at.SIDE, paths.row[e]] < 0.0:
+            continue
+        size = max(work.rows[at.LOAD, k], 1e-100)
+        for m in range(3):
+            share = 0.0
+            for r in range(3):
+                share += passing * work.pull[k, r] * own.wrench[e, m, 3 + r] / size
+            for c in range(wide):
+                load[c] += share * linear.gain[paths.row[e] + m, c]

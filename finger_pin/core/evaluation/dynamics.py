@@ -1,0 +1,175 @@
+"""The right-hand side of (18), compiled: `Mechanism.evaluate`, one state at a time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.inputs import inputs, tip_forces
+from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SPEED, STATE
+from finger_pin.core.evaluation.paths import passes
+from finger_pin.core.evaluation.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
+from finger_pin.core.evaluation.time_functions import signal_derivatives
+from finger_pin.core.jit import call_at, call_value, compiled
+from finger_pin.core.tables import END, FED, FIRST, PRESSED
+
+
+@compiled
+def _tips(tables: Any, work: Any) -> None:
+    """Fill positions and Jacobians of the tips, and J^T F, after `move`."""
+    size = tables.parents.size
+    for j in range(size):
+        work.external[j] = 0.0
+    for t in range(tables.tip_body.size):
+        tip, jacobian, body = work.tip[t], work.jacobian[t], tables.tip_body[t]
+        for r in range(3):
+            tip[r] = tables.tip_offset[t, r]
+            if body >= 0:
+                tip[r] = work.origin[body, r]
+                for c in range(3):
+                    tip[r] += work.rotation[body, r, c] * tables.tip_offset[t, c]
+        j = body
+        while j >= 0:
+            axis = work.spatial[AXIS, j]
+            jacobian[0, j] = axis[3] + axis[1] * tip[2] - axis[2] * tip[1]
+            jacobian[1, j] = axis[4] + axis[2] * tip[0] - axis[0] * tip[2]
+            jacobian[2, j] = axis[5] + axis[0] * tip[1] - axis[1] * tip[0]
+            for r in range(3):
+                work.external[j] += jacobian[r, j] * tables.tip_force[t, r]
+            j = tables.parents[j]
+
+
+@compiled
+def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
+    """Return |-e S + F| of (17) for row k, and keep the vector and e."""
+    body = tables.pins[k]
+    carrier = tables.carriers[body]
+    pull = work.pull[k]
+    for r in range(3):
+        value = tables.directions[body, r]
+        if carrier >= 0:
+            value = 0.0
+            for c in range(3):
+                value += work.rotation[carrier, r, c] * tables.directions[body, c]
+        work.lever[k, r] = value
+        pull[r] = -load * value
+        for t in range(tables.tip_body.size):
+            pull[r] += tables.carried[t, body] * tables.tip_force[t, r]
+    for index in range(work.paths.closed_count[0]):
+        e = work.paths.closed[index]
+        passing = passes(tables.paths, e, body)
+        for r in range(3):
+            pull[r] += passing * work.paths.push[e, r]
+    return np.sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2])
+
+
+@compiled
+def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
+    total = 0.0
+    for e in range(begin, end):
+        total += tables.weights[e] * work.rows[FORCE, tables.terms[e]]
+    return total
+
+
+@compiled
+def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
+    """Fill what the rows but those of contacts see of positions, velocities, states and inputs from outside.
+
+    One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
+    """
+    rows, first = work.rows, tables.touching
+    for k in range(first, rows.shape[1]):
+        rows[LENGTH, k] = tables.offset[k] + work.paths.length[k]
+        rows[SPEED, k] = 0.0
+        rows[CURVATURE, k] = tables.curvature_offset[k] + work.paths.turn[k]
+    for e in range(tables.arm_start[first], tables.arm_at.size):
+        k, j = tables.arm_row[e], tables.arm_at[e]
+        rows[LENGTH, k] += tables.measure[e] * q[j]
+        rows[SPEED, k] += work.arm[e] * v[j]
+    for e in range(tables.bend_start[first], tables.bend_at.size):
+        rows[CURVATURE, tables.bend_row[e]] += tables.bend[e] * abs(q[tables.bend_at[e]])
+    for i in range(2 * first // 3, tables.state_row.size):
+        rows[STATE, tables.state_row[i]] = z[i]
+    for i in range(tables.fed_row.size):
+        k = tables.fed_row[i]
+        rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
+
+
+@compiled
+def _act(tables: Any, work: Any) -> None:
+    """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
+    rows = work.rows
+    for g in range(tables.groups.shape[0]):
+        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        if begin < tables.touching:
+            continue
+        if tables.groups[g, FED]:
+            for k in range(begin, end):
+                rows[COMMAND, k] += _sum_of_terms(tables, tables.input_start[k], tables.input_start[k + 1], work)
+        if tables.groups[g, PRESSED]:
+            for k in range(begin, end):
+                load = _sum_of_terms(tables, tables.load_start[k], tables.load_start[k + 1], work)
+                if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
+                    rows[LOAD, k] = _pin_load(tables, k, load, work)
+                else:
+                    work.pull[k, 0] = load
+                    rows[LOAD, k] = abs(load)
+        call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
+
+
+@compiled
+def _drive(tables: Any, work: Any, rate: Any) -> None:
+    """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
+    rows, torque = work.rows, work.torque
+    for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
+        torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
+    for i in range(tables.state_row.size):
+        rate[i] = rows[RATE, tables.state_row[i]]
+
+
+@compiled
+def exert(model: Any, address: int, time: float) -> None:
+    """Fill what the rows see and do, where bodies are placed by `move` and inputs known, and their states' rates."""
+    tables, control, x, work = model.tables, model.control, model.state, model.work
+    width = work.torque.size
+    if tables.loaded:
+        tip_forces(control, time, 0, tables.tip_force)
+        _tips(tables, work)
+    for j in range(width):
+        work.torque[j] = 0.0
+    if model.measure != 0:
+        call_at(model.measure, address, time)
+    _see(tables, x[:width], x[width : 2 * width], x[2 * width :], work)
+    _act(tables, work)
+    _drive(tables, work, model.rate[2 * width :])
+
+
+@compiled
+def evaluate(model: Any, address: int, time: float) -> None:
+    """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
+    tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
+    size, width = tables.parents.size, work.torque.size
+    q, v = x[:width], x[width : 2 * width]
+    inputs(control, time, q, v, work.command)
+    if model.carry != 0:
+        call_at(model.carry, address, time)
+    move(tables, q, v, work)
+    call_at(model.exert, address, time)
+    mass_matrix(tables, work)
+    factorise_mass(tables, size, work)
+    inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)
+    for j in range(size):
+        work.acceleration[j] = work.torque[j] + work.external[j] - work.bias[j]
+    solve_mass(size, work, work.acceleration)
+    for j in range(size, width):
+        work.acceleration[j] = work.torque[j] / tables.lumps[j - size]
+    if work.guide.size > 0:
+        if control.palm.harmonics.shape[0] == 0:
+            signal_derivatives(control.guide, time, 2, work.guide)
+        for j in range(width):
+            if tables.guided[j] >= 0:
+                work.acceleration[j] = work.guide[tables.guided[j]]
+    for j in range(width):
+        rate[j] = v[j]
+        rate[width + j] = work.acceleration[j]

@@ -1,0 +1,146 @@
+"""What comes from outside, compiled: values of a `Control`, and their slopes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.control import HELD, SCHEDULED
+from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
+from finger_pin.core.evaluation.trigonometry import sine_cosine
+from finger_pin.core.jit import compiled
+from finger_pin.laws import controller as controller_laws
+from finger_pin.laws import palm as palm_laws
+
+_proportional_torque = inlined(controller_laws.proportional_torque)
+_internal_level = inlined(controller_laws.internal_level)
+_base_motion = inlined(palm_laws.base_motion)
+
+
+@compiled
+def _coupled(control: Any, values: Any, out: Any) -> None:
+    """Fill what a derivative of the base signals makes of the desired positions, by the coupling (20)."""
+    for j in range(out.size):
+        out[j] = 0.0
+        for k in range(control.coupling.shape[1]):
+            out[j] += control.coupling[j, k] * values[k]
+
+
+@compiled
+def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) -> None:
+    """Fill the inputs: f_hat of (19), (21), (22), or what is scheduled; what is held, beside them or alone."""
+    for i in range(out.size):
+        out[i] = control.tension[i]
+    if control.kind == HELD:
+        return
+    if control.kind == SCHEDULED:
+        signal_values(control.schedule, time, out)
+        for i in range(out.size):
+            out[i] += control.tension[i]
+        return
+    signal_values(control.reference, time, control.base)
+    desired, planned, base = control.desired, control.planned, control.base
+    count = position.size
+    for j in range(count):
+        wanted = control.offset[j]
+        for k in range(control.coupling.shape[1]):
+            wanted += control.coupling[j, k] * base[k]
+        desired[j] = _proportional_torque(control.gain[j], wanted, position[j])
+    if control.damped:
+        signal_derivatives(control.reference, time, 1, control.slope)
+        _coupled(control, control.slope, control.rate)
+        for j in range(count):
+            desired[j] += control.damping[j] * (control.rate[j] - velocity[j])
+    for c in range(control.level.size):
+        control.level[c] = -np.inf
+    for i in range(planned.size):
+        value = 0.0
+        for j in range(count):
+            value += control.inverse[i, j] * desired[j]
+        planned[i] = value
+        candidate = _internal_level(control.minimum[i], value, control.internal[i])
+        c = control.loop[i]
+        if candidate > control.level[c]:
+            control.level[c] = candidate
+            control.active[c] = i
+    for i in range(planned.size):
+        planned[i] += control.level[control.loop[i]] * control.internal[i]
+        if control.channel[i] >= 0:
+            out[control.channel[i]] = planned[i]
+
+
+@compiled
+def input_slopes(control: Any, time: float) -> None:
+    """Fill du/dq, du/dv and du/dt after `inputs`, for the active minimum of (22)."""
+    by_position, by_time = control.by_position, control.by_time
+    if control.kind == HELD:
+        return
+    if control.kind == SCHEDULED:
+        signal_derivatives(control.schedule, time, 1, by_time)
+        return
+    count = control.gain.size
+    signal_derivatives(control.reference, time, 1, control.base)
+    _coupled(control, control.base, control.rate)
+    if control.damped:
+        signal_derivatives(control.reference, time, 2, control.base)
+        _coupled(control, control.base, control.acceleration)
+    for i in range(control.planned.size):
+        row = control.channel[i]
+        if row < 0:
+            continue
+        active = control.active[control.loop[i]]
+        by_time[row] = 0.0
+        for j in range(count):
+            shared = control.inverse[active, j] / control.internal[active]
+            share = control.inverse[i, j] - control.internal[i] * shared
+            by_position[row, j] = -control.gain[j] * share
+            control.by_velocity[row, j] = -control.damping[j] * share
+            by_time[row] += share * (control.gain[j] * control.rate[j] + control.damping[j] * control.acceleration[j])
+
+
+@compiled
+def tip_forces(control: Any, time: float, order: int, out: Any) -> None:
+    """Fill the forces at the tips where they vary in time, or a derivative of them, shape (t, 3)."""
+    if control.force.harmonics.shape[0] > 0:
+        for t in range(out.shape[0]):
+            for r in range(3):
+                out[t, r] = signal_derivative(control.force, 3 * t + r, time, order)
+
+
+@compiled
+def _coordinates(signal: Any, time: float, order: int) -> Any:
+    return (
+        signal_derivative(signal, 0, time, order),
+        signal_derivative(signal, 1, time, order),
+        signal_derivative(signal, 2, time, order),
+        signal_derivative(signal, 3, time, order),
+        signal_derivative(signal, 4, time, order),
+        signal_derivative(signal, 5, time, order),
+    )
+
+
+@compiled
+def move_base(control: Any, time: float, tables: Any, work: Any) -> None:
+    """Fill velocity and acceleration of the base, and their rates, where it moves."""
+    if control.palm.harmonics.shape[0] == 0:
+        return
+    place = _coordinates(control.palm, time, 0)
+    turns = sine_cosine(place[3]) + sine_cosine(place[4]) + sine_cosine(place[5])
+    found = _base_motion(
+        _coordinates(control.palm, time, 1),
+        _coordinates(control.palm, time, 2),
+        _coordinates(control.palm, time, 3),
+        turns,
+        (tables.gravity[0], tables.gravity[1], tables.gravity[2]),
+    )
+    for k in range(6):
+        work.base_velocity[k] = found[k]
+        work.base_acceleration[k] = found[6 + k]
+        work.base_rate[0, k] = found[15 + k]
+        work.base_rate[1, k] = found[21 + k]
+    # What stands in the world, seen from a base that does not turn.
+    for i in range(work.guide.size):
+        r = i % 6
+        work.guide[i], work.guide_rate[i] = (-found[18 + r], -found[24 + r]) if r < 3 else (0.0, 0.0)

@@ -1,0 +1,171 @@
+"""Exact derivatives of paths through space.
+
+The wrenches of a piece turn with the body that carries its frame, and change with the points as that frame sees them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from finger_pin.core.evaluation.law_code import FORCE, LOAD
+from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
+from finger_pin.core.evaluation.rigid_body import AXIS
+from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
+from finger_pin.core.jit import call_shape, compiled
+from finger_pin.core.path_tables import WRENCH
+
+
+@compiled
+def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) -> None:
+    """Fill a frame's view of a point's velocity, for a unit rate of a coordinate."""
+    x = weight * (axis[3] + axis[1] * point[2] - axis[2] * point[1])
+    y = weight * (axis[4] + axis[2] * point[0] - axis[0] * point[2])
+    z = weight * (axis[5] + axis[0] * point[1] - axis[1] * point[0])
+    for c in range(3):
+        out[c] = rotation[0, c] * x + rotation[1, c] * y + rotation[2, c] * z
+
+
+@compiled
+def _changed(slopes: Any, first: int, dy: Any, rotation: Any, out: Any) -> None:
+    """Fill a vector's change as the base sees it, from the three rows of slopes that begin somewhere."""
+    for r in range(3):
+        out[r] = 0.0
+    for i in range(3):
+        change = 0.0
+        for c in range(6):
+            change += slopes[first + 6 * i + c] * dy[c]
+        for r in range(3):
+            out[r] += rotation[r, i] * change
+
+
+@compiled
+def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
+    """Fill the derivatives of a piece's wrenches and turn by the coordinates that move it."""
+    own = work.paths
+    rotation, ends, columns, slopes = own.frame[e], own.ends[e], paths.columns[e], own.slopes
+    dy, moved, point = work.vectors[0], work.vectors[1], work.centre
+    call_shape(paths.shapes[e, 1], own.seen[e], paths.parameters[e], slopes)
+    turn_out(rotation, own.out[e], 4, point)
+    for r in range(3):
+        point[r] += own.origin[e, r]
+    for s in range(paths.start[e], paths.start[e + 1]):
+        axis, moves = work.spatial[AXIS, paths.at[s]], paths.moves[s]
+        for p in range(2):
+            weight = 1.0 * (moves[p] - moves[2])
+            _seen_from(axis, rotation, ends[3 * p : 3 * p + 3], weight, dy[3 * p : 3 * p + 3])
+        for m in range(columns):
+            wrench, out = own.wrench[e, m], own.wrench_slope[s, m]
+            for i in range(WRENCH):
+                out[i] = 0.0
+            if columns == 1:
+                turn = 0.0
+                for c in range(6):
+                    turn += slopes[c] * dy[c]
+                own.turn_slope[s] = turn
+                for p in range(2):
+                    force = out[6 * p + 3 : 6 * p + 6]
+                    _changed(slopes, 6 + 18 * p, dy, rotation, force)
+                    add_moment(ends[3 * p : 3 * p + 3], force, out[6 * p : 6 * p + 3])
+                    turn_out(rotation, dy, 3 * p, moved)
+                    add_moment(moved, wrench[6 * p + 3 : 6 * p + 6], out[6 * p : 6 * p + 3])
+            else:
+                force = out[3:6]
+                _changed(slopes, 0 if m == 0 else 18 + 18 * m, dy, rotation, force)
+                add_moment(point, force, out[:3])
+                _changed(slopes, 18, dy, rotation, moved)
+                add_moment(moved, wrench[3:6], out[:3])
+            if moves[2]:
+                for p in range(2):
+                    add_force_cross(axis, wrench[6 * p : 6 * p + 6], out[6 * p : 6 * p + 6])
+
+
+@compiled
+def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
+    """Add the derivatives of the angle by which a row's path turns."""
+    paths, own = tables.paths, work.paths
+    k, gather = paths.rows[index], own.gather
+    for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
+        e = paths.piece[leg]
+        for s in range(paths.start[e], paths.start[e + 1]):
+            gather[paths.at[s]] += own.turn_slope[s]
+        if not paths.follows[leg]:
+            continue
+        before = paths.piece[leg - 1]
+        incoming, outgoing = own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6]
+        _, sine = angle_between(incoming, outgoing)
+        # A straight corner is a kink, as |q| is at 0.
+        inverse = 1.0 / sine if sine > 1e-12 else 0.0
+        for s in range(paths.start[e], paths.start[e + 1]):
+            change = own.wrench_slope[s, 0]
+            for r in range(3):
+                gather[paths.at[s]] += inverse * incoming[r] * change[3 + r]
+        for s in range(paths.start[before], paths.start[before + 1]):
+            change = own.wrench_slope[s, 0]
+            for r in range(3):
+                gather[paths.at[s]] += inverse * change[9 + r] * outgoing[r]
+    for b in range(tables.bend_start[k], tables.bend_start[k + 1]):
+        linear.bend[b] += gather[tables.bend_at[b]]
+    for j in range(gather.size):
+        gather[j] = 0.0
+
+
+@compiled
+def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
+    """Add to a pin's load what contacts do that turn with the posture at constant forces."""
+    paths, own = tables.paths, work.paths
+    size = max(work.rows[LOAD, k], 1e-100)
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
+        share = passes(paths, e, tables.pins[k]) / size
+        if share == 0.0:
+            continue
+        for s in range(paths.start[e], paths.start[e + 1]):
+            for m in range(3):
+                force = share * work.rows[FORCE, paths.row[e] + m]
+                for r in range(3):
+                    by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
+
+
+@compiled
+def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
+    """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
+    paths, own = tables.paths, work.paths
+    for e in range(paths.columns.size):
+        if own.active[e]:
+            _slopes_of_piece(paths, e, work)
+    axes, gather, net, crossed = work.spatial[AXIS], own.gather, work.vectors[0], work.vectors[1]
+    for index in range(paths.rows.size):
+        k = paths.rows[index]
+        if tables.touch[k] == 0:
+            _add_turns(tables, work, linear, index)
+        elif own.active[paths.piece[paths.leg_start[index]]] == 0:
+            continue
+        for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
+            e, m = paths.piece[leg], paths.column[leg]
+            if own.active[e] == 0:
+                continue
+            weight = paths.weights[leg, 0]
+            force = weight * work.rows[FORCE, k]
+            begin, end = paths.start[e], paths.start[e + 1]
+            for r in range(begin, end):
+                i, turning = paths.at[r], 0.0
+                for s in range(begin, end):
+                    j = paths.at[s]
+                    net_wrench(paths.moves[s], own.wrench_slope[r, m], net)
+                    slope = dot(axes[j], net)
+                    if paths.carries[i, j]:
+                        # A joint nearer to the base turns the axes of those that it carries.
+                        motion_cross(axes[i], axes[j], crossed)
+                        net_wrench(paths.moves[s], own.wrench[e, m], net)
+                        slope += dot(crossed, net)
+                    linear.by_position[j, i] -= force * slope
+                    turning += slope * velocity[j]
+                gather[i] += weight * turning
+        for a in range(tables.arm_start[k], tables.arm_start[k + 1]):
+            linear.arm[a], linear.measure[a] = work.arm[a], work.gradient[a]
+            linear.turning[a] = gather[tables.arm_at[a]]
+            gather[tables.arm_at[a]] = 0.0
+    if tables.touching:
+        for k in range(tables.pins.size):
+            if tables.pins[k] >= 0:
+                _turn_pushes(tables, work, k, linear.load_by_position[k])

@@ -1,0 +1,196 @@
+"""Paths through space, compiled: `pieces.reach`, one posture at a time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.law_code import FORCE, SIDE
+from finger_pin.core.evaluation.rigid_body import AXIS
+from finger_pin.core.evaluation.spatial import dot
+from finger_pin.core.jit import call_shape, compiled
+from finger_pin.core.path_tables import WRENCH
+
+
+@compiled
+def add_moment(point: Any, force: Any, out: Any) -> None:
+    """Add the moment of a force at a point."""
+    out[0] += point[1] * force[2] - point[2] * force[1]
+    out[1] += point[2] * force[0] - point[0] * force[2]
+    out[2] += point[0] * force[1] - point[1] * force[0]
+
+
+@compiled
+def _frame(paths: Any, e: int, work: Any) -> None:
+    """Place a piece's frame, its points, and its points as the frame sees them."""
+    own = work.paths
+    rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
+    body = paths.carriers[e, 2]
+    for r in range(3):
+        origin[r] = paths.origin[e, r]
+        for c in range(3):
+            rotation[r, c] = paths.rotation[e, r, c]
+    if body >= 0:
+        above = work.rotation[body]
+        for r in range(3):
+            origin[r] = work.origin[body, r]
+            for i in range(3):
+                origin[r] += above[r, i] * paths.origin[e, i]
+            for c in range(3):
+                rotation[r, c] = 0.0
+                for i in range(3):
+                    rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
+    for p in range(2):
+        body = paths.carriers[e, p]
+        for r in range(3):
+            ends[3 * p + r] = paths.points[e, 3 * p + r]
+        if body >= 0:
+            for r in range(3):
+                ends[3 * p + r] = work.origin[body, r]
+                for i in range(3):
+                    ends[3 * p + r] += work.rotation[body, r, i] * paths.points[e, 3 * p + i]
+        for c in range(3):
+            own.seen[e, 3 * p + c] = 0.0
+            for r in range(3):
+                own.seen[e, 3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
+
+
+@compiled
+def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
+    """Fill three numbers of a wrench with a vector that a frame sees."""
+    for r in range(3):
+        vector[r] = rotation[r, 0] * out[first] + rotation[r, 1] * out[first + 1] + rotation[r, 2] * out[first + 2]
+
+
+@compiled
+def look(paths: Any, e: int, work: Any) -> bool:
+    """Fill what a piece says where bodies are placed; return whether it was asked, or is out of reach."""
+    own = work.paths
+    _frame(paths, e, work)
+    out, y = own.out[e], own.seen[e]
+    beyond = 0.0
+    for c in range(3):
+        middle = 0.5 * (y[c] + y[3 + c])
+        beyond += middle * middle
+    beyond = np.sqrt(beyond) - paths.reach[e]
+    if beyond > 0.0:
+        out[0] = beyond
+    else:
+        call_shape(paths.shapes[e, 0], y, paths.parameters[e], out)
+    return not beyond > 0.0
+
+
+@compiled
+def _measure(paths: Any, e: int, work: Any) -> None:
+    """Fill what a piece says, and its wrenches."""
+    own = work.paths
+    look(paths, e, work)
+    out, columns = own.out[e], paths.columns[e]
+    own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[SIDE, paths.row[e]] > 0.0 else 0
+    rotation, ends, point = own.frame[e], own.ends[e], work.centre
+    for m in range(columns):
+        for i in range(WRENCH):
+            own.wrench[e, m, i] = 0.0
+    if own.active[e] == 0:
+        return
+    if columns == 1:
+        wrench = own.wrench[e, 0]
+        for p in range(2):
+            turn_out(rotation, out, 2 + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
+            add_moment(ends[3 * p : 3 * p + 3], wrench[6 * p + 3 : 6 * p + 6], wrench[6 * p : 6 * p + 3])
+    else:
+        turn_out(rotation, out, 4, point)
+        for r in range(3):
+            point[r] += own.origin[e, r]
+        for m in range(3):
+            wrench = own.wrench[e, m]
+            turn_out(rotation, out, 1 if m == 0 else 4 + 3 * m, wrench[3:6])
+            add_moment(point, wrench[3:6], wrench[:3])
+
+
+@compiled
+def net_wrench(moves: Any, wrench: Any, out: Any) -> None:
+    """Fill the wrench on all of the three bodies that a coordinate moves."""
+    first, second = 1.0 * (moves[0] - moves[2]), 1.0 * (moves[1] - moves[2])
+    for i in range(6):
+        out[i] = first * wrench[i] + second * wrench[6 + i]
+
+
+@compiled
+def angle_between(first: Any, second: Any) -> Any:
+    """Return cosine and sine of the angle between where a path comes in and where it goes on."""
+    cosine = -(first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
+    x = first[1] * second[2] - first[2] * second[1]
+    y = first[2] * second[0] - first[0] * second[2]
+    z = first[0] * second[1] - first[1] * second[0]
+    return cosine, np.sqrt(x * x + y * y + z * z)
+
+
+@compiled
+def measure_paths(tables: Any, work: Any) -> None:
+    """Fill lengths, turns and arms of all rows with paths, after `move`."""
+    paths, own = tables.paths, work.paths
+    closed = 0
+    for e in range(paths.columns.size):
+        if own.asleep[paths.row[e]] == 0:
+            _measure(paths, e, work)
+            if paths.columns[e] > 1 and own.active[e]:
+                own.closed[closed] = e
+                closed += 1
+    own.closed_count[0] = closed
+    axes, gather, net = work.spatial[AXIS], own.gather, work.vectors[0]
+    for index in range(paths.rows.size):
+        k = paths.rows[index]
+        if own.asleep[k]:
+            continue
+        length, turn = 0.0, 0.0
+        begin, end = tables.arm_start[k], tables.arm_start[k + 1]
+        for a in range(begin, end):
+            work.arm[a] = tables.arm[a]
+            work.gradient[a] = tables.measure[a]
+        for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
+            e, m = paths.piece[leg], paths.column[leg]
+            if m == 0:
+                length += paths.weights[leg, 1] * own.out[e, 0]
+            if own.active[e] == 0:
+                continue
+            if paths.columns[e] == 1:
+                turn += own.out[e, 1]
+            if paths.follows[leg]:
+                before = paths.piece[leg - 1]
+                cosine, sine = angle_between(own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6])
+                turn += np.arctan2(sine, cosine)
+            for r in range(paths.start[e], paths.start[e + 1]):
+                net_wrench(paths.moves[r], own.wrench[e, m], net)
+                gather[paths.at[r]] = dot(axes[paths.at[r]], net)
+            for a in range(begin, end):
+                j = tables.arm_at[a]
+                work.arm[a] += paths.weights[leg, 0] * gather[j]
+                work.gradient[a] += paths.weights[leg, 1] * gather[j]
+                gather[j] = 0.0
+        own.length[k], own.turn[k] = length, turn
+
+
+@compiled
+def push(tables: Any, work: Any) -> None:
+    """Fill the forces of all contacts, after their law."""
+    paths, own = tables.paths, work.paths
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
+        for r in range(3):
+            own.push[e, r] = 0.0
+            for m in range(3):
+                own.push[e, r] += work.rows[FORCE, paths.row[e] + m] * own.wrench[e, m, 3 + r]
+
+
+@compiled
+def passes(paths: Any, e: int, body: int) -> float:
+    """Return how often the force of a contact, and its reaction, pass the pin of a body."""
+    first, second = paths.carriers[e, 0], paths.carriers[e, 2]
+    beyond = 0.0
+    if first >= 0 and (first == body or paths.carries[body, first]):
+        beyond += 1.0
+    if second >= 0 and (second == body or paths.carries[body, second]):
+        beyond -= 1.0
+    return beyond

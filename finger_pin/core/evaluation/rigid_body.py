@@ -1,0 +1,216 @@
+"""Rigid-body dynamics of trees of revolute and prismatic joints, compiled.
+
+Everything is expressed in the base frame about its origin O: motion vectors are (angular velocity, velocity of the
+body's point at O), force vectors are (moment about O, force). Every joint turns about or slides along the z axis of
+its own frame; `plant` turns the frames of the model so that this holds.
+
+Inverse dynamics, composite inertias and bias are those of Featherstone, Rigid Body Dynamics Algorithms (2008).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
+from finger_pin.core.evaluation.trigonometry import sine_cosine
+from finger_pin.core.jit import compiled
+
+# Columns of the table of bodies.
+ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
+PRISMATIC = 1
+# Layers of work.spatial, one motion or force vector per body, and of work.square.
+AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPATIAL_LAYERS = range(8)
+MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
+
+
+@compiled
+def _place(tables: Any, i: int, angle: float, work: Any) -> None:
+    """Place body i: rotation, origin and joint axis in the base frame."""
+    body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
+    ax, ay, az = body[ROTATION], body[ROTATION + 1], body[ROTATION + 2]
+    bx, by, bz = body[ROTATION + 3], body[ROTATION + 4], body[ROTATION + 5]
+    cx, cy, cz = body[ROTATION + 6], body[ROTATION + 7], body[ROTATION + 8]
+    x, y, z = body[TRANSLATION], body[TRANSLATION + 1], body[TRANSLATION + 2]
+    prismatic = tables.kinds[i] == PRISMATIC
+    sine, cosine = (0.0, 1.0) if prismatic else sine_cosine(angle)
+    slid = angle if prismatic else 0.0
+    for r in range(3):
+        a, b, c, start = 1.0 * (r == 0), 1.0 * (r == 1), 1.0 * (r == 2), 0.0
+        if parent >= 0:
+            above = work.rotation[parent, r]
+            a, b, c, start = above[0], above[1], above[2], work.origin[parent, r]
+        # A row of the frame before the joint moves.
+        u, v, w = a * ax + b * bx + c * cx, a * ay + b * by + c * cy, a * az + b * bz + c * cz
+        rotation[r, 0], rotation[r, 1], rotation[r, 2] = cosine * u + sine * v, cosine * v - sine * u, w
+        origin[r] = start + a * x + b * y + c * z + slid * w
+
+
+@compiled
+def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
+    """Express the inertia of body i about O in base axes."""
+    body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
+    mass, x, y, z = body[MASS], body[CENTRE], body[CENTRE + 1], body[CENTRE + 2]
+    ixx, ixy, ixz = body[INERTIA], body[INERTIA + 1], body[INERTIA + 2]
+    iyy, iyz, izz = body[INERTIA + 3], body[INERTIA + 4], body[INERTIA + 5]
+    ax, ay, az = rotation[0, 0], rotation[0, 1], rotation[0, 2]
+    bx, by, bz = rotation[1, 0], rotation[1, 1], rotation[1, 2]
+    cx, cy, cz = rotation[2, 0], rotation[2, 1], rotation[2, 2]
+    # The centre of mass, and rows of R I.
+    px = origin[0] + ax * x + ay * y + az * z
+    py = origin[1] + bx * x + by * y + bz * z
+    pz = origin[2] + cx * x + cy * y + cz * z
+    ux, uy, uz = ax * ixx + ay * ixy + az * ixz, ax * ixy + ay * iyy + az * iyz, ax * ixz + ay * iyz + az * izz
+    vx, vy, vz = bx * ixx + by * ixy + bz * ixz, bx * ixy + by * iyy + bz * iyz, bx * ixz + by * iyz + bz * izz
+    wx, wy, wz = cx * ixx + cy * ixy + cz * ixz, cx * ixy + cy * iyy + cz * iyz, cx * ixz + cy * iyz + cz * izz
+    out[0], out[1], out[2], out[3] = mass, mass * px, mass * py, mass * pz
+    out[4] = ux * ax + uy * ay + uz * az + mass * (py * py + pz * pz)
+    out[5] = ux * bx + uy * by + uz * bz - mass * px * py
+    out[6] = ux * cx + uy * cy + uz * cz - mass * px * pz
+    out[7] = vx * bx + vy * by + vz * bz + mass * (px * px + pz * pz)
+    out[8] = vx * cx + vy * cy + vz * cz - mass * py * pz
+    out[9] = wx * cx + wy * cy + wz * cz + mass * (px * px + py * py)
+
+
+@compiled
+def move(tables: Any, position: Any, velocity: Any, work: Any) -> None:
+    """Fill axes, velocities and composite inertias of all bodies."""
+    for i in range(tables.parents.size):
+        parent = tables.parents[i]
+        _place(tables, i, position[i], work)
+        _inertia_about_origin(tables, i, work)
+        axis, rotation, origin = work.spatial[AXIS, i], work.rotation[i], work.origin[i]
+        x, y, z = rotation[0, 2], rotation[1, 2], rotation[2, 2]
+        if tables.kinds[i] == PRISMATIC:
+            axis[0], axis[1], axis[2], axis[3], axis[4], axis[5] = 0.0, 0.0, 0.0, x, y, z
+        else:
+            axis[0], axis[1], axis[2] = x, y, z
+            axis[3] = origin[1] * z - origin[2] * y
+            axis[4] = origin[2] * x - origin[0] * z
+            axis[5] = origin[0] * y - origin[1] * x
+        above = work.base_velocity if parent < 0 else work.spatial[MOTION, parent]
+        motion_cross(above, axis, work.spatial[AXIS_RATE, i])
+        for k in range(6):
+            work.spatial[MOTION, i, k] = above[k] + axis[k] * velocity[i]
+        for k in range(10):
+            work.composite[i, k] = work.inertia[i, k]
+    for i in range(tables.parents.size - 1, -1, -1):
+        if tables.parents[i] >= 0:
+            for k in range(10):
+                work.composite[tables.parents[i], k] += work.composite[i, k]
+
+
+@compiled
+def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, torque: Any, moving: bool) -> None:
+    """Fill torque = M a + C v + G after `move`, and the accelerations and composite forces of the bodies.
+
+    Without ``moving`` the acceleration is taken as zero: the bias forces.
+    """
+    size = tables.parents.size
+    for i in range(size):
+        parent = tables.parents[i]
+        own = acceleration[i] if moving else 0.0
+        for k in range(6):
+            above = work.base_acceleration[k] if parent < 0 else work.spatial[SPATIAL_ACCELERATION, parent, k]
+            work.spatial[SPATIAL_ACCELERATION, i, k] = (
+                above + work.spatial[AXIS, i, k] * own + work.spatial[AXIS_RATE, i, k] * velocity[i]
+            )
+        apply_inertia(work.inertia[i], work.spatial[SPATIAL_ACCELERATION, i], work.spatial[FORCE, i])
+        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
+        add_force_cross(work.spatial[MOTION, i], work.vectors[0], work.spatial[FORCE, i])
+    for i in range(size - 1, -1, -1):
+        own = acceleration[i] if moving else 0.0
+        torque[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i]) + tables.bodies[i, ARMATURE] * own
+        if tables.parents[i] >= 0:
+            for k in range(6):
+                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
+
+
+@compiled
+def base_power(tables: Any, velocity: Any, work: Any) -> Any:
+    """Return the power that a moving base supplies, W, after an evaluation: its velocity times what it exerts."""
+    inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
+    power = 0.0
+    for i in range(tables.parents.size):
+        if tables.parents[i] < 0:
+            power += dot(work.base_velocity, work.spatial[FORCE, i])
+    return power
+
+
+@compiled
+def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
+    """Fill the time derivative of inverse dynamics at a given motion where the base moves, shape (n,).
+
+    All velocities change alike, by dV; accelerations by that of the base and by dV x S v of every joint before. What
+    an evaluation has left in two layers is overwritten.
+    """
+    size, change = tables.parents.size, work.base_rate[0]
+    for i in range(size):
+        parent = tables.parents[i]
+        own, force = work.spatial[AXIS_CURVE, i], work.spatial[FORCE, i]
+        above = work.base_rate[1] if parent < 0 else work.spatial[AXIS_CURVE, parent]
+        motion_cross(change, work.spatial[AXIS, i], work.vectors[0])
+        for k in range(6):
+            own[k] = above[k] + work.vectors[0][k] * velocity[i]
+        apply_inertia(work.inertia[i], own, force)
+        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
+        add_force_cross(change, work.vectors[0], force)
+        apply_inertia(work.inertia[i], change, work.vectors[0])
+        add_force_cross(work.spatial[MOTION, i], work.vectors[0], force)
+    for i in range(size - 1, -1, -1):
+        out[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
+        if tables.parents[i] >= 0:
+            for k in range(6):
+                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
+
+
+@compiled
+def mass_matrix(tables: Any, work: Any) -> None:
+    """Fill work.square[MASS_MATRIX] = M after `move`."""
+    size = tables.parents.size
+    for i in range(size):
+        momentum = work.spatial[MOMENTUM, i]
+        apply_inertia(work.composite[i], work.spatial[AXIS, i], momentum)
+        for j in range(i):
+            work.square[MASS_MATRIX, i, j] = 0.0
+            work.square[MASS_MATRIX, j, i] = 0.0
+        j = i
+        while j >= 0:
+            value = dot(work.spatial[AXIS, j], momentum)
+            work.square[MASS_MATRIX, i, j] = value
+            work.square[MASS_MATRIX, j, i] = value
+            j = tables.parents[j]
+        work.square[MASS_MATRIX, i, i] += tables.bodies[i, ARMATURE]
+
+
+@compiled
+def factorise_mass(tables: Any, size: int, work: Any) -> None:
+    """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted."""
+    factor = work.square[CHOLESKY]
+    for i in range(size):
+        # Trees on the base do not feel each other's inertia.
+        first = i
+        while tables.parents[first] >= 0:
+            first = tables.parents[first]
+        for j in range(first, i + 1):
+            value = work.square[MASS_MATRIX, i, j]
+            for k in range(first, j):
+                value -= factor[i, k] * factor[j, k]
+            factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
+
+
+@compiled
+def solve_mass(size: int, work: Any, vector: Any) -> None:
+    """Replace a vector by M^-1 vector after `factorise_mass`."""
+    factor = work.square[CHOLESKY]
+    for i in range(size):
+        value = vector[i]
+        for k in range(i):
+            value -= factor[i, k] * vector[k]
+        vector[i] = value * factor[i, i]
+    for i in range(size - 1, -1, -1):
+        value = vector[i]
+        for k in range(i + 1, size):
+            value -= factor[k, i] * vector[k]
+        vector[i] = value * factor[i, i]

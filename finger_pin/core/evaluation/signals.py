@@ -1,0 +1,263 @@
+"""Many states at once, compiled: the evaluation that the integrator steps with, kept state by state."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finger_pin.core.evaluation.charts import place_bodies
+from finger_pin.core.evaluation.law_code import FORCE
+from finger_pin.core.evaluation.paths import turn_out
+from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
+from finger_pin.core.jit import Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, call_filling, compiled
+from finger_pin.core.model import MODEL
+from finger_pin.core.stepping.broad_phase import arrive, glide, settle, wake
+from finger_pin.core.tables import END, FIRST
+
+
+class States(NamedTuple):
+    """Many states of one island under given inputs, which its control must hold, and what is filled for them.
+
+    Attributes:
+        model: Address of a bound `Model`.
+        states: Shape (m, size).
+        commands: Shape (m, u).
+        forces: At the tips, shape (m, t, 3).
+        rates: Filled with the rates, shape (m, size), or (0, size) where they are not wanted.
+        rows: Filled with the table of rows from the first place on, shape (columns, first + m or more, K), or
+            (columns, 0, K) if only J^T F, energies and powers are wanted.
+        first: Where in it the first state stands.
+        torques: Filled with the sum of A^T phi, shape (m, N).
+        externals: Filled with J^T F, shape (m, N).
+        booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
+        bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
+            (m, 15 + g), or (0, 15 + g) at rest.
+        attitudes: Quaternions of free bodies, shape (m, f, 4).
+        touches: Filled with what contacts do in space, forces, points and normals, shape (m, contacts, 9), or
+            (0, contacts, 9).
+    """
+
+    model: int
+    states: Matrix
+    commands: Matrix
+    forces: Layers
+    rates: Matrix
+    rows: Layers
+    first: int
+    torques: Matrix
+    externals: Matrix
+    booked: Matrix
+    bases: Matrix
+    attitudes: Layers
+    touches: Layers
+
+
+class Motions(NamedTuple):
+    """Many positions and velocities of the bodies, and what is filled for them.
+
+    With a base that moves energies are those of the motion in the world, where the base has no height.
+
+    Attributes:
+        model: Address of a bound `Model`.
+        positions: Shape (m, n).
+        velocities: Shape (m, n).
+        tips: Filled with the positions of the tips, shape (m, t, 3).
+        kinetic: Filled with energies, shape (m,).
+        potential: Likewise.
+        bases: As of `States`.
+    """
+
+    model: int
+    positions: Matrix
+    velocities: Matrix
+    tips: Layers
+    kinetic: Vector
+    potential: Vector
+    bases: Matrix
+
+
+STATES, MOTIONS = Kind(States), Kind(Motions)
+
+
+@compiled
+def _book(tables: Any, work: Any, totals: Any) -> None:
+    """Sum up stored energies and powers of all rows after an evaluation."""
+    for c in range(totals.size):
+        totals[c] = 0.0
+    for g in range(tables.groups.shape[0]):
+        begin, end = tables.groups[g, FIRST], tables.groups[g, END]
+        if begin < tables.touching:
+            for k in range(begin, end, 3):
+                if work.paths.asleep[k] == 0:
+                    call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + 3)
+        else:
+            call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
+        for i in range(tables.books.shape[1]):
+            if tables.books[g, i] >= 0:
+                for k in range(begin, end):
+                    totals[tables.books[g, i]] += work.powers[i, k]
+
+
+@compiled
+def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: Any) -> None:
+    """Wake the contacts that may have closed since the state before the m-th."""
+    for f in range(tables.charts.size):
+        # What a free body has turned by: its angles count from its attitude.
+        first, second, cosine = attitudes[m - 1, f], attitudes[m, f], 0.0
+        for r in range(4):
+            cosine += first[r] * second[r]
+        before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
+    glide(before, after, tables.parents.size, work.paths)
+    wake(tables, work.paths)
+    width = work.torque.size
+    for k in range(tables.touching):
+        # Bent bristles tell of a contact that was closed meanwhile.
+        if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
+            first = k - k % 3
+            for each in range(first, first + 3):
+                work.paths.asleep[each] = 0
+
+
+@compiled
+def _touch(paths: Any, work: Any, out: Any) -> None:
+    """Fill the forces of contacts on the second body, the points, and the normals; zero where they are open."""
+    own = work.paths
+    for index in range(own.closed_count[0]):
+        e = own.closed[index]
+        k = paths.row[e]
+        if work.rows[FORCE, k] == 0.0:
+            continue
+        # Contacts come before all other rows.
+        touch = out[k // 3]
+        turn_out(own.frame[e], own.out[e], 4, touch[3:6])
+        for r in range(3):
+            touch[3 + r] += own.origin[e, r]
+            touch[6 + r] = own.wrench[e, 0, 3 + r]
+            for i in range(3):
+                touch[r] -= work.rows[FORCE, k + i] * own.wrench[e, i, 3 + r]
+
+
+@Unit
+def evaluate_many(address: int, _time: float) -> int:
+    """Evaluate the `States` at an address."""
+    many = bound_at(address, STATES)
+    states, commands, forces, rates, rows = many.states, many.commands, many.forces, many.rates, many.rows
+    first = many.first
+    torques, externals, booked, bases, attitudes = (
+        many.torques,
+        many.externals,
+        many.booked,
+        many.bases,
+        many.attitudes,
+    )
+    model = bound_at(many.model, MODEL)
+    tables, control, work = model.tables, model.control, model.work
+    # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
+    sleepy = tables.touching > 0 and rows.shape[1] == 0 and bases.shape[0] == 0
+    before = model.rate
+    for k in range(tables.touching):
+        work.paths.asleep[k] = 0
+    for e in range(work.paths.path.size):
+        work.paths.path[e] = 0.0
+    for m in range(states.shape[0]):
+        for i in range(commands.shape[1]):
+            control.tension[i] = commands[m, i]
+        for t in range(forces.shape[1]):
+            for r in range(3):
+                tables.tip_force[t, r] = forces[m, t, r]
+        for c in range(states.shape[1]):
+            model.state[c] = states[m, c]
+        if sleepy and m > 0:
+            _wake(tables, work, attitudes, m, before, model.state)
+        _set_base(bases, m, tables, work)
+        place_bodies(tables, attitudes[m])
+        if rates.shape[0] > 0 or bases.shape[0] > 0:
+            call_at(model.evaluate, many.model, 0.0)
+        else:
+            # Powers do not need the acceleration, and only some rows need to know where bodies are.
+            for i in range(commands.shape[1]):
+                work.command[i] = commands[m, i]
+            if tables.loaded or tables.paths.columns.size > 0:
+                width = work.torque.size
+                move(tables, model.state[:width], model.state[width : 2 * width], work)
+            call_at(model.exert, many.model, 0.0)
+        if rates.shape[0] > 0:
+            for c in range(states.shape[1]):
+                rates[m, c] = model.rate[c]
+        if rows.shape[1] > 0:
+            for c in range(rows.shape[0]):
+                for k in range(rows.shape[2]):
+                    rows[c, first + m, k] = work.rows[c, k]
+            if tables.touching:
+                _touch(tables.paths, work, many.touches[m])
+        for j in range(torques.shape[1]):
+            torques[m, j] = work.torque[j]
+            externals[m, j] = work.external[j]
+        _book(tables, work, booked[m])
+        if sleepy:
+            arrive(tables, work.paths)
+            settle(tables, work.rows, work.paths, model.state[2 * work.torque.size :])
+            for c in range(states.shape[1]):
+                before[c] = model.state[c]
+        last = booked.shape[1] - 1
+        if model.power != 0:
+            last -= 1
+            if bases.shape[0] > 0:
+                call_at(model.power, many.model, 0.0)
+                booked[m, last + 1] = work.base_power[0]
+        if work.guide.size > 0:
+            for j in range(torques.shape[1]):
+                if tables.guided[j] >= 0:
+                    booked[m, last] -= work.torque[j] * states[m, torques.shape[1] + j]
+    return 1
+
+
+@compiled
+def _set_base(bases: Any, m: int, tables: Any, work: Any) -> None:
+    """Set the motion of the base to the m-th, or to rest."""
+    for k in range(6):
+        moved = bases.shape[0] > 0
+        work.base_velocity[k] = bases[m, k] if moved else 0.0
+        rest = -tables.gravity[k - 3] if k >= 3 else 0.0
+        work.base_acceleration[k] = bases[m, 6 + k] if moved else rest
+    for i in range(work.guide.size):
+        work.guide[i] = bases[m, 15 + i] if bases.shape[0] > 0 else 0.0
+
+
+@Unit
+def motion_many(address: int, _time: float) -> int:
+    """Fill the `Motions` at an address."""
+    many = bound_at(address, MOTIONS)
+    positions, velocities, tips, bases = many.positions, many.velocities, many.tips, many.bases
+    model = bound_at(many.model, MODEL)
+    tables, work = model.tables, model.work
+    for m in range(positions.shape[0]):
+        _set_base(bases, m, tables, work)
+        move(tables, positions[m], velocities[m], work)
+        for t in range(tips.shape[1]):
+            body = tables.tip_body[t]
+            for r in range(3):
+                value = tables.tip_offset[t, r]
+                if body >= 0:
+                    value = work.origin[body, r]
+                    for c in range(3):
+                        value += work.rotation[body, r, c] * tables.tip_offset[t, c]
+                tips[m, t, r] = value
+        moving, lifted = 0.0, 0.0
+        for i in range(tables.parents.size):
+            inertia, v = work.inertia[i], work.spatial[MOTION, i]
+            # v . I v, with I = (mass, first moment, second moment about O).
+            moving += inertia[0] * (v[3] * v[3] + v[4] * v[4] + v[5] * v[5])
+            moving += inertia[4] * v[0] * v[0] + inertia[7] * v[1] * v[1] + inertia[9] * v[2] * v[2]
+            moving += 2.0 * (inertia[5] * v[0] * v[1] + inertia[6] * v[0] * v[2] + inertia[8] * v[1] * v[2])
+            moving += 2.0 * v[3] * (v[1] * inertia[3] - v[2] * inertia[2])
+            moving += 2.0 * v[4] * (v[2] * inertia[1] - v[0] * inertia[3])
+            moving += 2.0 * v[5] * (v[0] * inertia[2] - v[1] * inertia[1])
+            moving += tables.bodies[i, ARMATURE] * velocities[m, i] * velocities[m, i]
+            for r in range(3):
+                weight = bases[m, 12 + r] if bases.shape[0] > 0 else tables.gravity[r]
+                lifted -= weight * inertia[1 + r]
+        many.kinetic[m] = 0.5 * moving
+        many.potential[m] = lifted
+    return 1

@@ -1,0 +1,102 @@
+"""Functions of time, compiled: sinusoids and piecewise polynomials, with their derivatives."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.evaluation.trigonometry import sine_cosine
+from finger_pin.core.jit import Layers, Matrix, Vector, compiled
+from finger_pin.laws.quintic import quintic
+
+_quintic = inlined(quintic)
+
+
+class Signal(NamedTuple):
+    """k functions of time: a sinusoid about an offset each, plus a piecewise polynomial on shared knots.
+
+    Attributes:
+        harmonics: Offset, amplitude, frequency, phase, shape (k, 4).
+        knots: Shape (m,); m = 0 without polynomials. Outside, these keep their value.
+        coefficients: Of (t - knot)^(5 - i), shape (6, m - 1, k).
+    """
+
+    harmonics: Matrix
+    knots: Vector
+    coefficients: Layers
+
+
+def no_signal() -> Signal:
+    """Return a signal of no functions."""
+    return Signal(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
+
+
+@compiled
+def _piece(signal: Any, time: float) -> Any:
+    """Return the piece that a time is in, and the time since its knot, both clipped to the knots.
+
+    The search begins where even knots would have it, and doubles its stride until the time is between: samples at even
+    times are found at once, however many, and others by bisection.
+    """
+    knots = signal.knots
+    last = knots.size - 2
+    inside = min(max(time, knots[0]), knots[last + 1])
+    low = int((inside - knots[0]) / (knots[last + 1] - knots[0]) * last)
+    high, stride = low, 1
+    while low > 0 and knots[low] > inside:
+        high, low = low - 1, max(low - stride, 0)
+        stride *= 2
+    while high < last and knots[high + 1] <= inside:
+        low, high = high + 1, min(high + stride, last)
+        stride *= 2
+    while low < high:
+        middle = (low + high + 1) // 2
+        if knots[middle] <= inside:
+            low = middle
+        else:
+            high = middle - 1
+    return low, inside - knots[low]
+
+
+@compiled
+def signal_values(signal: Any, time: float, out: Any) -> None:
+    """Fill the values of the functions."""
+    table = signal.harmonics
+    for j in range(table.shape[0]):
+        out[j] = table[j, 0]
+        if table[j, 1] != 0.0:
+            out[j] += table[j, 1] * sine_cosine(2.0 * np.pi * table[j, 2] * time + table[j, 3])[0]
+    if signal.knots.size > 0:
+        piece, since = _piece(signal, time)
+        for j in range(table.shape[0]):
+            c = signal.coefficients[:, piece, j]
+            out[j] += _quintic(since, c[0], c[1], c[2], c[3], c[4], c[5])
+
+
+@compiled
+def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
+    """Return a time derivative of function j, of order 0 to 3."""
+    table, knots = signal.harmonics, signal.knots
+    circular = 2.0 * np.pi * table[j, 2]
+    value = table[j, 1] * circular**order * np.sin(circular * time + table[j, 3] + 0.5 * np.pi * order)
+    if order == 0:
+        value += table[j, 0]
+    if knots.size > 0 and (order == 0 or knots[0] <= time < knots[knots.size - 1]):
+        piece, since = _piece(signal, time)
+        polynomial = 0.0
+        for power in range(5, order - 1, -1):
+            factor = signal.coefficients[5 - power, piece, j]
+            for n in range(order):
+                factor *= power - n
+            polynomial = polynomial * since + factor
+        value += polynomial
+    return value
+
+
+@compiled
+def signal_derivatives(signal: Any, time: float, order: int, out: Any) -> None:
+    """Fill a time derivative of the functions, as many as there is room for; without functions what is there stays."""
+    for j in range(min(out.size, signal.harmonics.shape[0])):
+        out[j] = signal_derivative(signal, j, time, order)

@@ -1,0 +1,1 @@
+"""Steps: Rosenbrock methods, islands, touches that no step misses, and other integrators."""

@@ -1,0 +1,162 @@
+"""Contacts that are asleep: open, at rest, and too far apart to close before they are looked at again.
+
+Within a step the path of two bodies' relative motion is at most the sum, over the coordinates that move them against
+each other, of how far each goes to and fro times its lever. A polynomial goes no farther than its Bernstein
+coefficients do. One that is asleep keeps less than its gap, from which such paths are taken.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.law_code import RATE
+from finger_pin.core.jit import compiled
+
+# A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.
+KNOWN, _AHEAD = 1e-9, 3.0
+# Bristles bent by less, m, are straight: a ten thousandth of the diameter of an atom.
+_STRAIGHT = 1e-14
+
+
+@compiled
+def depart(tables: Any, own: Any) -> None:
+    """Note how far apart the bodies of all contacts that are awake are where a step begins."""
+    paths = tables.paths
+    for e in range(paths.columns.size):
+        if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
+            own.clear[e], own.far[e] = own.out[e, 0], distance(paths, e, own)
+
+
+@compiled
+def distance(paths: Any, e: int, own: Any) -> Any:
+    """Return how far the core of a gap's first body is from the origin of its frame at most, m."""
+    total = 0.0
+    for c in range(3):
+        middle = 0.5 * (own.seen[e, c] + own.seen[e, 3 + c])
+        total += middle * middle
+    return np.sqrt(total) + paths.cores[e]
+
+
+@compiled
+def trace(tableau: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
+    """Fill the Bernstein coefficients of the interpolant of a step, and how far each of n coordinates goes."""
+    last, rows = tableau.nodes.size - 1, tableau.dense.shape[0]
+    control = own.control
+    for j in range(size):
+        first, second, third = 0.0, 0.0, 0.0
+        for i in range(last + 1):
+            first += tableau.dense[0, i] * k[i, j]
+            second += tableau.dense[1, i] * k[i, j]
+        if rows > 2:
+            for i in range(last + 1):
+                third += tableau.dense[2, i] * k[i, j]
+        # (1 - s) x + s end + s (1 - s) (first + s second + s^2 third)
+        step = end[j] - x[j]
+        control[j, 0], control[j, 4] = x[j], end[j]
+        control[j, 1] = x[j] + 0.25 * (step + first)
+        control[j, 2] = x[j] + 0.5 * step + (first + 0.5 * second) / 3.0
+        control[j, 3] = end[j] - 0.25 * (step - first - second - third)
+        # The last stage is beside the end by the last increment.
+        own.travel[j] = abs(k[last, j])
+        for i in range(4):
+            own.travel[j] += abs(control[j, i + 1] - control[j, i])
+
+
+@compiled
+def glide(x: Any, end: Any, size: int, own: Any) -> None:
+    """Fill the same for a motion along a straight line."""
+    for j in range(size):
+        for i in range(5):
+            own.control[j, i] = x[j] + 0.25 * i * (end[j] - x[j])
+        own.travel[j] = abs(end[j] - x[j])
+
+
+@compiled
+def path_of(tables: Any, e: int, own: Any) -> Any:
+    """Return how far the bodies of a contact may move against each other in the step that was traced, m."""
+    paths, control = tables.paths, own.control
+    endless = np.isinf(paths.extents[e])
+    total, turned = 0.0, 0.0
+    for s in range(paths.start[e], paths.start[e + 1]):
+        j, other, lever = paths.at[s], paths.against[s], paths.levers[s]
+        way = own.travel[j]
+        if other >= 0:
+            # Beside what the last stage is off: what both have in common moves neither.
+            for i in range(4):
+                one, two = control[j, i + 1] - control[j, i], control[other, i + 1] - control[other, i]
+                way += abs(one - two) - abs(one) - abs(two)
+            way += own.travel[other]
+        total += lever * way
+        if endless and paths.moves[s, 2] > paths.moves[s, 0] and tables.kinds[j] == 0:
+            turned += way
+    return widened(total, turned, own.far[e])
+
+
+@compiled
+def widened(path: float, turned: float, far: float) -> Any:
+    """Return a path with that of what turns about a distant point, which is as far away as that and the path, m."""
+    if turned == 0.0:
+        return path
+    return (path + turned * far) / (1.0 - turned) if turned < 1.0 else np.inf
+
+
+@compiled
+def set_asleep(k: int, value: int, asleep: Any) -> None:
+    """Let the rows of a contact sleep, or wake them."""
+    for m in range(k, k + 3):
+        asleep[m] = value
+
+
+@compiled
+def wake(tables: Any, own: Any) -> None:
+    """Wake the contacts that may close on the way that was traced; note the paths of all."""
+    paths = tables.paths
+    for e in range(paths.columns.size):
+        k = paths.row[e]
+        if paths.columns[e] > 1:
+            own.path[e] = path_of(tables, e, own)
+            if own.asleep[k]:
+                own.ahead[e] = own.clear[e] - own.path[e]
+                if not own.ahead[e] > 0.0:
+                    set_asleep(k, 0, own.asleep)
+
+
+@compiled
+def arrive(tables: Any, own: Any) -> None:
+    """Note how far apart the bodies of contacts that are awake are at the end of a way that was traced."""
+    paths = tables.paths
+    for e in range(paths.columns.size):
+        if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
+            own.ahead[e], own.far[e] = own.out[e, 0] - KNOWN, distance(paths, e, own)
+
+
+@compiled
+def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
+    """Return whether the bristles of an open contact are straight; what is left of their bend then is nothing."""
+    for m in range(k + 1, k + 3):
+        if not abs(states[tables.state[m]]) < _STRAIGHT:
+            return False
+    for m in range(k + 1, k + 3):
+        states[tables.state[m]] = rows[RATE, m] = 0.0
+    return True
+
+
+@compiled
+def settle(tables: Any, rows: Any, own: Any, states: Any) -> None:
+    """Let contacts fall asleep or wake up where a step has ended, with what is known of their gaps there."""
+    paths = tables.paths
+    for e in range(paths.columns.size):
+        k = paths.row[e]
+        if paths.columns[e] == 1:
+            continue
+        near = not own.ahead[e] > _AHEAD * own.path[e]
+        if own.asleep[k]:
+            own.clear[e] = own.ahead[e]
+            own.far[e] += own.path[e]
+            if near:
+                set_asleep(k, 0, own.asleep)
+        elif not near and own.active[e] == 0 and _straighten(tables, rows, k, states):
+            own.clear[e], own.far[e] = own.ahead[e], own.far[e] + own.path[e]
+            set_asleep(k, 1, own.asleep)

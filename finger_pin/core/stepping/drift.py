@@ -1,0 +1,100 @@
+"""The error of a run, carried along with it: local errors, and what the linearised flow makes of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.jit import compiled
+
+# Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
+# loop that hunts makes of small errors; with six they are not.
+_TERMS = 6
+# How many steps one sum of terms covers; longer ones make fast vibrations grow.
+_LONGEST = 1.2
+# After a much longer step the flow is caught up over several, with no more sums than that in each.
+_MOST_SUMS = 64.0
+
+
+@compiled
+def carry(
+    linear: Any, h: float, gamma: float, drift: Any, difference: Any, behind: float, turned: bool, r: Any, u: Any
+) -> Any:
+    """Carry the error so far from the middle of the last step to that of this one, and add that of this one.
+
+    There the linearisation at this step's start is central. One that lags behind reversals damps what vibrates. Where
+    a step ends at a kink, the error is carried to its end: what comes after, such as a stiff contact, is another flow.
+
+    Args:
+        linear: Condensed for g = 1 / (h gamma).
+        h: Length of the step, s.
+        gamma: Of the method.
+        drift: The error so far, changed in place, shape (size,).
+        difference: That of the step, shape (size,).
+        behind: Time from where the error has been carried to, to the start of the step, s.
+        turned: Whether the step ends at a kink.
+        r: Scratch, shape (size + 1,).
+        u: Scratch, shape (size,).
+
+    Returns:
+        Time that is left to the end of the step, s.
+    """
+    size, time = drift.size, behind + 0.5 * h
+    sums = min(np.ceil(time / (_LONGEST * h)), _MOST_SUMS)
+    time = min(time, sums * _LONGEST * h)
+    for _ in range(int(sums)):
+        _flow(linear, 1.0 / (h * gamma), time / (sums * h * gamma), drift, r, u)
+    for c in range(size):
+        drift[c] += difference[c]
+    if turned:
+        _flow(linear, 1.0 / (h * gamma), 0.5 / gamma, drift, r, u)
+        time += 0.5 * h
+    return behind + h - time
+
+
+@compiled
+def weigh(part: Any, width: int, drift: Any) -> Any:
+    """Return the mean square of some coordinates' errors, rad2 or m2, at most one.
+
+    Beyond a radian the linearised flow says nothing more: their errors, and those of their velocities and of all that
+    is no coordinate, are less then.
+    """
+    total = 0.0
+    for c in part:
+        total += drift[c] * drift[c]
+    mean = total / max(part.size, 1)
+    if mean <= 1.0:
+        return mean
+    share = 1.0 / np.sqrt(mean) if mean < np.inf else 0.0
+    for c in part:
+        drift[c] = drift[c] * share if share > 0.0 else 0.0
+        drift[width + c] = drift[width + c] * share if share > 0.0 else 0.0
+    for c in range(2 * width, drift.size):
+        drift[c] = drift[c] * share if share > 0.0 else 0.0
+    return 1.0
+
+
+@compiled
+def _flow(linear: Any, g: float, share: float, drift: Any, r: Any, u: Any) -> None:
+    """Multiply by exp(share J / g) = sum of (-D)^k L_k(share), D = J / (g - J), Laguerre polynomials with alpha = -1.
+
+    The last term of the sum makes it vanish for fast decay.
+    """
+    size = drift.size
+    for c in range(size):
+        u[c] = drift[c]
+    r[size] = 0.0
+    before, term, total, sign = 0.0, 1.0, 1.0, 1.0
+    for k in range(1, _TERMS + 1):
+        before, term = term, ((2 * k - 2 - share) * term - (k - 2) * before) / k
+        sign = -sign
+        weight = sign * (term if k < _TERMS else -total)
+        total += term
+        for c in range(size):
+            r[c] = g * u[c]
+        solve(linear, r, u)
+        for c in range(size):
+            u[c] -= r[c] / g
+            drift[c] += weight * u[c]

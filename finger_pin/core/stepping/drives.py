@@ -1,0 +1,107 @@
+"""Loops of motors in position drive, compiled: sampled at their own period while an island advances."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from finger_pin.core.jit import Indices, Kind, Matrix, Unit, Vector, bound_at, call_at, compiled
+from finger_pin.core.model import MODEL
+from finger_pin.core.stepping.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
+
+
+class Drives(NamedTuple):
+    """The loops of m motors, U = V clip(k_p e + k_d e' + k_i int e, -1, 1); arrays that are memory change in place.
+
+    Attributes:
+        motors: Those that count here, of which the rotors are in one island.
+        places: Coordinates of the rotors, shape (m,).
+        channels: Inputs that are their voltages, shape (m,).
+        period: s.
+        goals: theta_m^d at multiples of the period, shape (k, m), rad; the last one is kept.
+        resolution: Step of the measured angles, 0 for none, shape (m,), rad.
+        gains: k_p, k_d, k_i, shape (3, m).
+        supply: V, shape (m,), V.
+        taken: Memory, the number of samples so far, shape (1,).
+        integral: Memory, int e, shape (m,).
+        last: Memory, e of the last sample, shape (m,).
+        voltages: Memory, U from every sample on, shape (k, m), V.
+    """
+
+    motors: Indices
+    places: Indices
+    channels: Indices
+    period: float
+    goals: Matrix
+    resolution: Vector
+    gains: Matrix
+    supply: Vector
+    taken: Indices
+    integral: Vector
+    last: Vector
+    voltages: Matrix
+
+
+class Driven(NamedTuple):
+    """A stretch that is integrated while loops run.
+
+    Attributes:
+        drives: The loops.
+        stretch: Address of the bound `Stretch`.
+        advance: Address of `rosenbrock.advance`.
+    """
+
+    drives: Drives
+    stretch: int
+    advance: int
+
+
+DRIVEN = Kind(Driven)
+
+
+@compiled
+def _sample(drives: Any, x: Any, tension: Any) -> None:
+    """Take a sample of all motors, and set their voltages."""
+    last = drives.goals.shape[0] - 1
+    k = min(drives.taken[0], last)
+    for j in drives.motors:
+        angle, step = x[drives.places[j]], drives.resolution[j]
+        if step > 0.0:
+            angle = np.round(angle / step) * step
+        error = drives.goals[k, j] - angle
+        rate = (error - drives.last[j]) / drives.period if drives.taken[0] > 0 else 0.0
+        drives.last[j] = error
+        summed = drives.integral[j] + error * drives.period
+        duty = drives.gains[0, j] * error + drives.gains[1, j] * rate + drives.gains[2, j] * summed
+        if abs(duty) < 1.0:
+            # The integral stands still while the supply is at its limit.
+            drives.integral[j] = summed
+        voltage = drives.supply[j] * min(max(duty, -1.0), 1.0)
+        # Until the next one is taken, perhaps never.
+        drives.voltages[k, j] = drives.voltages[min(k + 1, last), j] = voltage
+        tension[drives.channels[j]] = voltage
+    drives.taken[0] += 1
+
+
+@Unit
+def advance_driven(address: int, end: float) -> int:
+    """Advance as `rosenbrock.advance` does, and sample at every multiple of the period on the way, both ends included.
+
+    The end and a sample there may differ by rounding.
+    """
+    driven = bound_at(address, DRIVEN)
+    drives, stretch = driven.drives, bound_at(driven.stretch, STRETCH)
+    integration = bound_at(stretch.integration, INTEGRATION)
+    model = bound_at(integration.model, MODEL)
+    memory, times = integration.memory, stretch.times
+    while True:
+        if memory[TIME] * (1.0 + 1e-12) >= drives.taken[0] * drives.period:
+            _sample(drives, integration.x, model.control.tension)
+        if memory[TIME] >= end:
+            return DONE
+        if stretch.taken[0] == times.size and times.size > 0:
+            return FULL
+        status: int = call_at(driven.advance, driven.stretch, min(end, drives.taken[0] * drives.period))
+        if status != DONE:
+            return status

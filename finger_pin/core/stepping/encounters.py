@@ -1,0 +1,141 @@
+"""Touches within a step of any integrator whose interpolants are polynomials: `flights` in Python.
+
+The way of each coordinate is that of its Bernstein coefficients; of a quaternion, twice that over its least length is
+the angle. Only paths are compared with gaps, which costs more looks than the compiled core takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import comb
+
+from finger_pin.core.evaluation.charts import Charts
+from finger_pin.core.stepping.textbook import Meeting
+from finger_pin.core.tables import build_tables
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.mechanism import Mechanism
+
+#: Maps times, shape (m,), to packed states, shape (m, size): a polynomial within a step.
+Interpolant = Callable[[Array], Array]
+# The highest degree of an interpolant, that of LSODA.
+_DEGREE = 12
+_KNOWN, _ROUNDING, _OUT, _TIMES, _HALVINGS, _LEAST = 1e-9, 1e-11, 1e-6, 4.0, 12, 1e-12
+
+
+def meetings(mechanism: Mechanism) -> Meeting | None:
+    """Return what finds the touches of a mechanism's bodies that a step passes over; None without contacts."""
+    return _Meetings(mechanism) if np.any(build_tables(mechanism).touch) else None
+
+
+class _Meetings:
+    """Of every gap, how far it is open at least, kept from step to step."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        tables = build_tables(mechanism)
+        self._mechanism, self._charts, self._paths = mechanism, Charts.of(mechanism), tables.paths
+        self._bodies, self._kinds = len(tables.parents), tables.kinds
+        pieces = list(dict.fromkeys(leg.piece for table in mechanism.rows for legs in table.paths for leg in legs))
+        self._pieces = [(e, piece) for e, piece in enumerate(pieces) if piece.shape.columns > 1]
+        self._clear = np.zeros(len(pieces))
+        self._time = -np.inf
+        nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)
+        powers = np.arange(_DEGREE + 1)
+        basis = comb(_DEGREE, powers) * nodes[:, None] ** powers * (1.0 - nodes[:, None]) ** (_DEGREE - powers)
+        self._nodes, self._to_control = nodes, np.linalg.inv(basis)
+
+    def __call__(self, start: float, end: float, interpolate: Interpolant) -> float | None:
+        """See `Meeting`; a touch that lasts to the end, where bodies still approach, shows there."""
+        if start != self._time:
+            # From another moment than that where the last step ended.
+            self._clear[:] = 0.0
+        first, paths = np.inf, self._ways(start, end, interpolate)
+        ahead = self._clear - paths
+        for e, _ in self._pieces:
+            if not ahead[e] > 0.0:
+                ahead[e], found = self._scan(e, start, end, interpolate)
+                first = min(first, found)
+        if first < end - _LEAST * max(1.0, abs(end)):
+            return first
+        self._clear, self._time = ahead, end
+        return None
+
+    def _ways(self, start: float, end: float, interpolate: Interpolant) -> Array:
+        """Return how far the bodies of each piece may move against each other, shape (E,), m."""
+        paths, charts = self._paths, self._charts
+        packed = self._to_control @ interpolate(start + (end - start) * self._nodes)
+        control = np.zeros((_DEGREE + 1, self._bodies))
+        kept = charts.cores < self._bodies
+        control[:, charts.cores[kept]] = packed[:, charts.plain[kept]]
+        steps = np.diff(control, axis=0)
+        way = np.abs(steps).sum(axis=0)
+        for at, i in zip(charts.quaternions, charts.angles, strict=True):
+            turn = float(np.linalg.norm(np.diff(packed[:, at : at + 4], axis=0), axis=1).sum())
+            least = float(np.linalg.norm(packed[0, at : at + 4])) - turn
+            way[i] = 2.0 * turn / least if least > 0.0 else np.inf
+        against = np.abs(steps[:, paths.at] - np.where(paths.against >= 0, steps[:, paths.against], 0.0)).sum(axis=0)
+        ways = np.where(paths.against >= 0, against, way[paths.at])
+        levers = np.where(ways > 0.0, paths.levers, 0.0)
+        found = np.zeros(len(paths.columns))
+        for e, _ in self._pieces:
+            own = slice(paths.start[e], paths.start[e + 1])
+            found[e] = float(levers[own] @ np.where(levers[own] > 0.0, ways[own], 0.0))
+            carries = (paths.moves[own, 2] > paths.moves[own, 0]) & (self._kinds[paths.at[own]] == 0)
+            turned = float(ways[own][carries].sum()) if np.isinf(paths.extents[e]) else 0.0
+            if turned > 0.0:
+                distance = self._seen(e, interpolate(np.array([start]))[0])[1]
+                found[e] = (found[e] + turned * distance) / (1.0 - turned) if turned < 1.0 else np.inf
+        return found
+
+    def _seen(self, e: int, x: Array) -> tuple[float, float]:
+        """Return a gap at a packed state, and how far the first body's core is from the second's frame, m."""
+        mechanism, piece = self._mechanism, dict(self._pieces)[e]
+        q = np.array(x[: mechanism.body.model.nq])
+        for at in self._charts.quaternions:
+            q[at : at + 4] /= np.linalg.norm(q[at : at + 4])
+        placements, _ = mechanism.body.placements(q)
+        frame = placements[piece.joint] * piece.frame
+        ends = [frame.actInv(placements[end.joint].act(np.asarray(end.point, dtype=float))) for end in piece.ends]
+        middle = float(np.linalg.norm(0.5 * (ends[0] + ends[1])))
+        if middle > piece.reach:
+            return middle - piece.reach, middle + float(self._paths.cores[e])
+        out = np.zeros(16)
+        piece.shape.value(np.concatenate(ends), piece.parameters, out)
+        return float(out[0]), middle + float(self._paths.cores[e])
+
+    def _scan(self, e: int, start: float, end: float, interpolate: Interpolant) -> tuple[float, float]:
+        """Return how far a gap is open at the end, at least, and when bodies met that part again; else infinity."""
+
+        def gap(time: float) -> float:
+            return self._seen(e, interpolate(np.array([time]))[0])[0]
+
+        def clear(one: tuple[float, float], two: tuple[float, float]) -> bool:
+            path = self._ways(one[0], two[0], interpolate)[e]
+            if min(one[1], two[1]) < 0.0:
+                return bool(path < _TIMES * (abs(one[1]) + abs(two[1])) + _OUT)
+            return bool(path < one[1] + two[1] + _ROUNDING)
+
+        one, looks = (start, gap(start)), [(end, gap(end))]
+        last, parted, met, shortest = looks[0][1], one[1] >= 0.0, np.inf, _LEAST * max(1.0, abs(end))
+        if max(one[1], last) < 0.0:
+            return last - _KNOWN, np.inf
+        while looks:
+            two = looks[-1]
+            if two[0] - one[0] > shortest and not clear(one, two):
+                middle = 0.5 * (one[0] + two[0])
+                looks.append((middle, gap(middle)))
+                continue
+            if two[1] >= 0.0:
+                if np.isfinite(met):
+                    return last - _KNOWN, met
+                parted = True
+            elif parted and not np.isfinite(met):
+                early, met = one[0], two[0]
+                for _ in range(_HALVINGS):
+                    middle = 0.5 * (early + met)
+                    early, met = (early, middle) if gap(middle) < 0.0 else (middle, met)
+            one = looks.pop()
+        # What is inside at the end, and still approaches, is felt from there on.
+        felt = last < gap(end - 1e-3 * (end - start))
+        return last - _KNOWN, np.inf if felt else met

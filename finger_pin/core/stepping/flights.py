@@ -1,0 +1,216 @@
+"""Touches within a step that no stage has seen: looked for until there is none, or one is found.
+
+Bodies that are g_0 and g_1 apart at two moments, and touch in between, move against each other by g_0 + g_1 at least. A
+step is halved until the path of every part is shorter than that. Where bodies slide along each other, close and far,
+so is another bound: along a normal that is the same at both moments, a path is off its chord by no more than an eighth
+of its largest second derivative.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.law_code import SIDE
+from finger_pin.core.jit import call_at, compiled
+from finger_pin.core.path_tables import LOOKS
+from finger_pin.core.stepping.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
+from finger_pin.core.tables import END, FIRST, KINK
+
+# Of a step in which all touches have been seen, and of one with a contact that slept meanwhile.
+NOTHING, UNSEEN = 2.0, 1.0
+# To this distances are computed, m; and bodies that part are followed until they are so far out, or have moved by so
+# many times their distance.
+_ROUNDING, _OUT, _TIMES = 1e-13, 1e-6, 4.0
+# The moment of a meeting is found by so many halvings, and is before the end.
+_HALVINGS, _BEFORE = 10, 0.999
+# What is seen at a moment, in this order: the share of the step, the gap, its normal, how far the core of one body is.
+_SHARE, _GAP, _NORMAL, _FAR = 0, 1, 2, 5
+
+
+@compiled
+def _difference(own: Any, j: int, other: int, i: int) -> Any:
+    return own.control[j, i] if other < 0 else own.control[j, i] - own.control[other, i]
+
+
+@compiled
+def _between(start: float, end: float, b: Any) -> Any:
+    """Return the Bernstein coefficients of a part of a polynomial."""
+    b0, b1, b2, b3, b4 = b
+    s, c = end, 1.0 - end
+    for _ in range(2):
+        # What is left of s, then, turned round, what is right of the start.
+        d1, d2, d3, d4 = c * b0 + s * b1, c * b1 + s * b2, c * b2 + s * b3, c * b3 + s * b4
+        e1, e2, e3 = c * d1 + s * d2, c * d2 + s * d3, c * d3 + s * d4
+        f1, f2 = c * e1 + s * e2, c * e2 + s * e3
+        b4, b3, b2, b1, b0 = b0, d1, e1, f1, c * f1 + s * f2
+        s, c = 1.0 - start / end, start / end
+    return b0, b1, b2, b3, b4
+
+
+@compiled
+def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
+    """Return bounds of the path between two moments, and of how far it is off its chord, m."""
+    paths, far = tables.paths, max(one[_FAR], two[_FAR])
+    endless = np.isinf(paths.extents[e])
+    path = turned = moves = bends = turns = swing = curl = 0.0
+    for s in range(paths.start[e], paths.start[e + 1]):
+        j, other, lever = paths.at[s], paths.against[s], paths.levers[s]
+        carries = paths.moves[s, 2] > paths.moves[s, 0] and tables.kinds[j] == 0
+        if lever == 0.0 and not carries:
+            continue
+        whole = (
+            _difference(own, j, other, 0),
+            _difference(own, j, other, 1),
+            _difference(own, j, other, 2),
+            _difference(own, j, other, 3),
+            _difference(own, j, other, 4),
+        )
+        b0, b1, b2, b3, b4 = _between(one[_SHARE], two[_SHARE], whole)
+        d0, d1, d2, d3 = b1 - b0, b2 - b1, b3 - b2, b4 - b3
+        way = abs(d0) + abs(d1) + abs(d2) + abs(d3)
+        most = max(max(abs(d0), abs(d1)), max(abs(d2), abs(d3)))
+        curve = max(max(abs(d1 - d0), abs(d2 - d1)), abs(d3 - d2))
+        path += lever * way
+        moves += lever * most
+        bends += lever * curve
+        if tables.kinds[j] == 0:
+            turns += most
+        if carries:
+            # As the second body sees it, the first turns about it.
+            swing += most
+            curl += curve
+            if endless:
+                turned += way
+    path = widened(path, turned, far)
+    moves, bends = moves + swing * (far + path), bends + curl * (far + path)
+    # The second derivative of a coordinate is at most 12 times the second differences, the first one 4 times the first.
+    return path, 1.5 * bends + 4.0 * turns * moves
+
+
+@compiled
+def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
+    """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
+    path, bend = _bounds(tables, own, e, one, two)
+    if one[_GAP] < 0.0 or two[_GAP] < 0.0:
+        return path < _TIMES * (abs(one[_GAP]) + abs(two[_GAP])) + _OUT
+    if path < one[_GAP] + two[_GAP] + _ROUNDING:
+        return True
+    tilt, size = 0.0, 0.0
+    for i in range(_NORMAL, _NORMAL + 3):
+        tilt += (one[i] - two[i]) * (one[i] - two[i])
+        size += one[i] * two[i]
+    if not size > 0.5:
+        return False
+    # Of the plane across the first normal the second tells, as far as it is the same.
+    slant = np.sqrt(tilt) * (max(one[_FAR], two[_FAR]) + tables.paths.extents[e]) if tilt > 0.0 else 0.0
+    return bend + slant + KNOWN < min(one[_GAP], two[_GAP])
+
+
+@compiled
+def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None:
+    """Note what is seen of a gap at a share of the step."""
+    own, state = model.work.paths, model.state
+    s, c = share, 1.0 - share
+    w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4
+    for j in range(model.tables.parents.size):
+        b = own.control[j]
+        state[j] = w0 * b[0] + w1 * b[1] + w2 * b[2] + w3 * b[3] + w4 * b[4]
+    near = call_at(model.look, integration.model, float(e))
+    seen[_SHARE], seen[_GAP], seen[_FAR] = share, own.out[e, 0], distance(model.tables.paths, e, own)
+    for r in range(3):
+        # Of what is far away the normal is not asked for.
+        seen[_NORMAL + r] = own.out[e, 1 + r] if near else 0.0
+
+
+@compiled
+def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
+    """Return when bodies have just met that are apart at one moment and not at another."""
+    looks = model.work.paths.looks
+    early, late, middle = one[_SHARE], two[_SHARE], looks[LOOKS - 1]
+    for _ in range(_HALVINGS):
+        _look(integration, model, e, 0.5 * (early + late), middle)
+        if middle[_GAP] < 0.0:
+            late = middle[_SHARE]
+        else:
+            early = middle[_SHARE]
+    return min(late, _BEFORE)
+
+
+@compiled
+def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
+    """Return the share of the step where bodies meet that part again before its end; else `NOTHING`.
+
+    Those that are not apart at its end have parted too, unless that is ``seen``.
+    """
+    tables, own = model.tables, model.work.paths
+    looks = own.looks
+    _look(integration, model, e, 1.0, looks[1])
+    _look(integration, model, e, 0.0, looks[0])
+    own.ahead[e] = looks[1, _GAP] - KNOWN
+    parted, met, depth = looks[0, _GAP] >= 0.0, NOTHING, 1
+    while depth > 0:
+        one, two = looks[0], looks[depth]
+        if depth < LOOKS - 2 and not _clear(tables, own, e, one, two):
+            depth += 1
+            _look(integration, model, e, 0.5 * (one[_SHARE] + two[_SHARE]), looks[depth])
+            continue
+        if two[_GAP] >= 0.0:
+            if met < NOTHING:
+                return met
+            parted = True
+        elif parted and met == NOTHING:
+            met = _meeting(integration, model, e, one, two)
+        for i in range(looks.shape[1]):
+            one[i] = two[i]
+        depth -= 1
+    return NOTHING if seen else met
+
+
+@compiled
+def _pressed(tables: Any, rows: Any, k: int) -> bool:
+    """Return whether a contact presses, or would if it were not held open."""
+    pressed = False
+    for g in range(tables.groups.shape[0]):
+        if tables.groups[g, FIRST] <= k < tables.groups[g, END]:
+            pressed = rows[tables.groups[g, KINK], k] > 0.0
+    return pressed
+
+
+@compiled
+def survey(integration: Any, model: Any) -> float:
+    """Return the share of a step that was tried after which bodies touch, and part before its end; `NOTHING` for none.
+
+    It is `UNSEEN` if a contact slept that is closed at the end, or may be: it is awake now.
+    """
+    tables, own, rows, state = model.tables, model.work.paths, model.work.rows, model.state
+    paths, size, first = tables.paths, tables.parents.size, NOTHING
+    trace(integration.tableau, integration.k, integration.x, state, size, own)
+    for e in range(paths.columns.size):
+        if paths.columns[e] == 1:
+            continue
+        k, path = paths.row[e], path_of(tables, e, own)
+        own.path[e] = path
+        if own.asleep[k]:
+            own.ahead[e] = own.clear[e] - path
+            if own.ahead[e] > 0.0:
+                continue
+            share = _scan(integration, model, e, True)
+            if share < NOTHING or own.ahead[e] < 0.0:
+                set_asleep(k, 0, own.asleep)
+                share = min(share, UNSEEN)
+        else:
+            start, end = own.clear[e], own.out[e, 0]
+            own.ahead[e] = end - KNOWN - path
+            if min(start, end) >= 0.0 and path < start + end:
+                continue
+            if max(start, end) < 0.0 and rows[SIDE, k] > 0.0:
+                continue
+            ahead = own.ahead[e]
+            share = _scan(integration, model, e, _pressed(tables, rows, k))
+            own.ahead[e] = ahead
+        first = min(first, share)
+    for j in range(size):
+        state[j] = own.control[j, 4]
+    return first

@@ -1,0 +1,160 @@
+"""From a stepper to a trajectory that can be evaluated anywhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+
+from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.island_motion import IslandMotion
+from finger_pin.core.stepping.island_stepper import Part, Record, failure
+from finger_pin.core.stepping.stepper import Stepper, in_threads
+from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
+from finger_pin.description.routing import Array
+
+# The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
+_MOST_BYTES = 2e9
+
+# Slices of a simulation of several islands, between which it can be watched.
+_SLICES = 200
+
+
+class Held(Protocol):
+    """A controller that sets tensions at instants of its own and holds them in between."""
+
+    @property
+    def instant(self) -> float:
+        """The next time at which it is to act, s; later after every act."""
+
+    def act(self, x: Array) -> Array:
+        """Return the tensions from this instant on, shape (a,), at the packed state."""
+
+
+class _Recorder:
+    """Carries one island forward and keeps its steps."""
+
+    def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
+        self._stepper, self._index = stepper, index
+        part = self.part
+        self.start = (part.time, part.x.copy(), part.attitude.copy())
+        self.kept = [part.room(0)]
+        self.room = part.room(chunk)
+        self.taken = 0
+        self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
+
+    def advance(self, end: float, chunks: int = -1) -> int:
+        """Go to a time, or until some chunks are full; return the status."""
+        part = self.part
+        while chunks != 0:
+            status, steps = part.advance(end, self.room)
+            self.kept.append(self.room.first(steps))
+            self.taken += steps
+            chunks -= 1
+            if status != core.FULL or self.taken >= self.most:
+                return status
+        return core.DONE
+
+    @property
+    def part(self) -> Part:
+        """The island; a stepper that is loaded on the way replaces it."""
+        return self._stepper.parts[self._index]
+
+    @property
+    def full(self) -> bool:
+        """Whether no more steps can be kept."""
+        return self.taken >= self.most
+
+    def steps(self) -> IslandMotion:
+        """Return the steps that were taken."""
+        joined = {name: np.concatenate([getattr(record, name) for record in self.kept]) for name in vars(self.kept[0])}
+        return IslandMotion(self._stepper.mechanism, self.part, *self.start, Record(**joined))
+
+
+def integrate_compiled(
+    stepper: Stepper,
+    duration: float,
+    names: tuple[str, ...],
+    *,
+    held: Held | None = None,
+    knots: Array | None = None,
+    watch: Watch | None = None,
+    chunk: int = 256,
+    together: bool = False,
+    stop: Stop | None = None,
+) -> Trajectory:
+    """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
+
+    Args:
+        stepper: Where to start, with which method and tolerances.
+        duration: Time of the end, s.
+        names: Names of the numbers of the state, for messages.
+        held: A controller that holds its tensions in between.
+        knots: Times at which an input bends or jumps, in order, s: steps end there.
+        watch: Called with the simulated time that all have reached and the state after every chunk of steps.
+        chunk: Most steps between two calls.
+        together: Whether islands stop at the same times to be watched, which cuts some of their steps; otherwise a
+            state that is watched has each where it has got to.
+        stop: Asked now and then; true ends the integration there.
+    """
+    if knots is not None:
+        stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
+    # Advancing by nothing compiles, which is no part of an integration's cost.
+    stepper.advance(stepper.time)
+    began = time.perf_counter()
+    recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
+    alone = len(recorders) == 1
+    reason, interrupted = "", False
+    while stepper.time < duration and not reason and not interrupted:
+        end = duration
+        if held is not None:
+            if stepper.time >= held.instant:
+                stepper.hold(held.act(stepper.x))
+            end = min(end, held.instant)
+        elif not alone and together:
+            end = min(end, stepper.time + duration / _SLICES)
+        chunks = -1 if together and not alone else 1
+        statuses = in_threads(partial(_Recorder.advance, end=end, chunks=chunks), recorders)
+        for recorder, status in zip(recorders, statuses, strict=True):
+            places = stepper.places(recorder.part.island)
+            reason = reason or failure(recorder.part, status, [names[at] for at in places])
+            if not reason and recorder.full and recorder.part.time < duration:
+                reason = f"after {recorder.taken} steps the trajectory has reached the most that is kept in memory"
+        if watch is not None:
+            watch(stepper.time, stepper.x)
+        interrupted = stop is not None and not reason and stepper.time < duration and stop()
+    steps = [recorder.steps() for recorder in recorders]
+    memories = [recorder.part.memory for recorder in recorders]
+    ends = np.unique(np.concatenate([each.times for each in steps]))
+    return Trajectory(
+        breakpoints=ends[ends <= stepper.time],
+        interpolate=_states(stepper, steps),
+        statistics=Statistics(
+            steps=sum(recorder.taken for recorder in recorders),
+            evaluations=int(sum(memory[core.EVALUATIONS] for memory in memories)),
+            jacobians=int(sum(memory[core.JACOBIANS] for memory in memories)),
+            factorisations=int(sum(memory[core.FACTORISATIONS] for memory in memories)),
+            wall_time=time.perf_counter() - began,
+        ),
+        failure=reason,
+        interrupted=interrupted,
+        # Of a controller that acts in between, the linearised flow knows nothing.
+        estimated_error=np.nan if held is not None or stepper.driven else stepper.estimated_error,
+        # Inputs that are held in between are not the core's own.
+        islands=() if held is not None or stepper.driven or stepper.held else tuple(steps),
+    )
+
+
+def _states(stepper: Stepper, steps: list[IslandMotion]) -> Callable[[Array], Array]:
+    """Return what maps times to packed states, from the steps of all islands."""
+
+    def interpolate(at: Array) -> Array:
+        found = [each.interpolate(at) for each in steps]
+        if len(steps) == 1 and not len(steps[0].attitude):
+            return found[0][0]
+        return stepper.joined([state for state, _ in found], [attitude for _, attitude in found])
+
+    return interpolate

@@ -1,0 +1,267 @@
+"""One island under way: bound to compiled code, with the memory that a continued integration needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.control import Control
+from finger_pin.core.evaluation.charts import place_all
+from finger_pin.core.evaluation.rigid_body import PRISMATIC
+from finger_pin.core.jit import Unit, bound
+from finger_pin.core.model import BoundModel
+from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
+from finger_pin.core.stepping.islands import Island
+from finger_pin.core.stepping.knots import KNOTTED, Knotted, advance_knotted
+from finger_pin.core.stepping.tableaus import Tableau
+from finger_pin.core.tables import Tables
+from finger_pin.core.work import build_work
+from finger_pin.description.routing import Array
+from finger_pin.laws.law import ContactLaw, Law
+
+FIRST_STEP = 1e-6
+# A tolerance that every step keeps, and a step that every end cuts.
+_ANY = 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Room for the steps of one island, at most m.
+
+    Attributes:
+        times: Ends of the steps, shape (m,), s.
+        states: States there, before the angles of free bodies begin anew, shape (m, size).
+        attitudes: Quaternions after that, shape (m, f, 4).
+        dense: What the steps' interpolants are made of, shape (m, rows, size).
+    """
+
+    times: Array
+    states: Array
+    attitudes: Array
+    dense: Array
+
+    @classmethod
+    def of(cls, count: int, size: int, free: int, rows: int) -> Record:
+        """Make room."""
+        return cls(np.zeros(count), np.zeros((count, size)), np.zeros((count, free, 4)), np.zeros((count, rows, size)))
+
+    def first(self, count: int) -> Record:
+        """Return a copy of the first steps."""
+        return Record(*(part[:count].copy() for part in vars(self).values()))
+
+
+class Part:
+    """One island under way.
+
+    Attributes:
+        island: What it has of the whole.
+        laws: Of its groups of rows.
+        tables: Its tables.
+        control: Its inputs.
+        tableau: The method.
+        x: Its packed state, shape (size,); the angles of free bodies since the last step.
+        attitude: Quaternions of its free bodies, shape (f, 4).
+        atol: Absolute tolerances, shape (size,).
+        memory: Time, step size, error history and counters.
+        joints: Coordinates whose error is estimated; none of what is moved along paths.
+        objects: Those of free objects, likewise.
+        drives: Loops of motors in position drive, which sample on the way; None for none.
+        knots: Times at which steps end, s, positive, in order.
+    """
+
+    drives: Drives | None = None
+    knots: Array = np.zeros(0)
+
+    def __init__(
+        self,
+        island: Island,
+        laws: Sequence[Law | ContactLaw],
+        tables: Tables,
+        control: Control,
+        x: Array,
+        attitude: Array,
+        tableau: Tableau,
+        rtol: float,
+        atol: Array,
+        memory: Array,
+    ) -> None:
+        """Bind everything; arrays are taken as they are, not copied."""
+        self.island, self.laws = island, laws
+        # The block holds addresses: what it was made of lives as long as it does, and is not replaced.
+        self.work = build_work(tables, laws, len(control.tension))
+        self.model = BoundModel(tables, control, self.work)
+        of_objects, led = object_coordinates(tables), tables.guided[: len(tables.parents)] < 0
+        self._bound = core.Integration(
+            model=self.model.address,
+            tableau=tableau,
+            x=x,
+            attitude=attitude,
+            rtol=rtol,
+            atol=atol,
+            memory=memory,
+            k=np.zeros((len(tableau.nodes), len(x))),
+            start=np.zeros(len(x)),
+            r=np.zeros(len(x) + 1),
+            drift=np.zeros(len(x)),
+            kinks=np.zeros(len(tables.state)),
+            joints=np.flatnonzero(~of_objects & led),
+            objects=np.flatnonzero(of_objects & led),
+        )
+        self._block = bound(self._bound, core.INTEGRATION)
+        self.joints, self.objects = self._bound.joints, self._bound.objects
+        place_all(tables, attitude)
+        self.tables, self.control, self.tableau = tables, control, tableau
+        self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
+        self._nothing, self._taken = self.room(0), np.zeros(1, dtype=np.int64)
+        # What compiled code was given last: a record, loops and knots; and the blocks that hold them, what they are
+        # for last.
+        self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
+        self._blocks: list[NDArray[np.uint8]] = []
+        self._at = 0
+        self._advance = core.advance
+
+    def room(self, count: int) -> Record:
+        """Return room for so many steps."""
+        return Record.of(count, len(self.x), len(self.attitude), len(self.tableau.dense))
+
+    @property
+    def time(self) -> float:
+        """Time reached, s."""
+        return float(self.memory[core.TIME])
+
+    def advance(self, end: float, record: Record | None = None) -> tuple[int, int]:
+        """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
+        block, unit = self.ready(record)
+        return unit(block, end), int(self._taken[0])
+
+    def ready(self, record: Record | None = None) -> tuple[int, Unit]:
+        """Return the address of what compiled code is to advance, and the unit that does; into a record if given."""
+        self._taken[0] = 0
+        self._place(self._nothing if record is None else record)
+        return self._at, self._advance
+
+    def _place(self, record: Record) -> None:
+        """Put a record where compiled code finds it, with the loops of motors if any run, and the knots if any."""
+        placed = record, self.drives, self.knots
+        if all(one is other for one, other in zip(self._placed, placed, strict=True)):
+            return
+        room = (record.times, record.states, record.attitudes, record.dense)
+        stretch = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
+        self._placed, self._blocks, self._advance = placed, [stretch], core.advance
+        if self.drives is not None:
+            driven = Driven(self.drives, stretch.ctypes.data, self._advance.address)
+            self._blocks.append(bound(driven, DRIVEN))
+            self._advance = advance_driven
+        if len(self.knots):
+            passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].ctypes.data
+            knotted = Knotted(self.knots, passed, stretch.ctypes.data, self._advance.address, given)
+            self._blocks += [passed.view(np.uint8), bound(knotted, KNOTTED)]
+            self._advance = advance_knotted
+        self._at = int(self._blocks[-1].ctypes.data)
+
+    def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
+        """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
+        self.x[:], self.attitude[:] = x, attitude
+        self.work.paths.asleep[:] = 0
+        place_all(self.tables, self.attitude)
+        self.memory[[core.LAST_STEP, core.LAST_ERROR, core.CULPRIT, core.HELD_STEP]] = 0.0
+        self.memory[core.STEP] = FIRST_STEP
+        if time is not None:
+            # Steps are counted from here on, for those that creep.
+            self.memory[[core.TIME, core.WINDOW_START, core.WINDOW_END]] = time, 0.0, 0.0
+
+    def with_loads(self, loaded: bool) -> Part:
+        """Return the same part that minds forces at the tips, or not."""
+        bound = self._bound
+        return Part(
+            self.island,
+            self.laws,
+            self.tables._replace(loaded=loaded),
+            self.control,
+            bound.x,
+            bound.attitude,
+            bound.tableau,
+            bound.rtol,
+            bound.atol,
+            bound.memory,
+        )
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled by its attributes, many of which are addresses.
+
+        Raises:
+            TypeError: Always.
+        """
+        raise TypeError("an island under way holds addresses: its stepper is copied, and binds another")
+
+    @property
+    def moment(self) -> tuple[Array, ...]:
+        """All that steps have changed and later ones depend on; arrays of its own, which may be filled."""
+        return self.x, self.attitude, self.memory, self.control.tension, self.tables.tip_force, self.tables.bodies
+
+    def repeating(self, ends: Array) -> Part:
+        """Return the same part that takes steps with these ends, s, whatever their errors are."""
+        bound = self._bound
+        twin = Part(
+            self.island,
+            self.laws,
+            self.tables,
+            self.control,
+            bound.x,
+            bound.attitude,
+            bound.tableau,
+            _ANY,
+            np.full_like(bound.atol, _ANY),
+            bound.memory,
+        )
+        twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
+        return twin
+
+    def copy(self) -> Part:
+        """Return an independent part that goes on bit by bit alike."""
+        bound = self._bound
+        tables = self.tables._replace(tip_force=self.tables.tip_force.copy(), bodies=self.tables.bodies.copy())
+        return Part(
+            self.island,
+            self.laws,
+            tables,
+            self.control._replace(tension=self.control.tension.copy()),
+            bound.x.copy(),
+            bound.attitude.copy(),
+            bound.tableau,
+            bound.rtol,
+            bound.atol,
+            bound.memory.copy(),
+        )
+
+
+def object_coordinates(tables: Tables) -> NDArray[np.bool_]:
+    """Return which coordinates of the bodies are those of free objects: three that slide, and three that turn."""
+    found = np.zeros(len(tables.parents), dtype=bool)
+    for first in tables.charts:
+        found[first : first + 3] = True
+        if first >= 3 and np.all(tables.kinds[first - 3 : first] == PRISMATIC):
+            found[first - 3 : first] = True
+    return found
+
+
+def failure(part: Part, status: int, names: list[str]) -> str:
+    """Say what the status of an island means; empty if nothing failed."""
+    culprit = names[max(int(part.memory[core.CULPRIT]), 0)]
+    if status == core.UNDERFLOW:
+        return f"the step size fell below the resolution of time; the error is largest in {culprit}"
+    if status == core.CREEPING:
+        return (
+            f"the last {core.WINDOW} steps advanced by less than {core.LEAST_MEAN_STEP:g} s each; "
+            f"the error is largest in {culprit}"
+        )
+    if status == core.NOT_FINITE:
+        return f"the rate of {culprit} is not finite"
+    if status == core.RUNAWAY:
+        return f"{culprit} is beyond {core.FASTEST:g} rad/s (or m/s): the motion has left every physical range"
+    return ""

@@ -1,0 +1,265 @@
+"""A state that the compiled integrator carries forward, island by island; what a continued integration needs."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.control import HELD, Control
+from finger_pin.core.evaluation.charts import Charts
+from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.drives import Drives
+from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
+from finger_pin.core.stepping.islands import Island, find_islands, select, select_control
+from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
+from finger_pin.core.tables import Tables, build_tables
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.mechanism import Mechanism
+
+#: Of every island: whether it minds forces at tips, its loops of motors, its knots, and arrays that steps change.
+Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
+
+TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
+
+_Item = TypeVar("_Item")
+_Found = TypeVar("_Found")
+
+
+class Stepper:
+    """A mechanism under way.
+
+    Attributes:
+        mechanism: The mechanism.
+        parts: Its islands.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        control: Control,
+        x: Array,
+        tableau: Tableau,
+        rtol: float,
+        atol: Array,
+        force: Array | None = None,
+        time: float = 0.0,
+    ) -> None:
+        """Start from a state.
+
+        Args:
+            mechanism: The mechanism.
+            control: Its inputs.
+            x: Packed state, shape (mechanism.size,).
+            tableau: The method.
+            rtol: Relative tolerance.
+            atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
+            force: At the tips, shape (3,) or (t, 3), N, base frame.
+            time: When, s.
+        """
+        self.mechanism, self._charts = mechanism, Charts.of(mechanism)
+        self._made_of = (mechanism, control, x, tableau, rtol, atol, force, time)
+        tables = build_tables(mechanism)
+        tables.tip_force[:] = 0.0 if force is None else force
+        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
+        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
+        laws = [table.law for table in mechanism.rows]
+        self._width = mechanism.coordinates
+        islands = find_islands(tables, control)
+        self.parts: list[Part] = []
+        for island in islands:
+            whole = len(islands) == 1
+            own = tables if whole else select(tables, island)
+            inputs = control if whole else select_control(control, island)
+            # An island that nothing pushes computes as it does alone.
+            own = own._replace(loaded=bool(len(inputs.force.harmonics) or np.any(own.tip_force)))
+            memory = np.zeros(core.MEMORY_SIZE)
+            memory[[core.TIME, core.STEP]] = time, FIRST_STEP
+            at = self._places(island)
+            free = np.isin(tables.charts, island.coordinates)
+            self.parts.append(
+                Part(
+                    island,
+                    laws if whole else [laws[g] for g in _groups_of(tables, island)],
+                    own,
+                    inputs,
+                    start[at].copy(),
+                    attitude[free].copy(),
+                    tableau,
+                    float(rtol),
+                    tolerances[at].copy(),
+                    memory,
+                )
+            )
+        self._free = [np.isin(tables.charts, island.coordinates) for island in islands]
+
+    def _places(self, island: Island) -> NDArray[np.int64]:
+        """Return where the numbers of an island stand in the state of the whole."""
+        return np.concatenate([island.coordinates, self._width + island.coordinates, 2 * self._width + island.states])
+
+    def places(self, island: Island) -> NDArray[np.int64]:
+        """Return where the numbers of an island stand in a packed state."""
+        return self._charts.packed_places(self._places(island))
+
+    @property
+    def driven(self) -> bool:
+        """Whether loops of motors run."""
+        return any(part.drives is not None for part in self.parts)
+
+    @property
+    def held(self) -> bool:
+        """Whether inputs are held."""
+        return any(part.control.kind == HELD for part in self.parts)
+
+    @property
+    def estimated_error(self) -> float:
+        """Estimate of the error of the joints' angles so far, root mean square over joints and time, rad.
+
+        It is that of free objects, of their turns and places, rad and m, where that is larger. The local errors are
+        carried along the linearised flow. It is seldom below a third of the error, and often far above it.
+        """
+        joints = [(len(part.joints), part.memory[core.DRIFT]) for part in self.parts]
+        objects = [(len(part.objects), part.memory[core.OBJECT_DRIFT]) for part in self.parts]
+        means = [sum(n * drift for n, drift in each) / max(sum(n for n, _ in each), 1) for each in (joints, objects)]
+        return float(np.sqrt(max(means) / self.time)) if self.time > 0.0 else 0.0
+
+    @property
+    def time(self) -> float:
+        """Time that all have reached, s."""
+        return min(part.time for part in self.parts)
+
+    @property
+    def x(self) -> Array:
+        """The packed state, shape (mechanism.size,); a copy."""
+        if len(self.parts) == 1 and not len(self.parts[0].attitude):
+            return self.parts[0].x.copy()
+        return self.joined([part.x for part in self.parts], [part.attitude for part in self.parts])
+
+    def joined(self, states: list[Array], attitudes: list[Array]) -> Array:
+        """Return packed states of the whole from those of the islands, shapes (..., size) and (..., f, 4)."""
+        lead = states[0].shape[:-1]
+        whole = np.zeros((*lead, 2 * self._width + self.mechanism.state_count))
+        attitude = np.zeros((*lead, len(self._free[0]), 4))
+        for part, state, own, free in zip(self.parts, states, attitudes, self._free, strict=True):
+            whole[..., self._places(part.island)] = state
+            attitude[..., free, :] = own
+        return self._charts.to_packed(whole, attitude)
+
+    def restart(self, x: Array, time: float | None = None) -> None:
+        """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
+        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
+        for part, free in zip(self.parts, self._free, strict=True):
+            part.restart(start[self._places(part.island)], attitude[free], time)
+
+    def drive(self, drives: Drives) -> None:
+        """Let loops of motors run from now on, in every island those of its rotors; what they do they share."""
+        for part in self.parts:
+            motors = np.flatnonzero(np.isin(drives.places, part.island.coordinates))
+            if len(motors):
+                part.drives = drives._replace(
+                    motors=motors,
+                    places=np.searchsorted(part.island.coordinates, drives.places),
+                    channels=np.searchsorted(part.island.channels, drives.channels),
+                    taken=np.zeros(1, dtype=np.int64),
+                )
+
+    def end_steps_at(self, knots: Array) -> None:
+        """Let steps end at times from now on, s, positive, in order: inputs bend or jump there."""
+        for part in self.parts:
+            part.knots = np.array(knots, dtype=float)
+
+    def repeat(self, ends: Sequence[Array]) -> None:
+        """Take steps with given ends from now on, s, for each island, whatever their errors."""
+        for index, (part, own) in enumerate(zip(self.parts, ends, strict=True)):
+            self.parts[index] = part.repeating(own[own > part.time])
+
+    def hold(self, inputs: Array) -> None:
+        """Hold inputs from now on, shape (channels,); but voltages are those of loops that run."""
+        for part in self.parts:
+            held, running = inputs[part.island.channels], part.drives
+            if running is not None:
+                driven = running.channels[running.motors]
+                held[driven] = part.control.tension[driven]
+            part.control.tension[:] = held
+
+    def load(self, force: Array) -> None:
+        """Set the forces at the tips, shape (3,) or (t, 3), N, base frame."""
+        forces = np.broadcast_to(force, (len(self.mechanism.body.tips), 3))
+        for index, part in enumerate(self.parts):
+            part.tables.tip_force[:] = forces[part.island.tips]
+            if np.any(part.tables.tip_force) and not part.tables.loaded:
+                self.parts[index] = part.with_loads(True)
+
+    def advance(self, end: float) -> int:
+        """Integrate to a time; return the status of the first island that failed, else DONE."""
+        if len(self.parts) == 1:
+            return self.parts[0].advance(end)[0]
+        return max(in_threads(lambda part: part.advance(end)[0], self.parts))
+
+    def copy(self) -> Stepper:
+        """Return an independent stepper that goes on bit by bit alike."""
+        twin = object.__new__(Stepper)
+        twin.__dict__ |= self.__dict__
+        twin.parts = [part.copy() for part in self.parts]
+        return twin
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds islands of its own."""
+        return Stepper, self._made_of, self.moments
+
+    def __setstate__(self, state: Moments) -> None:
+        """Go on from where another one stood that was made alike."""
+        self.resume(state)
+
+    @property
+    def moments(self) -> Moments:
+        """Where it stands: all that steps change and later ones depend on; a copy."""
+        return [
+            (part.tables.loaded, part.drives, part.knots, tuple(each.copy() for each in part.moment))
+            for part in self.parts
+        ]
+
+    def resume(self, moments: Moments) -> None:
+        """Go on from where it, or one that was made alike, once stood."""
+        for index, (loaded, drives, knots, moment) in enumerate(moments):
+            if loaded != self.parts[index].tables.loaded:
+                self.parts[index] = self.parts[index].with_loads(loaded)
+            part = self.parts[index]
+            part.drives, part.knots = drives, knots
+            part.work.paths.asleep[:] = 0
+            for own, other in zip(part.moment, moment, strict=True):
+                own[...] = other
+
+    def failure(self, status: int, names: tuple[str, ...]) -> str:
+        """Say what a status means, with a name for every number of the state; empty if nothing failed."""
+        part = min(self.parts, key=lambda each: each.time)
+        return failure(part, status, [names[at] for at in self.places(part.island)])
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    # Only Linux binds processes to cores.
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
+    """Do a task that holds no lock of Python for all items side by side; return what it returns in their order.
+
+    Only what the main thread does is spread: who runs many at once has no core to spare.
+    """
+    workers = min(len(items), usable_cores())
+    if workers < 2 or threading.current_thread() is not threading.main_thread():
+        return [task(item) for item in items]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(task, items))
+
+
+def _groups_of(tables: Tables, island: Island) -> list[int]:
+    return [
+        g for g, (begin, end) in enumerate(tables.groups[:, :2]) if np.any((island.rows >= begin) & (island.rows < end))
+    ]

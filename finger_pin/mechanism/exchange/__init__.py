@@ -1,0 +1,1 @@
+"""Models of other programs: URDF, MJCF, MuJoCo and Pinocchio, read and written."""

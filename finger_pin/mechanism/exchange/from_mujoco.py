@@ -1,0 +1,297 @@
+"""A MuJoCo model as a description: bodies, joints, tendons, couplings and actuators; what else it has is listed.
+
+MuJoCo resolves defaults, classes and includes; what is read here is its compiled model (`mujoco.MjModel`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger_pin.description.meshes import Mesh
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import MOST_ANGLE, validate
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.exchange.mujoco_flags import obeyed
+from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
+from finger_pin.mechanism.exchange.mujoco_overlay import lay_tendons
+from finger_pin.mechanism.exchange.mujoco_rest import Rest
+from finger_pin.mechanism.exchange.mujoco_shapes import Shapes
+from finger_pin.mechanism.exchange.mujoco_tendons import STOP, TendonReader
+from finger_pin.mechanism.routes import rotation
+
+# Stiffness with which the range of a joint stops it where it slides, N/m.
+_STOP_SLIDING = 1e4
+_LEAST_FRICTION = 1e-7
+# Time constant with which a coupled joint follows, critically damped, s.
+_COUPLED = 0.005
+# Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
+_HIDDEN = 3
+
+
+def from_mujoco(
+    model: Any, name: str = "hand", *, tendons: Mapping[str, Mapping[str, Any]] | str | Path | None = None
+) -> FingerDescription:
+    """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
+
+    Motors that can only pull a tendon through space become tendons of the hand, with friction along their path and
+    slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons and joints,
+    which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the model's. Ranges
+    are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of (9). What is
+    not carried over stands in ``tree.left_out``.
+
+    Args:
+        model: A `mujoco.MjModel`, or the path of an XML file.
+        name: Of the hand.
+        tendons: Tendons to lay over a model that has none, or not all; see `lay_tendons`. The model has to be a file
+            then, or a `mujoco.MjSpec`.
+
+    Raises:
+        InputError: If it is neither, MuJoCo refuses the file, or it has muscles, ball joints or nothing that drives it.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("model", "needs MuJoCo: pip install 'finger-pin[mujoco]'") from None
+    if isinstance(model, str | Path | mujoco.MjSpec):
+        try:
+            spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))
+            if tendons is not None:
+                lay_tendons(spec, tendons)
+            model = spec.compile()
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"model {model}", " ".join(str(error).split())) from None
+    elif tendons is not None:
+        raise InputError("model", "must be a file or a mujoco.MjSpec to lay tendons over it", type(model).__name__)
+    if not isinstance(model, mujoco.MjModel):
+        raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
+    return validate(FingerDescription, _Reader(mujoco, model).table(name), ("finger",))
+
+
+class _Reader:
+    """Reads a model, element by element."""
+
+    def __init__(self, mujoco: Any, model: Any) -> None:
+        self.mujoco, self.model = mujoco, obeyed(mujoco, model)
+        model = self.model
+        self.rest = Rest(mujoco, model)
+        self.names = Names.of(model)
+        self.shapes = Shapes(mujoco, model, self.names, self.rest)
+        kinds = mujoco.mjtJoint
+        for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
+            raise InputError(
+                f"joint {self.names.joints[i]}", "is a ball joint; joints have to turn or slide about one axis"
+            )
+        self.affine = self.rest.affine_actuators()
+        self.pulling = [i for i in self.affine if self._pulls(i)]
+        self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
+
+    def table(self, name: str) -> Table:
+        """Return the description as a table."""
+        model, flags = self.model, self.mujoco.mjtDisableBit
+        if not self.kept_joints:
+            raise InputError("model", "has no joints that turn or slide")
+        weightless = model.opt.disableflags & int(flags.mjDSBL_GRAVITY)
+        dofs = model.jnt_dofadr[self.kept_joints]
+        sliding = model.jnt_type[self.kept_joints] == self.mujoco.mjtJoint.mjJNT_SLIDE
+        reader = TendonReader(self.mujoco, model, self.names, self.rest)
+        tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
+        bodies = self._bodies()
+        return {
+            "name": entry_name(name),
+            "gravity": [0.0, 0.0, 0.0] if weightless else model.opt.gravity.tolist(),
+            "joints": {self.names.joints[i]: self._joint(i) for i in self.kept_joints},
+            "tendons": self._pulled(),
+            "joint_friction": {
+                "viscous": 0.0,
+                "floor": np.maximum(model.dof_frictionloss[dofs], _LEAST_FRICTION).tolist(),
+            },
+            "stroke_limiter": {"stiffness": np.where(sliding, _STOP_SLIDING, STOP).tolist()},
+            "tree": {
+                "bodies": {self.names.bodies[i]: self._body(i) for i in bodies},
+                "joints": {self.names.joints[i]: self._moving(i) for i in self.kept_joints},
+                "tendons": tendons,
+                "couplings": self._couplings(),
+                "actuators": self._actuators(),
+                "tip": self._tip(),
+                "touching": self.shapes.pairs(bodies),
+                "meshes": self._meshes(bodies),
+                "left_out": self.rest.listed(),
+            },
+        }
+
+    def _bodies(self) -> list[int]:
+        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+        model, types = self.model, self.mujoco.mjtWrap
+        sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE]
+        wraps = model.wrap_objid[(model.wrap_type == types.mjWRAP_SPHERE) | (model.wrap_type == types.mjWRAP_CYLINDER)]
+        needed = {int(each) for each in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
+        needed |= {self._tip_body()[0]}
+        moved: set[int] = set()
+        for i in range(1, model.nbody):
+            own = any(model.jnt_bodyid[j] == i for j in self.kept_joints)
+            if own or int(model.body_parentid[i]) in moved:
+                moved.add(i)
+        needed |= moved
+        for i in range(model.nbody - 1, 0, -1):
+            if i in needed:
+                needed.add(int(model.body_parentid[i]))
+        return sorted(needed - {0})
+
+    def _body(self, i: int) -> Table:
+        model = self.model
+        turned = rotation(quaternion(model.body_iquat[i]))
+        moments = turned @ np.diag(model.body_inertia[i]) @ turned.T
+        return {
+            **self.names.carrier(int(model.body_parentid[i]), "parent"),
+            "position": model.body_pos[i].tolist(),
+            "orientation": quaternion(model.body_quat[i]),
+            "mass": float(model.body_mass[i]),
+            "centre": model.body_ipos[i].tolist(),
+            "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "solids": self._solids(i),
+            "shapes": self.shapes.of_body(i),
+        }
+
+    def _solids(self, body: int) -> Table:
+        """Return what MuJoCo's viewer shows of a body, where it hides all, all; meshes only of what moves."""
+        model, kinds, found = self.model, self.mujoco.mjtGeom, {}
+        own = np.flatnonzero(model.geom_bodyid == body)
+        shown = own[model.geom_group[own] < _HIDDEN]
+        for i in shown if len(shown) else own:
+            kind, size = model.geom_type[i], model.geom_size[i]
+            place = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
+            radius, length = float(size[0]), 2.0 * float(size[1])
+            if kind == kinds.mjGEOM_SPHERE:
+                found[self.names.geoms[i]] = {"kind": "sphere", "radius": radius, **place}
+            elif kind == kinds.mjGEOM_CAPSULE or kind == kinds.mjGEOM_CYLINDER:
+                name = "capsule" if kind == kinds.mjGEOM_CAPSULE else "cylinder"
+                found[self.names.geoms[i]] = {"kind": name, "radius": radius, "length": length, **place}
+            elif kind == kinds.mjGEOM_BOX or kind == kinds.mjGEOM_ELLIPSOID:
+                found[self.names.geoms[i]] = {"kind": "box", "sides": (2.0 * size).tolist(), **place}
+            elif kind == kinds.mjGEOM_MESH and model.body_weldid[body]:
+                # A forearm that stands still would be in the way.
+                name = self.names.meshes[model.geom_dataid[i]]
+                found[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **place}
+        return found
+
+    def _meshes(self, bodies: list[int]) -> Table:
+        """Return the meshes that the solids of bodies are made of."""
+        model, names = self.model, self.names.meshes
+        used = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
+        found = {}
+        for i in range(model.nmesh):
+            points = slice(model.mesh_vertadr[i], model.mesh_vertadr[i] + model.mesh_vertnum[i])
+            faces = slice(model.mesh_faceadr[i], model.mesh_faceadr[i] + model.mesh_facenum[i])
+            if names[i] in used:
+                found[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
+        return found
+
+    def _joint(self, i: int) -> Table:
+        model, dof = self.model, int(self.model.jnt_dofadr[i])
+        spring = {
+            "stiffness": float(model.jnt_stiffness[i]),
+            "rest": float(model.qpos_spring[model.jnt_qposadr[i]]),
+            "damping": float(model.dof_damping[dof]),
+        }
+        limited = bool(model.jnt_limited[i])
+        return {
+            "range": model.jnt_range[i].tolist() if limited else [-MOST_ANGLE, MOST_ANGLE],
+            **({"spring": spring} if spring["stiffness"] or spring["damping"] else {}),
+        }
+
+    def _moving(self, i: int) -> Table:
+        model = self.model
+        hinge = model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
+        return {
+            "body": self.names.bodies[model.jnt_bodyid[i]],
+            "kind": "hinge" if hinge else "slide",
+            "axis": model.jnt_axis[i].tolist(),
+            "anchor": model.jnt_pos[i].tolist(),
+            "reference": float(model.qpos0[model.jnt_qposadr[i]]),
+            "armature": float(model.dof_armature[model.jnt_dofadr[i]]),
+        }
+
+    def _couplings(self) -> Table:
+        model, found = self.model, {}
+        for i in self.rest.joint_equalities():
+            first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+            constant, ratio = (float(each) for each in model.eq_data[i, :2])
+            q0 = model.qpos0[model.jnt_qposadr]
+            other = {"other": self.names.joints[second], "ratio": ratio} if second >= 0 else {}
+            offset = q0[first] + constant - (ratio * q0[second] if second >= 0 else 0.0)
+            inertia = float(model.dof_M0[model.jnt_dofadr[first]])
+            found[model.equality(i).name or f"equality_{i}"] = {
+                "joint": self.names.joints[first],
+                "offset": float(offset),
+                "stiffness": inertia / _COUPLED**2,
+                "damping": 2.0 * inertia / _COUPLED,
+                **other,
+            }
+        return dict(zip(distinct("equality", list(found)), found.values(), strict=True))
+
+    def _actuators(self) -> Table:
+        model, found = self.model, {}
+        for i in self.affine:
+            if i in self.pulling:
+                continue
+            kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
+            of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
+            affine = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_AFFINE
+            offset, by_length, by_speed = model.actuator_biasprm[i, :3].tolist() if affine else (0.0, 0.0, 0.0)
+            found[i] = {
+                **({"tendon": self.names.tendons[at]} if of_tendon else {"joint": self.names.joints[at]}),
+                "gear": float(model.actuator_gear[i, 0]),
+                "gain": float(model.actuator_gainprm[i, 0]),
+                "offset": offset,
+                "by_length": by_length,
+                "by_speed": by_speed,
+            }
+            if model.actuator_ctrllimited[self.rest.control(i)]:
+                found[i]["input_range"] = model.actuator_ctrlrange[self.rest.control(i)].tolist()
+            if model.actuator_forcelimited[i]:
+                found[i]["force_range"] = model.actuator_forcerange[i].tolist()
+        names = distinct("actuator", [model.actuator(i).name for i in found])
+        return dict(zip(names, found.values(), strict=True))
+
+    def _pulls(self, i: int) -> bool:
+        """Return whether an actuator is a motor that can only pull a tendon through space."""
+        model, types = self.model, self.mujoco
+        at = int(model.actuator_trnid[i, 0])
+        if (
+            model.actuator_trntype[i] != types.mjtTrn.mjTRN_TENDON
+            or model.actuator_biastype[i] != types.mjtBias.mjBIAS_NONE
+            or not model.actuator_ctrllimited[self.rest.control(i)]
+            or model.actuator_forcelimited[i]
+            or model.wrap_type[model.tendon_adr[at]] == types.mjtWrap.mjWRAP_JOINT
+        ):
+            return False
+        exerted = (
+            model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[self.rest.control(i)]
+        )
+        return bool(np.all(exerted <= 0.0) and np.any(exerted))
+
+    def _pulled(self) -> Table:
+        """Return the tendons that motors pull, by the names of these."""
+        model = self.model
+        names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
+        along = [self.names.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
+        return {name: {"along": path} for name, path in zip(names, along, strict=True)}
+
+    def _tip_body(self) -> tuple[int, Array]:
+        """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""
+        model = self.model
+        for i in range(model.nsite):
+            if "tip" in model.site(i).name.lower() and model.body_weldid[model.site_bodyid[i]]:
+                return int(model.site_bodyid[i]), model.site_pos[i]
+        return int(model.jnt_bodyid[self.kept_joints[-1]]), np.zeros(3)
+
+    def _tip(self) -> Table:
+        body, position = self._tip_body()
+        return {**self.names.carrier(body, "body"), "position": position.tolist()}

@@ -1,0 +1,123 @@
+"""What a MuJoCo model has that is not carried over: listed, element by element, or refused by name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.exchange.mujoco_flags import undriven
+
+
+class Rest:
+    """What is left out of a model.
+
+    Attributes:
+        mujoco: The module.
+        model: The compiled model.
+    """
+
+    def __init__(self, mujoco: Any, model: Any) -> None:
+        """Look at everything but equalities and actuators, which are looked at when they are read.
+
+        Raises:
+            InputError: If the model has muscles.
+        """
+        self.mujoco, self.model = mujoco, model
+        self._listed: list[str] = []
+        self._refuse_muscles()
+        for i in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
+            body = model.body(model.jnt_bodyid[i]).name or f"body_{model.jnt_bodyid[i]}"
+            self.add(f"free joint of {body}: it stays where it is")
+        self._every("body", "body_gravcomp", "gravity compensation")
+        self._every("joint", "jnt_stiffnesspoly", "a stiffness that grows with the deflection")
+        self._every("joint", "dof_dampingpoly", "damping that grows with the speed", by_dof=True)
+        self._every("joint", "jnt_springyield", "a spring that yields")
+        self._every("joint", "jnt_actfrclimited", "a limit on what actuators exert on it together")
+        self._every("tendon", "tendon_actfrclimited", "a limit on what actuators exert on it together")
+        self._every("tendon", "tendon_armature", "armature")
+        self._every("tendon", "tendon_stiffnesspoly", "a stiffness that grows with the stretch")
+        self._every("tendon", "tendon_dampingpoly", "damping that grows with the speed")
+        self._every("tendon", "tendon_springyield", "a spring that yields")
+        if model.opt.density or model.opt.viscosity:
+            self.add("the medium: nothing is dragged")
+        for count, what in (
+            (model.nflex, "flexible bodies"),
+            (model.nplugin, "plugins"),
+            (model.nmocap, "mocap bodies"),
+        ):
+            if count:
+                self.add(f"{what}: {count}")
+
+    def listed(self) -> list[str]:
+        """Return what is left out, a line each."""
+        return list(dict.fromkeys(self._listed))
+
+    def add(self, line: str) -> None:
+        """List something."""
+        self._listed.append(line)
+
+    def joint_equalities(self) -> list[int]:
+        """Return the equalities that are linear in two joints; the others are listed."""
+        model, found = self.model, []
+        for i in np.flatnonzero(model.eq_active0):
+            name = model.equality(i).name or f"equality_{i}"
+            kind = self.mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
+            if kind != "joint":
+                self.add(f"equality {name}: of kind {kind}")
+            elif np.any(model.eq_data[i, 2:5]):
+                self.add(f"equality {name}: its polynomial is not linear")
+            else:
+                found.append(int(i))
+        return found
+
+    def control(self, i: int) -> int:
+        """Return the control of an actuator; those before it may have several, or none."""
+        first = getattr(self.model, "actuator_ctrladr", None)
+        return i if first is None else int(first[i])
+
+    def affine_actuators(self) -> list[int]:
+        """Return the actuators on joints and tendons without dynamics; the others are listed."""
+        model, mujoco, found = self.model, self.mujoco, []
+        for i in range(getattr(model, "nactuator", model.nu)):
+            name = model.actuator(i).name or f"actuator_{i}"
+            idle = undriven(mujoco, model, i)
+            driven = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
+            if idle:
+                self.add(f"actuator {name}: {idle}")
+            elif driven not in ("joint", "jointinparent", "tendon"):
+                self.add(f"actuator {name}: it drives a {driven}")
+            elif driven != "tendon" and model.jnt_type[model.actuator_trnid[i, 0]] == mujoco.mjtJoint.mjJNT_FREE:
+                self.add(f"actuator {name}: it drives a free joint")
+            elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
+                self.add(f"actuator {name}: it has dynamics of its own")
+            elif model.actuator_gaintype[i] != mujoco.mjtGain.mjGAIN_FIXED:
+                kind = mujoco.mjtGain(int(model.actuator_gaintype[i])).name.removeprefix("mjGAIN_").lower()
+                self.add(f"actuator {name}: its gain is not constant, but of kind {kind}")
+            elif model.actuator_biastype[i] not in (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)):
+                self.add(f"actuator {name}: its bias is not affine")
+            else:
+                found.append(i)
+        return found
+
+    def _refuse_muscles(self) -> None:
+        model, mujoco = self.model, self.mujoco
+        for i in range(getattr(model, "nactuator", model.nu)):
+            kinds = (
+                model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_MUSCLE,
+                model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_MUSCLE,
+                model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_MUSCLE,
+            )
+            if any(kinds):
+                raise InputError(f"actuator {model.actuator(i).name or i}", "is a muscle; muscles are not supported")
+
+    def _every(self, what: str, attribute: str, has: str, by_dof: bool = False) -> None:
+        """List every element whose numbers of an attribute, which older versions lack, are not zero."""
+        values = getattr(self.model, attribute, None)
+        if values is None or not len(values):
+            return
+        for i in np.flatnonzero(np.any(np.reshape(values, (len(values), -1)), axis=1)):
+            index = self.model.dof_jntid[i] if by_dof else i
+            name = getattr(self.model, what)(index).name or f"{what}_{index}"
+            self.add(f"{what} {name}: {has}")

@@ -1,0 +1,127 @@
+"""Where a simulation starts: a packed state, or the last saved state of a result; and what of it is a user's own."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger_pin.description.routing import Array
+from finger_pin.description.validation import finite_vector
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.state import State
+from finger_pin.simulation.contact_variables import last_touching
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_PARTS = {
+    "position": "joint_position",
+    "velocity": "joint_velocity",
+    "passive_position": "passive_position",
+    "passive_velocity": "passive_velocity",
+    "tendon_stiction": "tendon_stiction",
+    "joint_stiction": "joint_stiction",
+    "motor_position": "motor_position",
+    "motor_velocity": "motor_velocity",
+    "gearbox_stiction": "gearbox_stiction",
+}
+
+
+def own_parts(
+    controller: object, reference: object, fingertip_force: object, initial: object, finger: object = None
+) -> str:
+    """Return what of a simulation is a user's own, such as ``controller, reference``; empty for nothing.
+
+    Args:
+        controller: As for `simulate`.
+        reference: As for `simulate`.
+        fingertip_force: As for `simulate`.
+        initial: As for `simulate`.
+        finger: As for `simulate`.
+    """
+    given = {
+        "controller": controller,
+        "reference": reference,
+        "force": fingertip_force,
+        "initial state": initial,
+        "finger": finger,
+    }
+    return ", ".join(name for name, each in given.items() if each is not None)
+
+
+def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
+    """Return the packed state at the start, shape (size,).
+
+    Args:
+        initial: A packed state, or a result of the same finger, which is continued from its last saved state.
+        finger: The finger.
+
+    Raises:
+        InputError: If sizes, names or numbers are not those of a state of this finger.
+    """
+    import xarray as xr
+
+    if not isinstance(initial, xr.Dataset):
+        try:
+            return finite_vector("initial", np.array(initial, dtype=float), finger.layout.size)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            allowed = f"must be a result, or a packed state of {finger.layout.size} numbers"
+            raise InputError("initial", allowed, type(initial).__name__) from None
+    routing = finger.routing
+    for dimension, names in (("joint", routing.joints), ("tendon", routing.tendons)):
+        if dimension not in initial.coords or tuple(map(str, initial[dimension].values)) != names:
+            raise InputError("initial", f"is a result of another finger: its {dimension}s must be {', '.join(names)}")
+    last, parts = initial.isel(time=-1), {}
+    sizes = vars(finger.layout.unpack(np.zeros(finger.layout.size)))
+    for part, name in _PARTS.items():
+        if name in last:
+            parts[part] = np.atleast_1d(last[name].values)
+        elif sizes[part].size:
+            raise InputError("initial", f"has no {name}; give what simulate returned")
+        else:
+            parts[part] = np.zeros(0)
+    parts |= last_touching(finger, last)
+    return finite_vector("initial", finger.layout.pack(State(**parts)), finger.layout.size)
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return an argument as finite numbers of a shape; a copy.
+
+    Raises:
+        InputError: If it is anything else; ``name`` names the argument.
+    """
+    wanted = f"must be {' times '.join(map(str, shape))} numbers"
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(name, wanted, value) from None
+    if found.shape != shape:
+        raise InputError(name, f"{wanted}, not an array of shape {found.shape}")
+    # Of a few numbers Python asks sooner than NumPy.
+    if not all(map(math.isfinite, found.ravel().tolist())):
+        raise InputError(name, "must be finite", found.tolist())
+    return found
+
+
+def check_motors(finger: Finger, x: Array) -> None:
+    """Refuse a packed state in which a motor turns faster than its supply and its current limit can stand.
+
+    What it induces is then more than the supply and what the greatest current takes away at its resistance.
+
+    Raises:
+        InputError: Naming the motor and its speed.
+    """
+    speed, actuators = finger.layout.unpack(x).motor_velocity, finger.actuators
+    assert speed is not None
+    constant, resistance, supply, limit = actuators.motor[:4]
+    most = (supply + resistance * limit) / constant
+    for name, own, greatest in zip(actuators.names, speed, most, strict=True):
+        if abs(own) > greatest:
+            allowed = f"motor {name} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
+            raise InputError("initial", allowed, float(own))

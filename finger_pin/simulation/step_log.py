@@ -1,0 +1,143 @@
+"""What a simulator was told, step by step: little to keep, and enough to repeat its run and record it."""
+
+from __future__ import annotations
+
+import copy
+from array import array
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.open_loop import OpenLoopTensions
+from finger_pin.control.position_drive import GivenVoltages
+from finger_pin.control.reference import Reference, SignalReference
+from finger_pin.control.signal import Signal
+from finger_pin.control.user_controllers import Samples
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import Stepper
+from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import validate
+from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.accuracy import check_memory, left_open, open_account
+from finger_pin.simulation.recording import Motions, record
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# A sample this close to the end of a step, s, is taken there.
+_SAME = 1e-9
+
+
+class Told:
+    """The steps of a simulator since a start, in the order in which they were made."""
+
+    def __init__(self, stepper: Stepper) -> None:
+        """Begin with no steps, where a stepper stands that goes on meanwhile."""
+        self._stepper, self._moments = stepper, stepper.moments
+        self._numbers = array("d")
+
+    @property
+    def start(self) -> Stepper:
+        """A copy of the stepper as it stood at the start."""
+        start = self._stepper.copy()
+        start.resume(self._moments)
+        return start
+
+    def add(self, end: float, inputs: Array, force: Array) -> None:
+        """Keep a step: when it ended, s, and what was held during it: inputs (u,), and forces (3,) or (f, 3), N."""
+        self._numbers.append(end)
+        self._numbers.frombytes(inputs.tobytes() + force.tobytes())
+
+    def copy(self) -> Told:
+        """Return the same steps, to go on from independently."""
+        twin = copy.copy(self)
+        twin._numbers = self._numbers[:]
+        return twin
+
+    def result(self, finger: Finger, settings: dict[str, Any], reference: Reference | Samples | None) -> xr.Dataset:
+        """Repeat the steps bit by bit, and return their signals.
+
+        Args:
+            finger: The finger.
+            settings: As in ``simulation`` of a scenario, without the duration.
+            reference: As for `simulate`; by default the posture at the start.
+
+        Raises:
+            InputError: If there are no steps yet, or a setting or the reference is wrong.
+            IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
+        """
+        if not self._numbers:
+            raise InputError("result", "is of steps, and there are none yet: call step")
+        tips = finger.mechanism.body.tips
+        steps = np.array(self._numbers).reshape(-1, 1 + finger.mechanism.channels + 3 * len(tips))
+        stepper = self.start
+        knots, joints = np.append(stepper.time, steps[:, 0]), len(finger.routing.joints)
+        inputs, force = np.split(steps[:, 1:], [finger.mechanism.channels], axis=1)
+        tension, channels = inputs.copy(), finger.actuators.voltages
+        tension[:, channels] = 0.0
+        description = finger.description
+        table = {
+            "name": description.name,
+            "title": f"{description.name} in a loop of one's own",
+            "finger": description,
+            "controller": {"kind": "tensions"},
+            "simulation": {"duration": float(knots[-1] - knots[0]), **settings},
+        }
+        scenario = validate(Scenario, table, ())
+        check_memory(scenario.simulation, finger)
+        if reference is None:
+            posture = finger.layout.unpack(stepper.x).position
+            resting = Signal.held(knots[[0, -1]], posture[None])
+            reference = SignalReference(resting, PassiveCoupling(np.eye(joints), np.zeros(joints), ()))
+        loop = replace(
+            ClosedLoop.from_scenario(scenario, reference=reference, finger=finger),
+            controller=OpenLoopTensions(Signal.held(knots, tension), finger.routing),
+            fingertip_force=np.zeros(3 if len(tips) == 1 else (len(tips), 3)),
+            varying_force=Signal.held(knots, force),
+            dynamics=CompiledFinger(finger),
+            drives=GivenVoltages(channels, Signal.held(knots, inputs[:, channels])) if len(channels) else None,
+        )
+        again = _Repeated(stepper, knots, inputs, force)
+        trajectory = integrate_compiled(stepper, float(knots[-1]), finger.layout.names, held=again)
+        # Rounding must not take a sample to the other side of a step's end, where other tensions act.
+        times = knots[0] + scenario.sample_times()
+        near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
+        times = np.where(np.abs(near - times) < _SAME, near, times)
+        result = record(scenario, Motions(loop, trajectory, times), trajectory, str(settings["method"]))
+        result.attrs["own"] = "loop"
+        if trajectory.failure:
+            reached = float(trajectory.breakpoints[-1])
+            raise IntegrationError(reached, trajectory.failure, "fewer steps", result.dataset())
+        gap = open_account(left_open(result))
+        if gap:
+            result.attrs["account"] = gap
+        return result.dataset()
+
+
+class _Repeated:
+    """Holds again what was held.
+
+    Attributes:
+        instant: When the next step begins, s.
+    """
+
+    def __init__(self, stepper: Stepper, knots: Array, inputs: Array, force: Array) -> None:
+        self._stepper, self._knots, self._inputs, self._force = stepper, knots, inputs, force
+        self._step = 0
+
+    @property
+    def instant(self) -> float:
+        return float(self._knots[self._step])
+
+    def act(self, x: Array) -> Array:
+        """Begin a step: load it with its force, and return its inputs, shape (u,)."""
+        step, self._step = self._step, self._step + 1
+        self._stepper.load(self._force[step].reshape(-1, 3))
+        inputs: Array = self._inputs[step]
+        return inputs
