@@ -109,7 +109,6 @@ def compute(
 ) -> tuple[xr.Dataset | None, BaseException | None]:
     """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did."""
     from finger_pin.simulation.convergence import check_convergence
-    from finger_pin.simulation.recorded import as_dataset
     from finger_pin.simulation.running import run
 
     if live:
@@ -123,9 +122,9 @@ def compute(
         warnings.simplefilter("ignore", ScenarioWarning)
         observe = viewer.observe if viewer else None
         try:
-            whole = run(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested).dataset()
+            whole = run(scenario, progress=progress, observe=observe, stop=lambda: interrupts.requested)
         except (IntegrationError, Interrupted) as error:
-            return None if error.result is None else as_dataset(error.result), error
+            return error.result, error
         if not check:
             return whole, None
         try:

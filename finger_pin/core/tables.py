@@ -249,12 +249,12 @@ def _read(mechanism: Mechanism) -> Tables:
 
 
 def _books(mechanism: Mechanism) -> NDArray[np.int64]:
-    stored, powers = mechanism.books.stored, mechanism.books.powers
+    stored, powers = ([each.name for each in one] for one in (mechanism.books.stored, mechanism.books.powers))
     wide = 1 + max((len(table.powers) for table in mechanism.rows), default=0)
     books = np.full((len(mechanism.rows), wide), -1, dtype=np.int64)
     for row, table in zip(books, mechanism.rows, strict=True):
-        row[0] = stored.index(table.stored)
-        row[1 : 1 + len(table.powers)] = [len(stored) + powers.index(name) for name in table.powers]
+        row[0] = stored.index(table.stored.name)
+        row[1 : 1 + len(table.powers)] = [len(stored) + powers.index(each.name) for each in table.powers]
     return books
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.textbook import Statistics, Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.simulation.recording import Motions, Variable, variables
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.variables import RESIDUAL, Variable, variables
 
 _NOTHING = Statistics(0, 0, 0, 0, 0.0)
-# Of a whole run, not of an instant; and of a reference and a controller, which do not act.
-_OF_RUNS = ("energy_", "power_")
+# Of a reference and a controller, which do not act.
 _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
 
 
@@ -20,7 +20,8 @@ def known_variables(loop: ClosedLoop) -> dict[str, Variable]:
     return {
         name: each
         for name, each in variables(loop).items()
-        if not name.startswith(_OF_RUNS) and name not in _OF_CONTROLLERS
+        # The account is of a whole run.
+        if each.booked is None and name not in (*_OF_CONTROLLERS, RESIDUAL)
     }
 
 

@@ -28,7 +28,9 @@ from finger_pin.learning.instant import instant, known_variables
 from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Measurement
 from finger_pin.learning.task import Task
-from finger_pin.simulation.recording import Motions, record, variables
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.recording import record
+from finger_pin.simulation.variables import variables
 from finger_pin.views.viewer.video import draw_picture
 
 if TYPE_CHECKING:
@@ -221,15 +223,15 @@ class World:
         trajectory = integrate_compiled(stepper, end, self._loop.finger.layout.names, held=held)
         times = np.arange(round(end * sample_rate) + 1) / sample_rate
         motions = Motions(self._loop, trajectory, times)
-        found = record(self._scenario, motions, trajectory, self._scenario.simulation.method)
+        found = record(self._scenario, motions, self._scenario.simulation.method)
         found.attrs["own"] = "policy"
-        return found.dataset()
+        return found
 
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, seen from where all postures are in view, of bytes."""
         motions = self._motions()
         method = self._scenario.simulation.method
-        found = record(self._scenario, motions, motions.trajectory, method, list(known_variables(self._loop)))
+        found = record(self._scenario, motions, method, list(known_variables(self._loop)))
         return draw_picture(found, self._stage)
 
     @cached_property

@@ -22,10 +22,13 @@ from finger_pin.laws.elastic_tendon import ELASTIC_TENDON
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
 from finger_pin.laws.motor import MOTOR
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.rows import Rows
 
 # Least level of what a tendon holds, N, as that of tendon friction.
 _FLOOR = 1e-4
+_STRETCH = Energy("elastic_tendons", "tendons on spools")
+_DAMPING = Energy("elastic_damping", "tendons stretching")
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +168,8 @@ class Actuators:
             parameters=np.array([self.stiffness, self.damping]),
             arm=arm,
             offset=-self.slack,
-            powers=("elastic_damping",),
+            stored=_STRETCH,
+            powers=(_DAMPING,),
         )
         held = self.held
         if not held.size:
@@ -178,8 +182,8 @@ class Actuators:
             parameters=np.array(numbers),
             arm=arm[held],
             loads={"elastic_tendons": np.eye(len(arm))[held]},
-            stored="elastic_tendons",
-            powers=("elastic_damping",),
+            stored=_STRETCH,
+            powers=(_DAMPING,),
         )
         return [elastic, hysteresis]
 
@@ -196,7 +200,7 @@ class Actuators:
                 self.motor,
                 turns,
                 channels=self.channels,
-                powers=("electrical", "motor_heat"),
+                powers=(Energy("electrical", "motors' electronics"), Energy("motor_heat", "heat in windings")),
             ),
             Rows(
                 "gearboxes",
@@ -206,7 +210,7 @@ class Actuators:
                 turns,
                 inputs=self.wired(self.spools.T) if one_way else {},
                 loads={"motors": np.eye(count), **self.wired(-self.external_weight[:, None] * self.spools.T)},
-                stored="gearboxes",
-                powers=("gearbox_coulomb", "gearbox_viscous"),
+                stored=Energy("gearboxes", "gear bristles"),
+                powers=(Energy("gearbox_coulomb", "gears sliding"), Energy("gearbox_viscous", "gears viscous")),
             ),
         ]

@@ -11,6 +11,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.features import Part, contacts_of
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
@@ -20,6 +21,11 @@ from finger_pin.mechanism.solids import Solid
 
 #: How deep bodies may be in each other at the start, m.
 DEEPEST_START = 1e-3
+_LOSSES = (
+    Energy("contacts_impact", "contacts, impact"),
+    Energy("contacts_sliding", "contacts sliding"),
+    Energy("contacts_micro_damping", "contacts' bristles"),
+)
 
 
 def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozenset[str]] = ()) -> Rows:
@@ -47,7 +53,8 @@ def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozens
             numbers.append(law_numbers(a.surface, w.surface))
             paths += [(Leg(piece, column),) for column in range(CONTACT.arms)]
     parameters = np.array(numbers).reshape(-1, len(CONTACT.parameters)).T
-    return Rows("contacts", CONTACT, tuple(names), parameters, np.zeros((len(paths), width)), paths=tuple(paths))
+    arm = np.zeros((len(paths), width))
+    return Rows("contacts", CONTACT, tuple(names), parameters, arm, paths=tuple(paths), powers=_LOSSES)
 
 
 def _piece(a: Solid, part: Part, w: Solid, prism: tuple[float, ...]) -> Piece:

@@ -1,44 +1,14 @@
-"""What evaluating a mechanism gives, and how its energies and powers are booked."""
+"""What evaluating a mechanism gives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.rows import Rows, RowSignals
-
-#: The powers that a moving base supplies, and what moves objects along paths.
-BASE, GUIDED = "palm", "objects"
-#: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `laws.palm`.
-GUIDES = 27
-
-
-@dataclass(frozen=True, eq=False)
-class Books:
-    """Names under which the rows' energies and powers are booked; some tables share a name.
-
-    Attributes:
-        stored: Energies.
-        powers: Powers, supplied and lost.
-        supplies: Those of them that are supplied.
-    """
-
-    stored: tuple[str, ...]
-    powers: tuple[str, ...]
-    supplies: frozenset[str]
-
-    @classmethod
-    def of(cls, rows: Sequence[Rows], moved: bool = False, guided: bool = False) -> Books:
-        """Collect the names of tables, and those of moved coordinates and of a base that moves."""
-        base = ((GUIDED,) if guided else ()) + ((BASE,) if moved else ())
-        return cls(
-            stored=tuple(dict.fromkeys(table.stored for table in rows)),
-            powers=(*dict.fromkeys(name for table in rows for name in table.powers), *base),
-            supplies=frozenset(name for table in rows for name in table.powers[: len(table.law.supplies)]) | {*base},
-        )
+from finger_pin.mechanism.books import BASE, GUIDED, Books
+from finger_pin.mechanism.rows import RowSignals
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +31,7 @@ class Evaluation:
     """Everything at one state or at many; leading dimensions are kept.
 
     Attributes:
-        books: Names of energies and powers.
+        books: Its energies and powers.
         rows: What the rows do, by table.
         torque: Sum of A^T phi, shape (..., N).
         external: J^T F, shape (..., N).
@@ -86,22 +56,22 @@ class Evaluation:
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return the energies that the rows store, J, and their powers, W, by name; shapes (...,)."""
+        stored, flows = ([each.name for each in entries] for entries in (self.books.stored, self.books.powers))
         if self.booked is not None:
             columns = np.moveaxis(self.booked, -1, 0)
-            count = len(self.books.stored)
             return (
-                dict(zip(self.books.stored, columns[:count], strict=True)),
-                dict(zip(self.books.powers, columns[count:], strict=True)),
+                dict(zip(stored, columns[: len(stored)], strict=True)),
+                dict(zip(flows, columns[len(stored) :], strict=True)),
             )
         nothing = np.zeros(self.rate.shape[:-1])
-        energies, powers = dict.fromkeys(self.books.stored, nothing), dict.fromkeys(self.books.powers, nothing)
+        energies, powers = dict.fromkeys(stored, nothing), dict.fromkeys(flows, nothing)
         for signals in self.rows.values():
-            stored, flows = signals.account()
-            energies[signals.rows.stored] = energies[signals.rows.stored] + stored
-            for name, value in flows.items():
+            energy, taken = signals.account()
+            energies[signals.rows.stored.name] = energies[signals.rows.stored.name] + energy
+            for name, value in taken.items():
                 powers[name] = powers[name] + value
         if self.guided_power is not None:
-            powers[GUIDED] = self.guided_power
+            powers[GUIDED.name] = self.guided_power
         if self.base_power is not None:
-            powers[BASE] = self.base_power[..., 0]
+            powers[BASE.name] = self.base_power[..., 0]
         return energies, powers

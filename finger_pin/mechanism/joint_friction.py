@@ -13,7 +13,15 @@ from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.laws.bristle import PIN_FRICTION
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.rows import Rows
+
+#: What friction in the joints takes, in the order of its law.
+LOSSES = (
+    Energy("joint_coulomb", "joints sliding"),
+    Energy("joint_viscous", "joints viscous"),
+    Energy("joint_micro_damping", "joints' micro-damping"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +82,8 @@ class JointFriction:
             arm=np.eye(size, width),
             loads=loads,
             pins=np.arange(size),
-            stored="joint_bristles",
-            powers=("joint_coulomb", "joint_viscous", "joint_micro_damping"),
+            stored=Energy("joint_bristles", "joint bristles"),
+            powers=LOSSES,
         )
 
 

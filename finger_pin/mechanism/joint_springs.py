@@ -11,10 +11,12 @@ from finger_pin.description.parameters import FingerDescription, Spring
 from finger_pin.description.routing import Array
 from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
 from finger_pin.laws.spring import JOINT_SPRING, spring_torque
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.rows import Rows
 
 # Least level of what a spring holds, N m, as that of joint friction.
 _FLOOR = 1e-7
+_ENERGY = Energy("joint_springs", "joints' springs")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,8 @@ class JointSprings:
             names=tuple(names[joint] for joint in sprung),
             parameters=np.array([self.stiffness, self.rest, self.damping])[:, sprung],
             arm=np.eye(len(names), width)[sprung],
-            powers=("joint_springs",),
+            stored=_ENERGY,
+            powers=(_ENERGY,),
         )
 
     def hysteresis_rows(self, names: tuple[str, ...], width: int) -> list[Rows]:
@@ -81,7 +84,7 @@ class JointSprings:
                 parameters=np.array([shares, stiffness, np.full(len(joints), _FLOOR)]),
                 arm=np.eye(len(names), width)[joints],
                 loads={"joint_springs": np.eye(len(sprung))[held]},
-                stored="joint_springs",
-                powers=("joint_springs",),
+                stored=_ENERGY,
+                powers=(_ENERGY,),
             )
         ]

@@ -22,13 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.evaluation import Books, Evaluation
+from finger_pin.mechanism.books import Books
+from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.pieces import Paths, Reach, moved, reach
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 
-#: The powers that a moving base supplies, and what moves objects along paths.
-BASE, GUIDED = "palm", "objects"
 #: Where the accelerations of coordinates that are moved along paths stand, after the numbers of `laws.palm`.
 GUIDES = 27
 
@@ -42,7 +41,7 @@ class Mechanism:
         inertia: Of the lumps, shape (l,), kg or kg m2.
         rows: The tables, in the order of evaluation.
         states: For every table the range of its states in z.
-        books: Names under which energies and powers of the rows are booked.
+        books: Energies and powers of the rows.
         channels: Number of inputs from outside.
         moved: Whether the base moves along a path.
         guided: For coordinates that are moved along paths, the number of their acceleration among all; else -1.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
+from finger_pin.mechanism.books import LOST, SUPPLIED, Energy, energy
 from finger_pin.mechanism.pieces import Leg
 
 
@@ -42,8 +43,10 @@ class Rows:
         bends: Shape (k, N), how much |q| adds to the curvature (15).
         curvature_offset: Shape (k,), rad.
         paths: For every row what pieces of paths through space add to its length, arm and curvature.
-        stored: Name of the energy that the rows store; by default the group's.
-        powers: Names of the law's powers, supplies first; by default the group's name and the law's.
+        stored: The energy that the rows store, or its name; by default the group's.
+        powers: The law's powers, supplies first, or their names; by default the group's name and the law's. Tables that
+            give the same name share an entry of the account.
+        unit: Of the rows' length, ``m`` or ``rad``; SI by default.
     """
 
     group: str
@@ -61,13 +64,13 @@ class Rows:
     bends: Array = None  # type: ignore[assignment]
     curvature_offset: Array = None  # type: ignore[assignment]
     paths: tuple[tuple[Leg, ...], ...] = ()
-    stored: str = ""
-    powers: tuple[str, ...] = ()
+    stored: Energy = None  # type: ignore[assignment]
+    powers: tuple[Energy, ...] = ()
+    unit: str = ""
 
     def __post_init__(self) -> None:
         """Fill in what was left out, and check the sizes."""
         count, width = self.count, np.shape(self.arm)[-1]
-        powers = (*self.law.supplies, *self.law.losses)
         shapes: dict[str, tuple[Any, tuple[int, ...], Any]] = {
             "parameters": (self.parameters, (len(self.law.parameters), len(self.names)), None),
             "arm": (self.arm, (count, width), None),
@@ -86,10 +89,18 @@ class Rows:
         object.__setattr__(self, "paths", tuple(self.paths) or ((),) * count)
         if len(self.paths) != count:
             raise InputError(f"rows.{self.group}.paths", f"must be {count}, not {len(self.paths)}")
-        object.__setattr__(self, "stored", self.stored or self.group)
-        object.__setattr__(self, "powers", self.powers or tuple(f"{self.group}_{name}" for name in powers))
-        if len(self.powers) != len(powers):
-            raise InputError(f"rows.{self.group}.powers", f"must name {', '.join(powers)}", list(self.powers))
+        object.__setattr__(self, "stored", energy(self.stored or self.group))
+        object.__setattr__(self, "powers", self._booked())
+
+    def _booked(self) -> tuple[Energy, ...]:
+        """Return the powers with what they are, which the law says."""
+        law = self.law
+        kinds = dict.fromkeys(law.supplies, SUPPLIED) | dict.fromkeys(law.losses, LOST)
+        given = [energy(each) for each in self.powers or [f"{self.group}_{name}" for name in kinds]]
+        if len(given) != len(kinds):
+            names = [each.name for each in given]
+            raise InputError(f"rows.{self.group}.powers", f"must be {', '.join(kinds) or 'none'}", names)
+        return tuple(each._replace(kind=kind) for each, kind in zip(given, kinds.values(), strict=True))
 
     @property
     def count(self) -> int:
@@ -148,7 +159,7 @@ class RowSignals:
         rows = self.rows
         stored, *powers = rows.law.book(self.row, rows.parameters, self.force, self.rate, self.signals)
         return np.sum(stored, axis=-1), {
-            name: np.sum(power, axis=-1) for name, power in zip(rows.powers, powers, strict=True)
+            each.name: np.sum(power, axis=-1) for each, power in zip(rows.powers, powers, strict=True)
         }
 
 

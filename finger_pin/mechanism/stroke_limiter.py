@@ -10,7 +10,10 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.laws.limiter import STROKE_LIMITER
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.rows import Rows
+
+_ENERGY = Energy("limiter", "stroke limiters")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,5 +48,6 @@ class StrokeLimiter:
             names=names,
             parameters=np.array([self.lower, self.upper, self.stiffness, self.damping]),
             arm=np.eye(len(names), width),
-            powers=("limiter",),
+            stored=_ENERGY,
+            powers=(_ENERGY,),
         )

@@ -12,8 +12,20 @@ from finger_pin.description.validation import expand
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.joint_friction import bristles
 from finger_pin.mechanism.rows import Rows
+
+#: What ideal sources of force supply.
+SOURCES = Energy("actuators", "actuators")
+#: What friction in the canals takes, in the order of its law.
+LOSSES = (
+    Energy("tendon_coulomb", "tendons sliding"),
+    Energy("tendon_viscous", "tendons viscous"),
+    Energy("tendon_micro_damping", "tendons' micro-damping"),
+)
+_SLACK = Energy("slack", "tensions cut at zero")
+_BRISTLES = Energy("tendon_bristles", "tendon bristles")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +107,6 @@ class Tendons:
         bends[:, :joints] = routing.curvature_matrix
         shared = (getattr(self, name) for name in PASSIVE_FRICTION.parameters[2:])
         friction = np.array([self.surface, self.stiction_ratio, *shared])
-        losses = ("tendon_coulomb", "tendon_viscous", "tendon_micro_damping")
         names = routing.passive_names
         wired = {} if actuators is None or not motors else actuators.wired(actuators.pulled)
         elastic = wired["elastic_tendons"].any(axis=1) if wired else np.zeros(actuated, dtype=bool)
@@ -106,7 +117,7 @@ class Tendons:
                 names=tuple(f"{name}.{half}" for name in names for half in ("proximal", "distal")),
                 parameters=np.repeat(self.half_stiffness, 2)[None],
                 arm=halves,
-                stored="passive_tendon",
+                stored=Energy("passive_tendon", "passive tendons"),
             ),
             *(actuators.tendon_rows(width) if actuators is not None and motors else []),
             Rows(
@@ -119,8 +130,8 @@ class Tendons:
                 inputs=wired,
                 bends=bends[:actuated],
                 curvature_offset=routing.curvature_offset[:actuated],
-                stored="tendon_bristles",
-                powers=("actuators", *losses, "slack"),
+                stored=_BRISTLES,
+                powers=(SOURCES, *LOSSES, _SLACK),
             ),
             Rows(
                 group="passive_tendons",
@@ -131,7 +142,7 @@ class Tendons:
                 loads={"passive_halves": np.repeat(np.eye(passive), 2, axis=1)},
                 bends=bends[actuated:],
                 curvature_offset=routing.curvature_offset[actuated:],
-                stored="tendon_bristles",
-                powers=losses,
+                stored=_BRISTLES,
+                powers=LOSSES,
             ),
         ]

@@ -17,14 +17,29 @@ from finger_pin.laws.dead_band import DEAD_BAND_SPRING
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.spring import JOINT_SPRING
+from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Placed, Route, Routes, rotation
 from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.tendons import SOURCES
 
 _TIP = "fingertip"
 # Dry friction of a tendon holds until it has slid so far, m.
 _HOLDS = 1e-4
 _UNLIMITED = (-np.inf, np.inf)
+# What rows of a tree store and exchange, by table.
+_STORED = {
+    "tendon_spring": Energy("tendon_spring", "tendons' springs"),
+    "tendon_limit": Energy("tendon_limit", "tendons' limits"),
+    "coupling": Energy("coupling", "couplings"),
+    "actuator": Energy("joint_springs", "joints' springs"),
+}
+_EXCHANGED = {
+    "tendon_spring": (Energy("tendon_spring_damping", "tendons' dampers"),),
+    "tendon_limit": (Energy("tendon_limit_limiter", "tendons' limits"),),
+    "coupling": (Energy("coupling_damping", "couplings"),),
+    "actuator": (SOURCES,),
+}
 
 
 def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
@@ -97,7 +112,8 @@ def tree_rows(description: FingerDescription, routes: Routes, width: int) -> lis
         arm = np.zeros((len(along), width))
         arm[:, : len(joints)] = [route.coefficients for route in along.values()]
         paths = tuple(route.legs for route in along.values())
-        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **more)
+        booked = {"stored": _STORED.get(group), "powers": _EXCHANGED.get(group, ())}
+        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(booked | more))
 
     sprung = {name: each for name, each in tree.tendons.items() if each.stiffness or each.damping}
     limited = {name: each for name, each in tree.tendons.items() if each.range is not None}
@@ -135,9 +151,5 @@ def tree_rows(description: FingerDescription, routes: Routes, width: int) -> lis
             for each in tree.actuators.values()
         ]
         channels = len(description.actuated_names) + np.arange(len(tree.actuators))
-        tables.append(
-            table(
-                "actuator", ACTUATOR, along, numbers, channels=channels, stored="joint_springs", powers=("actuators",)
-            )
-        )
+        tables.append(table("actuator", ACTUATOR, along, numbers, channels=channels))
     return tables

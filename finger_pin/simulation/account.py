@@ -72,10 +72,10 @@ def account(
     booked = powers(signals.finger)
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
-    parts, done = _parts(loop, trajectory), np.zeros((len(times), len(booked.names)))
+    parts, done = _parts(loop, trajectory), np.zeros((len(times), len(booked.booked)))
     found = [_works(part, times, done.shape[1]) for part in parts]
     done += np.sum(found, axis=0)
-    works = Flows(done, booked.names, booked.supplies)
+    works = Flows(done, booked.booked)
     gained = total - total[0]
     residual = gained - works.net
     allowed = max(_CLOSED * float(np.sum(np.max(np.abs(done), axis=0, initial=0.0))), _NOTHING)
@@ -84,7 +84,7 @@ def account(
             finer = _halved((ends, power), _suspected(ends, times, residual), 1e-3 * allowed)
             if len(finer):
                 done += _works((np.union1d(ends, finer), power), times, done.shape[1]) - own
-        works = Flows(done, booked.names, booked.supplies)
+        works = Flows(done, booked.booked)
         residual = gained - works.net
     return Account(stored=stored, powers=booked, works=works, residual=residual)
 

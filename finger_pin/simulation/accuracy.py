@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +16,13 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario, SimulationSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
+from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
-from finger_pin.simulation.recorded import Recording
+from finger_pin.simulation.energy import entries
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 128
@@ -69,7 +74,7 @@ class Run:
 
     scenario: Scenario
     trajectory: Trajectory
-    result: Recording
+    result: xr.Dataset
     left: float
     coarser: Trajectory | None = None
 
@@ -78,7 +83,7 @@ def close_account(
     scenario: Scenario,
     trajectory: Trajectory,
     repeated: Callable[[Scenario, Stop], Trajectory],
-    recorded: Callable[[Trajectory], Recording],
+    recorded: Callable[[Trajectory], xr.Dataset],
 ) -> Run:
     """Record a run, and repeat it at tighter tolerances as long as its energy account does not close to ten times them.
 
@@ -181,21 +186,19 @@ def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
     return lambda: next(looks) >= most
 
 
-def left_open(result: Recording) -> float:
+def left_open(result: xr.Dataset) -> float:
     """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding.
 
     Of bodies that exchange none, such as one that flies freely, it is the share of the most that is stored.
     """
-    most = {
-        name.removeprefix("energy_"): float(np.abs(values).max())
-        for name, (_, values, _) in result.variables.items()
-        if name.startswith("energy_")
-    }
-    residual = most.pop("residual")
-    exchanged = sum(value for name, value in most.items() if name.startswith("exchanged_"))
-    if not residual > _ROUNDING * max(most.values()):
+    stored, exchanged = (
+        [float(np.abs(each.values).max()) for each in entries(result, *kinds).values()]
+        for kinds in ((STORED,), (SUPPLIED, LOST))
+    )
+    residual, most = float(np.abs(result.variables["energy_residual"].values).max()), max(*stored, *exchanged)
+    if not residual > _ROUNDING * most:
         return 0.0
-    return residual / (exchanged or max(most.values()))
+    return residual / (sum(exchanged) or most)
 
 
 def open_account(share: float) -> str:
@@ -208,10 +211,11 @@ def open_account(share: float) -> str:
     )
 
 
-def finite_part(result: Recording) -> str:
-    """Cut a result before its first sample that is not finite; return the first variable that is not, else empty."""
-    length, excess = len(result.time), ""
-    for name, (_, values, _) in result.variables.items():
+def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return a result up to its first sample that is not finite, and the first variable that is not, else empty."""
+    length, excess = result.sizes["time"], ""
+    for name in result.data_vars:
+        values = result.variables[name].values
         # The sum alone tells in most cases.
         if np.isfinite(np.sum(values)):
             continue
@@ -219,11 +223,11 @@ def finite_part(result: Recording) -> str:
         if not finite.all():
             first = int(np.argmin(finite.reshape(len(values), -1).all(axis=1)))
             if first < length:
-                length, excess = first, name
+                length, excess = first, str(name)
     if excess:
-        result.cut(max(length, 1))
-        result.attrs["end_time"] = float(result.time[-1])
-    return excess
+        result = result.isel(time=slice(max(length, 1)))
+        result.attrs["end_time"] = float(result["time"][-1])
+    return result, excess
 
 
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
@@ -248,7 +252,7 @@ def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
     )
 
 
-def too_stiff(result: Recording, finger: Finger, tolerance: float) -> str:
+def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
     """Return what to say if bodies have touched whose contact is too stiff for the tolerance; else empty.
 
     Args:
@@ -262,7 +266,7 @@ def too_stiff(result: Recording, finger: Finger, tolerance: float) -> str:
     stiffness, exponent = (contacts.parameters[CONTACT.parameters.index(name)] for name in ("stiffness", "exponent"))
     depth = stiffness ** (-1.0 / exponent)
     # Bounces may all fall between samples: what is closer than can be told has touched.
-    touched = np.any(result.variables["contact_gap"][1] < known, axis=0)
+    touched = np.any(result.variables["contact_gap"].values < known, axis=0)
     for index in np.flatnonzero(touched & (depth < _SEEN * known)):
         return (
             f"{contacts.names[index]} is too stiff for the tolerances: 1 N presses it in by {depth[index]:.1g} m, and "

@@ -8,17 +8,23 @@ It closes to the integrator's tolerance, or a sign somewhere is wrong.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.evaluation import Books
+from finger_pin.mechanism.books import SUPPLIED, Books, Energy
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Kinematics, Motion
 
-#: The power that the fingertip force supplies.
-FINGERTIP = "fingertip"
+if TYPE_CHECKING:
+    import xarray as xr
+
+FINGERTIP = Energy("fingertip", "fingertip force", SUPPLIED)
+_KINETIC, _GRAVITY = Energy("kinetic", "kinetic"), Energy("gravity", "gravity")
+_ROTORS = Energy("rotors", "rotors")
+_OBJECTS = Energy("objects_kinetic", "objects, kinetic"), Energy("objects_gravity", "objects, gravity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,48 +36,51 @@ class Flows:
 
     Attributes:
         values: By name, shape (..., f).
-        names: f names.
-        supplies: Those that come in; the others are lost.
+        booked: What the f of them are.
     """
 
     values: Array
-    names: tuple[str, ...]
-    supplies: frozenset[str]
+    booked: tuple[Energy, ...]
 
     @classmethod
     def of(cls, books: Books, rows: Array, fingertip: Array) -> Flows:
         """Join the powers of the rows, shape (..., powers), and that of the fingertip force, shape (...,)."""
         values = np.concatenate([rows, np.asarray(fingertip)[..., None]], axis=-1)
-        return cls(values, (*books.powers, FINGERTIP), books.supplies | {FINGERTIP})
+        return cls(values, flows(books))
 
     def __getitem__(self, name: str) -> Array:
         """Return one of them, shape (...,)."""
-        value: Array = self.values[..., self.names.index(name)]
+        value: Array = self.values[..., [each.name for each in self.booked].index(name)]
         return value
 
     @property
     def net(self) -> Array:
         """Supplied less lost, shape (...,)."""
-        return np.asarray(self.values @ [1.0 if name in self.supplies else -1.0 for name in self.names])
+        return np.asarray(self.values @ [1.0 if each.kind == SUPPLIED else -1.0 for each in self.booked])
 
 
 def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics) -> dict[str, Array]:
     """Return the stored energies at the given signals by name, shape (...,), J."""
     state, (stored, _) = signals.state, signals.mechanism.account()
     lumps = 0.5 * np.sum(finger.tendons.mass * state.passive_velocity**2, axis=-1)
-    found = {"kinetic": motion.kinetic_energy + lumps, "gravity": motion.potential_energy, **stored}
+    found = {_KINETIC.name: motion.kinetic_energy + lumps, _GRAVITY.name: motion.potential_energy, **stored}
     if finger.actuators.names and state.motor_velocity is not None:
-        found["rotors"] = 0.5 * np.sum(finger.actuators.inertia * state.motor_velocity**2, axis=-1)
+        found[_ROTORS.name] = 0.5 * np.sum(finger.actuators.inertia * state.motor_velocity**2, axis=-1)
     if isinstance(motion, Motion) and motion.objects is not None:
-        found["objects_kinetic"], found["objects_gravity"] = motion.objects
+        found |= dict(zip((each.name for each in _OBJECTS), motion.objects, strict=True))
     return found
 
 
-def stored_names(finger: Finger) -> tuple[str, ...]:
-    """Return the names of the stored energies of a finger."""
-    rotors = ("rotors",) if finger.actuators.names else ()
-    objects = () if finger.surroundings is None else ("objects_kinetic", "objects_gravity")
-    return ("kinetic", "gravity", *finger.mechanism.books.stored, *rotors, *objects)
+def flows(books: Books) -> tuple[Energy, ...]:
+    """Return what the powers of a mechanism are, with that of the fingertip force."""
+    return (*books.powers, FINGERTIP)
+
+
+def stores(finger: Finger) -> tuple[Energy, ...]:
+    """Return what the stored energies of a finger are."""
+    rotors = (_ROTORS,) if finger.actuators.names else ()
+    objects = () if finger.surroundings is None else _OBJECTS
+    return (_KINETIC, _GRAVITY, *finger.mechanism.books.stored, *rotors, *objects)
 
 
 def powers(signals: FingerSignals) -> Flows:
@@ -82,3 +91,20 @@ def powers(signals: FingerSignals) -> Flows:
     else:
         rows = np.stack(list(found.account()[1].values()), axis=-1)
     return Flows.of(found.books, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
+
+
+def entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:
+    """Return the energies in a result's account, J, that are of some kinds: stored, supplied or lost.
+
+    Args:
+        result: What `simulate` returned.
+        kinds: Of `mechanism.books`.
+
+    Returns:
+        By the name of the variable; ``label`` among its attributes says in words what it is.
+    """
+    return {
+        str(name): values
+        for name, values in result.variables.items()
+        if values.attrs.get("account") in kinds and values.attrs["units"] == "J"
+    }

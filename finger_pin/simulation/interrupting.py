@@ -6,13 +6,19 @@ import signal
 import threading
 from collections.abc import Callable
 from types import FrameType
+from typing import TYPE_CHECKING, TypeVar
 
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.exceptions import Interrupted, InterruptedByKeyboard
-from finger_pin.simulation.recorded import Recording
+from finger_pin.simulation.run_arrays import RunArrays
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Found = TypeVar("Found", "xr.Dataset", RunArrays)
 
 
-def interruptible(run: Callable[[Stop], Recording], stop: Stop | None) -> Recording:
+def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
     """Return what a run returns, given what it asks whether it is to stop: after Ctrl-C, or when the caller says so.
 
     A second Ctrl-C ends at once, without a result. Where others than Python handle the signal, such as a command of
@@ -48,5 +54,6 @@ def interruptible(run: Callable[[Stop], Recording], stop: Stop | None) -> Record
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if pressed:
         # It came after the last step.
-        raise InterruptedByKeyboard(float(found.attrs["end_time"]), found.dataset())
+        whole = found.dataset() if isinstance(found, RunArrays) else found
+        raise InterruptedByKeyboard(float(found.attrs["end_time"]), whole)
     return found

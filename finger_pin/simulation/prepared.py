@@ -14,17 +14,19 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.family import Family
-from finger_pin.description.loading import load_scenario, to_toml
+from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
-from finger_pin.simulation.recorded import Recording
-from finger_pin.simulation.recording import Motions, record, variables
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.recording import attributes_of, record, recorded
+from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.running import Setup, Steps, run
 from finger_pin.simulation.sensitivity import TIGHT, TIGHTER, add_slopes
+from finger_pin.simulation.variables import coordinates, variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,7 +101,7 @@ class Prepared:
         stop: Stop | None = None,
         sensitivities: bool = False,
         accuracy: float | None = None,
-    ) -> Recording:
+    ) -> RunArrays:
         """Simulate, and return what is recorded, and no more: bit for bit as in the result of `simulate`.
 
         Nothing is judged: whether the energy account closes, or how large the error is, `simulate` says.
@@ -128,7 +130,7 @@ class Prepared:
         stop: Stop,
         sensitivities: bool,
         accuracy: float | None,
-    ) -> Recording:
+    ) -> RunArrays:
         scenario = self.scenario(values)
         if not sensitivities:
             return self._made(scenario, initial, stop)[0]
@@ -144,7 +146,7 @@ class Prepared:
         found, trajectory = self._made(_tight(scenario, tight), initial, stop)
         steps = None if apart else [each.times for each in trajectory.islands] or [trajectory.breakpoints]
 
-        def again(moved: Sequence[float]) -> Recording:
+        def again(moved: Sequence[float]) -> RunArrays:
             return self._made(_tight(self.scenario(moved), tight), initial, stop, steps)[0]
 
         return add_slopes(found, [float(value) for value in given], again, apart=apart)
@@ -155,22 +157,20 @@ class Prepared:
         initial: ArrayLike | xr.Dataset | None,
         stop: Stop | None,
         steps: Steps | None = None,
-    ) -> tuple[Recording, Trajectory]:
+    ) -> tuple[RunArrays, Trajectory]:
         """Make a run, on given steps if there are any."""
         setup = Setup.of(scenario, _started(scenario, initial))
         self._check(setup.loop)
         trajectory = setup.integrate(stop=stop, steps=steps)
         motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = record(scenario, motions, trajectory, setup.method, self.record, text="")
-        reached = float(trajectory.breakpoints[-1])
         if trajectory.failure or trajectory.interrupted:
-            found.attrs["scenario"] = to_toml(scenario)
-        if trajectory.failure:
-            raise IntegrationError(reached, *setup.failure(trajectory), found.dataset())
-        if trajectory.interrupted:
-            raise Interrupted(reached, found.dataset())
-        return found, trajectory
+            reached, partial = float(trajectory.breakpoints[-1]), record(scenario, motions, setup.method, self.record)
+            if trajectory.failure:
+                raise IntegrationError(reached, *setup.failure(trajectory), partial)
+            raise Interrupted(reached, partial)
+        names = coordinates(scenario, setup.loop, motions.times)
+        attributes = attributes_of(scenario, trajectory, setup.method)
+        return RunArrays(recorded(motions, self.record), names, attributes), trajectory
 
     def simulate(
         self,
@@ -191,7 +191,7 @@ class Prepared:
         scenario = self.scenario(values)
         own = own_parts(None, None, None, initial)
         started = _started(scenario, initial)
-        return interruptible(lambda asked: run(scenario, started, own, progress=progress, stop=asked), stop).dataset()
+        return interruptible(lambda asked: run(scenario, started, own, progress=progress, stop=asked), stop)
 
     def _check(self, loop: ClosedLoop) -> None:
         """Raise unless the result of a loop has everything that is recorded."""

@@ -1,453 +1,80 @@
-"""The variables of a result, each with its unit, name and equation, computed when it is asked for."""
+"""What is recorded of a motion: variables of it, as arrays or as a Dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import cache, cached_property, partial
+from functools import cache
 from importlib import metadata
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
-from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.core.stepping.textbook import Trajectory
+from finger_pin.description.embedded import embedded
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.kinematics import Motion
-from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.state import State
-from finger_pin.simulation.account import Account, account
-from finger_pin.simulation.contact_variables import contact_coordinates, contact_values, contact_variables
-from finger_pin.simulation.energy import FINGERTIP, Flows, energies, powers, stored_names
-from finger_pin.simulation.recorded import Recording
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
 
-_JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
-_MOTOR, _TIME = ("time", "motor"), ("time",)
-#: A variable that is left out of a whole result where nothing limits tensions.
-SHORTFALL = "torque_shortfall"
+if TYPE_CHECKING:
+    import xarray as xr
+
 _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
-_STORED = {
-    "kinetic": "kinetic energy",
-    "gravity": "potential energy of gravity",
-    "passive_tendon": "elastic energy of the passive tendons",
-    "limiter": "elastic energy of the stroke limiters",
-    "joint_springs": "elastic energy of the joints' springs",
-    "tendon_spring": "elastic energy of the tendons' springs",
-    "tendon_limit": "elastic energy of the tendons' limits",
-    "coupling": "elastic energy of the couplings of joints",
-    "tendon_bristles": "elastic energy of the tendons' bristles",
-    "joint_bristles": "elastic energy of the joints' bristles",
-    "contacts": "elastic energy of contacts",
-    "objects_kinetic": "kinetic energy of free objects",
-    "objects_gravity": "potential energy of free objects",
-    "elastic_tendons": "elastic energy of the tendons on spools",
-    "gearboxes": "elastic energy of the gearboxes' bristles",
-    "rotors": "kinetic energy of the rotors",
-}
-_EXCHANGED = {
-    "actuators": "supplied by the actuators",
-    "electrical": "supplied by the motors' electronics",
-    "fingertip": "supplied by the fingertip force",
-    "motor_heat": "lost as heat in the motors' windings",
-    "gearbox_coulomb": "lost by gears sliding",
-    "gearbox_viscous": "lost in the gears' viscous friction",
-    "elastic_damping": "lost as tendons on spools stretch",
-    "palm": "supplied by what moves the palm",
-    "objects": "supplied by what moves objects",
-    "tendon_coulomb": "lost by tendons sliding",
-    "tendon_viscous": "lost in the tendons' viscous friction",
-    "tendon_micro_damping": "lost in the tendons' micro-damping",
-    "joint_coulomb": "lost by joints sliding",
-    "joint_viscous": "lost in the joints' viscous friction",
-    "joint_micro_damping": "lost in the joints' micro-damping",
-    "limiter": "lost in the stroke limiters",
-    "joint_springs": "lost in the joints' springs",
-    "contacts_impact": "lost in contacts along their normals",
-    "contacts_sliding": "lost in contacts sliding",
-    "contacts_micro_damping": "lost in the bristles of contacts",
-    "slack": "booked where a tension is cut at zero",
-    "tendon_spring_damping": "lost in the tendons' dampers",
-    "tendon_limit_limiter": "lost where tendons are at their limits",
-    "tendon_dry_friction_coulomb": "lost by tendons sliding dry",
-    "coupling_damping": "lost in the couplings of joints",
-}
+
+#: Variables by name: dimensions, of which time is the first, values and attributes.
+Recorded = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
 
 
-class Variable(NamedTuple):
-    """A variable of a result.
-
-    Attributes:
-        dims: Names of its dimensions, time first.
-        value: Returns its values from what is known of a motion.
-        units: SI.
-        long_name: In words.
-        equation: Number of its equation in the paper; empty for none.
-        frame: Whose axes its components are along: ``base``, a palm's if there is one, ``world`` or ``object``; empty
-            for what has no components.
-    """
-
-    dims: tuple[str, ...]
-    value: Callable[[Motions], Array]
-    units: str
-    long_name: str
-    equation: str = ""
-    frame: str = ""
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Unit, name, frame and equation."""
-        found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
-        return found | {"equation": f"({self.equation})"} if self.equation else found
-
-
-class Motions:
-    """A trajectory at times, and all that follows from it, computed when it is first asked for.
-
-    The signals are recomputed from the states by the evaluation that the dynamics use.
-
-    Attributes:
-        loop: The system.
-        trajectory: Its solution.
-        times: Shape (m,), s, as far as the trajectory goes.
-    """
-
-    def __init__(
-        self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
-    ) -> None:
-        """Compute nothing yet.
-
-        Args:
-            loop: The system.
-            trajectory: Its solution.
-            times: Shape (m,), in order, s.
-            names: What will be asked for, as names of `variables`; by default all.
-        """
-        self._accelerated = names is None or "joint_acceleration" in names
-        self.loop, self.trajectory = loop, trajectory
-        self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
-
-    @cached_property
-    def packed(self) -> Array:
-        """The packed states, shape (m, size)."""
-        return self.trajectory.interpolate(self.times)
-
-    @cached_property
-    def state(self) -> State:
-        """The states by name."""
-        return self.loop.finger.layout.unpack(self.packed)
-
-    @cached_property
-    def reference(self) -> ReferenceSignals:
-        """What was desired."""
-        return self.loop.reference.at(self.times)
-
-    @cached_property
-    def control(self) -> ControlSignals:
-        """What was planned."""
-        return self.signals.control
-
-    @cached_property
-    def contacts(self) -> dict[str, Array]:
-        """What contacts and free objects do."""
-        return contact_values(self.loop.finger, self.finger)
-
-    @cached_property
-    def signals(self) -> LoopSignals:
-        """Everything that the finger does."""
-        return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
-
-    @property
-    def finger(self) -> FingerSignals:
-        """What the finger does, by the names of the paper."""
-        return self.signals.finger
-
-    @cached_property
-    def motion(self) -> Motion:
-        """Fingertips, and energies of the rigid body."""
-        return self.loop.motion(self.times, self.state)
-
-    @cached_property
-    def stored(self) -> dict[str, Array]:
-        """The energies by name, J."""
-        return energies(self.loop.finger, self.finger, self.motion)
-
-    @cached_property
-    def powers(self) -> Flows:
-        """What comes in and what is lost, W."""
-        return powers(self.finger)
-
-    @cached_property
-    def account(self) -> Account:
-        """The energy account."""
-        return account(self.loop, self.trajectory, self.times, self.signals, self.motion)
-
-
-def variables(loop: ClosedLoop) -> dict[str, Variable]:
-    """Return all variables that a result of a loop can have, by name."""
-    table = {
-        "joint_position": Variable(_JOINT, lambda of: of.state.position, "rad", "joint angle"),
-        "joint_velocity": Variable(_JOINT, lambda of: of.state.velocity, "rad/s", "joint velocity"),
-        "joint_acceleration": Variable(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
-        "joint_reference": Variable(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
-        "tracking_error": Variable(
-            _JOINT, lambda of: of.reference.position - of.state.position, "rad", "desired less actual joint angle"
-        ),
-    }
-    tip = ("time", "axis") if len(loop.finger.rigid_body.tips) == 1 else ("time", "finger", "axis")
-    table |= {
-        "fingertip_position": Variable(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
-        "tendon_command": Variable(_TENDON, lambda of: of.control.tension, "N", "commanded or planned tension", "21b"),
-        "tendon_tension": Variable(
-            _TENDON,
-            lambda of: of.loop.finger.routing.tendon_tension(of.finger.tendons.strands),
-            "N",
-            "delivered tension; distal half of a passive tendon",
-            "12",
-        ),
-        "tendon_velocity": Variable(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
-        "tendon_friction": Variable(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": Variable(_TENDON, lambda of: of.state.tendon_stiction, "N", "tendon stiction force", "9a"),
-        "tendon_normal_force": Variable(
-            _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
-        ),
-        "tendon_friction_coefficient": Variable(
-            _TENDON, lambda of: of.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
-        ),
-        "tendon_curvature": Variable(
-            _TENDON, lambda of: of.finger.tendons.curvature, "rad", "total curvature of the path", "15"
-        ),
-        "joint_torque_command": Variable(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
-        "joint_torque": Variable(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
-        "joint_friction": Variable(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_stiction": Variable(_JOINT, lambda of: of.state.joint_stiction, "N m", "joint stiction torque", "9a"),
-        "joint_reaction": Variable(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
-        "limiter_torque": Variable(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": Variable(tip, _fingertip_force, "N", "force on the fingertip", "6"),
-        "spring_torque": Variable(_JOINT, lambda of: of.finger.spring_torque, "N m", "torque of the joints' springs"),
-        "external_torque": Variable(
-            _JOINT, lambda of: of.finger.external_torque, "N m", "torque of the fingertip force", "6"
-        ),
-        SHORTFALL: Variable(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
-    }
-    table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _more(loop)
-    return {name: each._replace(frame=_frame(name, each, loop)) for name, each in table.items()}
-
-
-def _frame(name: str, variable: Variable, loop: ClosedLoop) -> str:
-    """Return the frame of a variable with components: the base's by default."""
-    if not {"axis", "quaternion"} & set(variable.dims):
-        return ""
-    if name.startswith("palm_") or (name == "fingertip_position" and loop.palm is not None):
-        return "world"
-    return "object" if name == "object_angular_velocity" else "base"
-
-
-def _more(loop: ClosedLoop) -> dict[str, Variable]:
-    table = {
-        name: Variable(dims, partial(_contact, name), units, text)
-        for name, (dims, units, text) in contact_variables(loop.finger).items()
-    }
-    return table | _of_further(loop.finger.further) | _of_account(loop)
-
-
-def _contact(name: str, of: Motions) -> Array:
-    return of.contacts[name]
-
-
-def _fingertip_force(of: Motions) -> Array:
-    force = of.loop.force(of.times)
-    return np.broadcast_to(force, (len(of.times), *of.loop.fingertip_force.shape))
-
-
-def _shortfall(of: Motions) -> Array:
-    missing = of.control.shortfall
-    return np.zeros_like(of.state.position) if missing is None else missing
-
-
-def _of_palm(loop: ClosedLoop) -> dict[str, Variable]:
-    if loop.palm is None:
-        return {}
-    path = loop.palm
-
-    def turned(of: Motions) -> Array:
-        return np.array([pin.Quaternion(each).coeffs() for each in path.place(of.times)[1]])
-
-    text = "rotation of the palm to the world, x, y, z, w"
-    return {
-        "palm_position": Variable(
-            ("time", "axis"), lambda of: path.place(of.times)[0], "m", "place of the palm in the world"
-        ),
-        "palm_orientation": Variable(("time", "quaternion"), turned, "1", text),
-    }
-
-
-def _of_motors(loop: ClosedLoop) -> dict[str, Variable]:
-    if not loop.finger.actuators.names:
-        return {}
-
-    def moved(of: Motions, name: str) -> Array:
-        return np.asarray(getattr(of.state, name))
-
-    def driven(of: Motions, name: str) -> Array:
-        return np.asarray(getattr(of.finger.motors, name))
-
-    text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
-    table = {
-        name: Variable(_MOTOR, partial(moved if inner == name else driven, name=inner), units, long_name, equation)
-        for name, inner, units, long_name, equation in (
-            ("motor_position", "motor_position", "rad", "angle of the spool", ""),
-            ("motor_velocity", "motor_velocity", "rad/s", "velocity of the spool", ""),
-            ("motor_current", "current", "A", "current", ""),
-            ("motor_voltage", "voltage", "V", "voltage", ""),
-            ("motor_torque", "torque", "N m", "torque of the motor, at the spool", ""),
-            ("gearbox_friction", "friction", "N m", "friction torque of the gearbox", "9c"),
-            ("gearbox_stiction", "gearbox_stiction", "N m", "its stiction torque", "9a"),
-            ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
-        )
-    }
-    return table | {"spool_tension": Variable(_TENDON, lambda of: of.finger.tendons.entering, "N", text)}
-
-
-def _of_passive(loop: ClosedLoop) -> dict[str, Variable]:
-    count, actuated = loop.finger.routing.passive, loop.finger.routing.actuated
-    if not count:
-        return {}
-    # One passive tendon, the common case, needs no dimension of its own.
-    single = count == 1
-    dims = ("time",) if single else _PASSIVE
-
-    def shaped(values: Array) -> Array:
-        return values[:, 0] if single else values
-
-    def proximal(of: Motions) -> Array:
-        return shaped(of.finger.tendons.strands[..., actuated::2])
-
-    return {
-        "passive_tension_proximal": Variable(dims, proximal, "N", "tension of the proximal half", "12"),
-        "passive_position": Variable(
-            dims, lambda of: shaped(of.state.passive_position), "m", "position of the lumped mass", "13"
-        ),
-        "passive_velocity": Variable(
-            dims, lambda of: shaped(of.state.passive_velocity), "m/s", "velocity of the lumped mass", "13"
-        ),
-    }
-
-
-def _of_further(tables: tuple[Rows, ...]) -> dict[str, Variable]:
-    """Return what rows of a user's own see and show, by table."""
-
-    def seen(of: Motions, group: str, name: str) -> Array:
-        found = of.finger.mechanism.rows[group]
-        return np.asarray(getattr(found.row, name))
-
-    def exerted(of: Motions, group: str) -> Array:
-        return of.finger.mechanism.rows[group].force
-
-    def shown(of: Motions, group: str, index: int) -> Array:
-        return of.finger.mechanism.rows[group].signals[index]
-
-    found: dict[str, Variable] = {}
-    for table in tables:
-        group = table.group
-        values: dict[str, Callable[[Motions], Array]] = {"force": partial(exerted, group=group)}
-        values |= {name: partial(seen, group=group, name=name) for name in ("length", "speed")}
-        values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
-        if np.any(table.channels >= 0):
-            values["input"] = partial(seen, group=group, name="command")
-        if table.law.scale is not None:
-            values["state"] = partial(seen, group=group, name="state")
-        for name, value in values.items():
-            found[f"{group}_{name}"] = Variable(("time", group), value, "SI", f"{name} of {table.law.name}")
-    return found
-
-
-def _of_account(loop: ClosedLoop) -> dict[str, Variable]:
-    def stored(of: Motions, name: str) -> Array:
-        return of.stored[name]
-
-    def power(of: Motions, name: str) -> Array:
-        return of.powers[name]
-
-    def work(of: Motions, name: str) -> Array:
-        return of.account.works[name]
-
-    books = loop.finger.mechanism.books
-    names = (*books.powers, FINGERTIP)
-    table = {}
-    for name in stored_names(loop.finger):
-        text = _STORED.get(name, f"energy stored in {name}")
-        table[f"energy_{name}"] = Variable(_TIME, partial(stored, name=name), "J", text)
-    for name in sorted(names, key=[*_EXCHANGED, *names].index):
-        other = f"supplied by {name}" if name in books.supplies else f"lost in {name}"
-        text = _EXCHANGED.get(name, other)
-        table[f"power_{name}"] = Variable(_TIME, partial(power, name=name), "W", f"power {text}")
-        table[f"energy_exchanged_{name}"] = Variable(_TIME, partial(work, name=name), "J", f"energy {text}")
-    text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
-    table["energy_residual"] = Variable(_TIME, lambda of: of.account.residual, "J", text)
-    return table
-
-
-def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str, Any]:
-    """Return the coordinates of a result."""
-    routing, finger = loop.finger.routing, loop.finger
-    found: dict[str, Any] = {
-        "time": ("time", times, {"units": "s", "long_name": "time"}),
-        "joint": ("joint", list(routing.joints), {"long_name": "joint"}),
-        "tendon": ("tendon", list(routing.tendons), {"long_name": "tendon"}),
-        "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
-    }
-    found |= {table.group: list(table.names) for table in finger.further} | contact_coordinates(finger)
-    if scenario.hand is not None and len(scenario.hand.fingers) > 1:
-        found["finger"] = list(scenario.hand.fingers)
-    if routing.passive > 1:
-        found["passive_tendon"] = list(routing.passive_names)
-    if finger.actuators.names:
-        found["motor"] = ("motor", list(finger.actuators.names), {"long_name": "motor"})
-    return found
-
-
-def record(
-    scenario: Scenario,
-    motions: Motions,
-    trajectory: Trajectory,
-    method: str,
-    names: Sequence[str] | None = None,
-    text: str | None = None,
-) -> Recording:
+def recorded(motions: Motions, names: Sequence[str] | None = None) -> Recorded:
     """Return variables of a motion, by default all; only what they need is computed.
 
     Args:
-        scenario: What was simulated.
         motions: The motion at the times that are recorded.
-        trajectory: Its solution.
-        method: Its integrator.
         names: Of the variables.
-        text: The scenario's TOML; written anew unless it is given.
     """
     table = variables(motions.loop)
     if names is None and motions.control.shortfall is None:
         del table[SHORTFALL]
     chosen = table if names is None else {name: table[name] for name in names}
-    values = {name: (each.dims, np.asarray(each.value(motions)), each.attributes) for name, each in chosen.items()}
-    attributes = _attributes(scenario, to_toml(scenario) if text is None else text, trajectory, method)
-    return Recording(values, coordinates(scenario, motions.loop, motions.times), attributes)
+    # A motion at the edge of what numbers hold has energies beyond it: that is told apart from this.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return {name: (each.dims, np.asarray(each.value(motions)), each.attributes) for name, each in chosen.items()}
 
 
-def _attributes(scenario: Scenario, text: str, trajectory: Trajectory, method: str) -> dict[str, Any]:
-    settings = scenario.simulation
-    statistics: Mapping[str, Any] = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
+def record(
+    scenario: Scenario,
+    motions: Motions,
+    method: str,
+    names: Sequence[str] | None = None,
+    text: str | None = None,
+) -> xr.Dataset:
+    """Return a motion as a Dataset.
+
+    Args:
+        scenario: What was simulated.
+        motions: The motion at the times that are recorded.
+        method: Its integrator.
+        names: Of the variables; by default all.
+        text: The scenario's TOML; written anew unless it is given.
+    """
+    import xarray as xr
+
+    found = recorded(motions, names)
+    texts = {"scenario": to_toml(scenario) if text is None else text, **embedded(scenario)}
+    attributes = {**attributes_of(scenario, motions.trajectory, method), **texts}
+    return xr.Dataset(found, coordinates(scenario, motions.loop, motions.times), attributes)
+
+
+def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
+    """Return what a result says of its run: how far it went, by which method, and what it took."""
+    statistics = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,
-        "scenario": text,
         "method": method,
-        "rtol": settings.rtol,
-        "atol_scale": settings.atol_scale,
+        "rtol": scenario.simulation.rtol,
+        "atol_scale": scenario.simulation.atol_scale,
         "end_time": float(trajectory.breakpoints[-1]),
         **statistics,
         **_versions(),

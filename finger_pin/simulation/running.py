@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,8 +47,11 @@ from finger_pin.simulation.accuracy import (
     too_stiff,
 )
 from finger_pin.simulation.initial_state import check_motors
-from finger_pin.simulation.recorded import Recording
-from finger_pin.simulation.recording import Motions, record
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.recording import record
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
 # Where tolerances are tight already, it is rounding that an integrator cannot get below.
@@ -177,8 +181,8 @@ def run(
     progress: Callable[[float], None] | None = None,
     observe: Callable[[float, LoopSignals], None] | None = None,
     stop: Stop | None = None,
-) -> Recording:
-    """Simulate as `simulate` does, and return plain arrays: to import xarray takes longer than to simulate.
+) -> xr.Dataset:
+    """Simulate as `simulate` does, given the loop; Ctrl-C is left to the caller.
 
     Args:
         scenario: What to simulate.
@@ -209,11 +213,8 @@ def run(
 
     text = to_toml(scenario)
 
-    def recorded(found: Trajectory) -> Recording:
-        # A motion at the edge of what numbers hold has energies beyond it: that is reported below, in one line.
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            motions = Motions(loop, found, scenario.sample_times())
-            return record(scenario, motions, found, setup.method, text=text)
+    def recorded(found: Trajectory) -> xr.Dataset:
+        return record(scenario, Motions(loop, found, scenario.sample_times()), setup.method, text=text)
 
     first = setup.integrate(watch, stop, chunk=CHUNK if observe is None else _CHUNK_OBSERVED)
     margin = _margin(scenario, loop, own)
@@ -221,31 +222,31 @@ def run(
     if close:
         warnings.warn(close, SelfLockingWarning, stacklevel=5)
     closed = close_account(scenario, first, repeated, recorded)
-    trajectory, recording = closed.trajectory, closed.result
+    trajectory, result = closed.trajectory, closed.result
     reached = float(trajectory.breakpoints[-1])
     error, inaccurate = estimate_error(scenario, closed, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
-    inaccurate = inaccurate or too_stiff(recording, loop.finger, scenario.simulation.atol_scale)
+    inaccurate = inaccurate or too_stiff(result, loop.finger, scenario.simulation.atol_scale)
     if inaccurate:
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=5)
     if margin is not None:
-        recording.attrs["self_locking_margin"] = margin
+        result.attrs["self_locking_margin"] = margin
     if np.isfinite(error):
-        recording.attrs["estimated_error"] = error
+        result.attrs["estimated_error"] = error
     gap = "" if trajectory.failure else open_account(closed.left)
     told = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
     told["own"] = own
-    recording.attrs |= {name: text for name, text in told.items() if text}
-    excess = finite_part(recording)
+    result.attrs |= {name: text for name, text in told.items() if text}
+    result, excess = finite_part(result)
     if trajectory.failure:
         reason, advice = setup.failure(trajectory, slow)
-        raise IntegrationError(reached, reason, advice, recording.dataset())
+        raise IntegrationError(reached, reason, advice, result)
     if excess:
-        reason, reached = f"{excess} is not finite after that", recording.attrs["end_time"]
-        raise IntegrationError(reached, reason, _ADVICE, recording.dataset())
+        reason, reached = f"{excess} is not finite after that", result.attrs["end_time"]
+        raise IntegrationError(reached, reason, _ADVICE, result)
     if trajectory.interrupted:
-        raise Interrupted(reached, recording.dataset())
-    return recording
+        raise Interrupted(reached, result)
+    return result
 
 
 def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:

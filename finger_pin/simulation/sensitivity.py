@@ -17,7 +17,7 @@ import numpy as np
 from finger_pin.core.stepping.stepper import in_threads
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.recorded import Recording
+from finger_pin.simulation.run_arrays import RunArrays
 
 #: Loosest tolerances of a run that is differentiated, on common steps and on steps of its own.
 TIGHT, TIGHTER = 1e-8, 1e-9
@@ -26,11 +26,11 @@ _CHANGE, _LARGE = 1e-8, 1e-4
 # A signal that changes so much more than its number does, both of their size, says nothing of the number any more.
 _LOST = 1e4
 
-Again = Callable[[Sequence[float]], Recording]
+Again = Callable[[Sequence[float]], RunArrays]
 
 
-def add_slopes(run: Recording, values: Sequence[float], again: Again, *, apart: bool) -> Recording:
-    """Put the derivatives of all variables into a run, as `Recording.slopes`, and return it.
+def add_slopes(run: RunArrays, values: Sequence[float], again: Again, *, apart: bool) -> RunArrays:
+    """Put the derivatives of all variables into a run, as `RunArrays.slopes`, and return it.
 
     Args:
         run: What is to have them.
@@ -39,7 +39,7 @@ def add_slopes(run: Recording, values: Sequence[float], again: Again, *, apart: 
         apart: Whether on steps of their own.
     """
 
-    def moved(k: int, change: float) -> tuple[float, Recording]:
+    def moved(k: int, change: float) -> tuple[float, RunArrays]:
         other = list(values)
         other[k] += change * (abs(values[k]) or 1.0)
         return other[k], again(other)
@@ -66,7 +66,7 @@ def add_slopes(run: Recording, values: Sequence[float], again: Again, *, apart: 
     return run
 
 
-def _lost(run: Recording, sizes: Array) -> float:
+def _lost(run: RunArrays, sizes: Array) -> float:
     """Return the time from which on some number sways the motion beyond all measure, s; infinite if none does."""
     first = np.inf
     for name, slope in run.slopes.items():

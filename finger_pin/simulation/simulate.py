@@ -93,6 +93,4 @@ def simulate(
         loop = replace(loop, start=packed_state(initial, loop.finger))
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
-    return interruptible(
-        lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop
-    ).dataset()
+    return interruptible(lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop)

@@ -25,7 +25,8 @@ from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import check_memory, left_open, open_account
-from finger_pin.simulation.recording import Motions, record
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.recording import record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,15 +110,15 @@ class Told:
         times = knots[0] + scenario.sample_times()
         near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
         times = np.where(np.abs(near - times) < _SAME, near, times)
-        result = record(scenario, Motions(loop, trajectory, times), trajectory, str(settings["method"]))
+        result = record(scenario, Motions(loop, trajectory, times), str(settings["method"]))
         result.attrs["own"] = "loop"
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])
-            raise IntegrationError(reached, trajectory.failure, "fewer steps", result.dataset())
+            raise IntegrationError(reached, trajectory.failure, "fewer steps", result)
         gap = open_account(left_open(result))
         if gap:
             result.attrs["account"] = gap
-        return result.dataset()
+        return result
 
 
 class _Repeated:

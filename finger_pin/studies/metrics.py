@@ -21,7 +21,10 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism import joint_friction, tendons
+from finger_pin.mechanism.books import LOST
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.energy import entries
 from finger_pin.simulation.simulate import simulate
 from finger_pin.studies.executing import quiet
 from finger_pin.studies.response import (
@@ -119,20 +122,18 @@ def tension_mean(run: Run) -> float:
 
 
 def losses(run: Run) -> float:
-    """Return what friction, limiters, springs, gears and tendons that stretch took, J."""
-    further = ("limiter", "joint_springs", "gearbox_coulomb", "gearbox_viscous", "elastic_damping")
-    rest = sum(_final(run.result, name) for name in further if f"energy_exchanged_{name}" in run.result)
-    return losses_tendons(run) + losses_joints(run) + rest
+    """Return all energy that was lost but the heat in the windings, J, which is a metric of its own."""
+    return sum(float(each[-1]) for each in entries(run.result, LOST).values()) - heat(run)
 
 
 def losses_tendons(run: Run) -> float:
     """Return what the friction of the tendons took, J."""
-    return sum(_final(run.result, f"tendon_{kind}") for kind in ("coulomb", "viscous", "micro_damping"))
+    return sum(_final(run.result, each.name) for each in tendons.LOSSES)
 
 
 def losses_joints(run: Run) -> float:
     """Return what the friction of the joints took, J."""
-    return sum(_final(run.result, f"joint_{kind}") for kind in ("coulomb", "viscous", "micro_damping"))
+    return sum(_final(run.result, each.name) for each in joint_friction.LOSSES)
 
 
 def slack_time(run: Run) -> float:
@@ -213,7 +214,7 @@ METRICS = {
         Metric("tracking_peak", "rad", "largest tracking error of any joint", tracking_peak),
         Metric("tension_peak", "N", "largest tension at either end of any tendon", tension_peak),
         Metric("tension_mean", "N", "delivered tension, mean over time and tendons", tension_mean),
-        Metric("losses", "J", "energy lost to friction and limiters", losses),
+        Metric("losses", "J", "energy lost, but for the heat in windings", losses),
         Metric("losses_tendons", "J", "energy lost to the friction of the tendons", losses_tendons),
         Metric("losses_joints", "J", "energy lost to the friction of the joints", losses_joints),
         Metric("slack_time", "s", "time with a slack tendon", slack_time),

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger_pin.description.loading import scenario_of
-from finger_pin.views.account import account
-from finger_pin.views.trees import is_tree
+from finger_pin.description.embedded import described
+from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
+from finger_pin.simulation.energy import entries
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,8 @@ def summarize(result: xr.Dataset) -> str:
         result: What `simulate` returned, or what an exception of it carries, whole or partial.
     """
     head = [*_head(result), *_own(result), *_warnings(result)]
-    motion = [_joints(result), *_actuators(result)] if is_tree(result) else [_tracking(result)]
+    tree = described(result.attrs).finger.tree
+    motion = [_tracking(result)] if tree is None else [_joints(result), *_actuators(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
     blocks = [
         head,
@@ -151,7 +152,7 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
     """Return for how long every tendon on a spool has hung slack, s; by tendon, as the samples have it."""
     tension = result["spool_tension"]
     time = np.asarray(result["time"])
-    pulled = scenario_of(result.attrs).finger.actuators.values()
+    pulled = described(result.attrs).finger.actuators.values()
     steps = np.gradient(time) if len(time) > 1 else np.zeros(len(time))
     return {
         name: float(np.sum(steps * (np.asarray(tension.sel(tendon=name)) <= 0.0)))
@@ -161,13 +162,15 @@ def slack_time(result: xr.Dataset) -> dict[str, float]:
 
 
 def _energy(result: xr.Dataset) -> list[str]:
-    energies = account(result)
-    stored = sum(_final(values) - float(values[0]) for values in energies.stored.values())
-    came_in = sum(max(value, 0.0) for value in (*map(_final, energies.supplied.values()), -stored))
-    exchanged = (*energies.supplied.values(), *energies.lost.values())
-    entries = [(_label(values), _final(values)) for values in exchanged]
-    entries += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
-    rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in entries]
+    stored = sum(_final(each) - float(each[0]) for each in entries(result, STORED).values())
+    came_in = sum(max(value, 0.0) for value in (*map(_final, entries(result, SUPPLIED).values()), -stored))
+    named = [
+        (f"{kind}: {each.attrs['label']}", _final(each))
+        for kind in (SUPPLIED, LOST)
+        for each in entries(result, kind).values()
+    ]
+    named += [("stored, end less start", stored), ("residual, not accounted for", _final(result["energy_residual"]))]
+    rows = [(label, f"{1e3 * value:.4g}", _share(value, came_in)) for label, value in named]
     return ["Energy, and its share of what was supplied or drawn from store", *table(("", "mJ", "share"), rows)]
 
 
@@ -197,12 +200,8 @@ def _cost(result: xr.Dataset) -> list[str]:
     ]
 
 
-def _final(values: xr.DataArray) -> float:
+def _final(values: xr.DataArray | xr.Variable) -> float:
     return float(values[-1])
-
-
-def _label(values: xr.DataArray) -> str:
-    return str(values.attrs["long_name"]).removeprefix("energy ")
 
 
 def _range(name: str, values: Array) -> tuple[str, str, str]:

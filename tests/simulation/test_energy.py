@@ -48,6 +48,18 @@ def test_the_account_of_the_main_job_closes(fig6):
     assert float(abs(fig6.energy_residual).max()) < 1e-5 * float(fig6.energy_exchanged_actuators.max())
 
 
+@pytest.mark.parametrize("name", ["servo", "grasp"])
+def test_what_energies_say_of_themselves_adds_up_to_the_residual(name):
+    result = fp.simulate(fp.load_scenario(name, {"simulation.duration": 0.02}))
+    signs = {"stored": 1.0, "supplied": -1.0, "lost": 1.0}
+    booked = [
+        each - each[0].values for each in result.values() if each.attrs["units"] == "J" and "account" in each.attrs
+    ]
+    left = sum(signs[each.attrs["account"]] * each for each in booked)
+    most = max(float(abs(each).max()) for each in booked)
+    np.testing.assert_allclose(left, result.energy_residual, rtol=0.0, atol=1e-12 * most)
+
+
 def test_the_account_of_the_hard_case_closes():
     result = fp.simulate(fp.load_scenario("stick_slip"))
     assert float(abs(result.energy_residual).max()) < 1e-5 * float(result.energy_exchanged_actuators.max())

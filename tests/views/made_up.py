@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import finger_pin as fp
+from finger_pin.description.embedded import embedded
+
 STORED = ("kinetic", "gravity", "passive_tendon", "limiter", "joint_springs", "tendon_bristles", "joint_bristles")
 LOST = (
     "tendon_coulomb",
@@ -16,6 +19,11 @@ LOST = (
     "joint_springs",
     "slack",
 )
+
+
+def booked(values, kind, label):
+    """An energy over time as it stands in a result's account."""
+    return "time", values, {"units": "J", "account": kind, "label": label}
 
 
 def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
@@ -48,14 +56,14 @@ def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
     total = np.zeros(samples)
     for name in STORED:
         values = 0.0 * total if name == "limiter" else 1e-3 * np.abs(noise(samples))
-        variables[f"energy_{name}"] = ("time", values)
+        variables[f"energy_{name}"] = booked(values, "stored", name)
         total = total + values - values[0]
     for name in LOST:
         values = 0.0 * total if name == "slack" else 1e-3 * np.cumsum(random.random(samples)) / samples
-        variables[f"energy_exchanged_{name}"] = ("time", values, {"long_name": "energy lost"})
+        variables[f"energy_exchanged_{name}"] = booked(values, "lost", name)
         total = total + values
-    variables["energy_exchanged_actuators"] = ("time", total, {"long_name": "energy supplied by the actuators"})
-    variables["energy_exchanged_fingertip"] = ("time", 0.0 * total, {"long_name": "energy supplied by the force"})
+    variables["energy_exchanged_actuators"] = booked(total, "supplied", "actuators")
+    variables["energy_exchanged_fingertip"] = booked(0.0 * total, "supplied", "force")
     variables["energy_residual"] = ("time", 1e-12 * noise(samples))
     names = [f"T{index + 1}" for index in range(tendons)]
     coordinates = {
@@ -65,7 +73,7 @@ def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
     }
     if passive > 1:
         coordinates["passive_tendon"] = names[actuated:]
-    return xr.Dataset(variables, coordinates)
+    return xr.Dataset(variables, coordinates, embedded(fp.load_scenario("fig6")))
 
 
 SIZES = {

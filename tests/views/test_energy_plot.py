@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_up import LOST, SIZES, STORED, assert_shows, columns, lines, synthetic
+from made_up import LOST, SIZES, STORED, assert_shows, booked, columns, lines, synthetic
 from matplotlib.collections import PolyCollection
 
 from finger_pin.views import plots
@@ -30,7 +30,7 @@ def test_energy_shows_what_is_stored_supplied_and_lost(size):
     for area, height in zip(areas.values(), [*level, max(level[-1], supplied[-1])], strict=True):
         x, y = area.get_paths()[0].vertices.T
         assert np.isclose(y[x == time[-1]], 1e3 * height).any()
-    assert "tensions cut at zero" not in areas and list(areas)[-1] == "put into store"
+    assert "slack" not in areas and list(areas)[-1] == "put into store"
     assert residual.get_yscale() == "log"
     worst = np.abs(result["energy_residual"].values).max() / np.abs(supplied).max()
     assert residual.get_lines()[0].get_ydata().max() == pytest.approx(worst)
@@ -39,9 +39,9 @@ def test_energy_shows_what_is_stored_supplied_and_lost(size):
 def test_what_rows_of_ones_own_store_lose_and_supply_is_in_the_account():
     result, bare = synthetic(), synthetic()
     own = 1e-2 * np.linspace(0.0, 1.0, result.sizes["time"])
-    result["energy_band"] = "time", own
-    result["energy_exchanged_band_damping"] = "time", own, {"long_name": "energy lost in band_damping"}
-    result["energy_exchanged_band_pump"] = "time", 2.0 * own, {"long_name": "energy supplied by band_pump"}
+    result["energy_band"] = booked(own, "stored", "band")
+    result["energy_exchanged_band_damping"] = booked(own, "lost", "band damping")
+    result["energy_exchanged_band_pump"] = booked(2.0 * own, "supplied", "band pump")
     left, (balance, _) = columns(plots.plot_energy(result))
     assert_shows(
         next(axes for axes in left if "band" in axes.get_ylabel()).get_lines()[0], result.time.values, 1e3 * own

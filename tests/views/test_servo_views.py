@@ -42,7 +42,7 @@ def test_the_summary_tells_for_how_long_a_tendon_hung_slack_at_its_spool(result)
 
 def test_what_motors_supply_counts_as_supplied(result):
     supplied = float(result["energy_exchanged_electrical"][-1])
-    assert row(result, "supplied by the motors' electronics")[0] == pytest.approx(1e3 * supplied, rel=1e-3)
+    assert row(result, "supplied: motors' electronics")[0] == pytest.approx(1e3 * supplied, rel=1e-3)
     assert row(result, "residual, not accounted for")[0] == pytest.approx(
         1e3 * float(result.energy_residual[-1]), rel=1e-3
     )

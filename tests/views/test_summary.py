@@ -61,7 +61,7 @@ def test_the_shares_of_the_energy_account_add_up(result):
     gone = sum(share for name, share in shares.items() if not name.startswith("supplied"))
     assert supplied == pytest.approx(gone, abs=0.05)
     assert abs(shares["residual, not accounted for"]) < 0.1
-    assert {"lost by tendons sliding", "lost by joints sliding", "stored, end less start"} <= set(shares)
+    assert {"lost: tendons sliding", "lost: joints sliding", "stored, end less start"} <= set(shares)
 
 
 def test_the_summary_tells_the_cost(result):

@@ -15,9 +15,11 @@ from finger_pin.description.loading import read_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.simulation.recorded import Recording as Arrays
-from finger_pin.simulation.recording import Motions, record
+from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.recording import recorded
+from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.running import Setup, Steps
+from finger_pin.simulation.variables import coordinates
 from finger_pin.studies.identification.problem import At, Own, own_number
 from finger_pin.studies.identification.recordings import Recording
 
@@ -152,15 +154,14 @@ class RecordedMotion:
             found.append(np.asarray(scale * self._one(seen[delay], key) + offset))
         return found
 
-    def _seen(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> Arrays:
+    def _seen(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
         """Return the variables of the outputs with a delay, at the instants that they are of."""
         names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
         motions = Motions(setup.loop, trajectory, times, tuple(names))
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return record(setup.scenario, motions, trajectory, setup.method, tuple(names))
+        return RunArrays(recorded(motions, tuple(names)), coordinates(setup.scenario, setup.loop, times), {})
 
-    def _one(self, found: Arrays, name: str) -> Array:
+    def _one(self, found: RunArrays, name: str) -> Array:
         """Return one column of a variable, by its labels."""
         variable, _, label = name.partition(".")
         values, (dims, *_) = found[variable], found.variables[variable]

@@ -12,7 +12,7 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.prepared import prepare
-from finger_pin.simulation.recorded import Recording
+from finger_pin.simulation.run_arrays import RunArrays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -84,7 +84,7 @@ def propose(
     )
 
 
-def _slopes(run: Recording, output: str) -> Array:
+def _slopes(run: RunArrays, output: str) -> Array:
     """Return the derivatives of an output by the parameters, shape (p, m)."""
     variable, _, label = output.partition(".")
     slopes, dims = run.slopes[variable], run.variables[variable][0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.views.account import account
+from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
+from finger_pin.simulation.energy import entries
 from finger_pin.views.plots.lines import shade, trace
 from finger_pin.views.plots.panels import labelled, legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import (
@@ -32,48 +34,12 @@ from finger_pin.views.plots.style import (
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
 
-_STORED = {
-    "kinetic": "kinetic",
-    "gravity": "gravity",
-    "passive_tendon": "passive tendons",
-    "limiter": "limiters",
-    "joint_springs": "joints' springs",
-    "tendon_spring": "tendons' springs",
-    "tendon_limit": "tendons' limits",
-    "coupling": "couplings",
-    "tendon_bristles": "tendon bristles",
-    "joint_bristles": "joint bristles",
-    "contacts": "contacts",
-    "objects_kinetic": "objects, kinetic",
-    "objects_gravity": "objects, gravity",
-    "rotors": "rotors",
-    "elastic_tendons": "tendons on spools",
-    "gearboxes": "gear bristles",
-}
-_LOST = {
-    "tendon_coulomb": ("tendons sliding", VERMILLION),
-    "tendon_viscous": ("tendons viscous", ORANGE),
-    "tendon_micro_damping": ("tendons' micro-damping", YELLOW),
-    "joint_coulomb": ("joints sliding", BLUE),
-    "joint_viscous": ("joints viscous", SKY),
-    "joint_micro_damping": ("joints' micro-damping", BLACK),
-    "limiter": ("stroke limiters", GREEN),
-    "joint_springs": ("joints' springs", "saddlebrown"),
-    "slack": ("tensions cut at zero", PURPLE),
-    "contacts_impact": ("contacts, impact", "darkcyan"),
-    "contacts_sliding": ("contacts sliding", "deeppink"),
-    "contacts_micro_damping": ("contacts' bristles", "tan"),
-    "motor_heat": ("heat in windings", "firebrick"),
-    "gearbox_coulomb": ("gears sliding", "slategrey"),
-    "gearbox_viscous": ("gears viscous", "lightsteelblue"),
-    "elastic_damping": ("tendons stretching", "olive"),
-    "tendon_spring_damping": ("tendons' dampers", "yellowgreen"),
-    "tendon_limit_limiter": ("tendons' limits", "darkolivegreen"),
-    "tendon_dry_friction_coulomb": ("tendons sliding dry", "sienna"),
-    "coupling_damping": ("couplings", "mediumpurple"),
-}
-#: Of what has no colour of its own: rows that a user has added.
-_OTHER = "rosybrown"
+#: Of losses, in their order; they begin anew where there are more.
+_COLOURS = (
+    *(VERMILLION, ORANGE, YELLOW, PURPLE, BLUE, SKY, BLACK, GREEN),
+    *("saddlebrown", "darkcyan", "deeppink", "tan", "firebrick", "slategrey", "lightsteelblue", "olive"),
+    *("yellowgreen", "darkolivegreen", "sienna", "mediumpurple", "rosybrown"),
+)
 _MILLI = 1e3
 
 
@@ -91,33 +57,30 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         titles: Whether panels have titles.
     """
     time = result["time"].values
-    energies = account(result)
-    order = sorted(energies.stored, key=[*_STORED, *energies.stored].index)
-    stored = {name: energies.stored[name].values for name in order}
-    shown = {name: values for name, values in stored.items() if np.any(values) or name == "kinetic"}
-    supplied = np.sum([each.values for each in energies.supplied.values()], axis=0)
+    stored, coming, lost = (entries(result, kind) for kind in (STORED, SUPPLIED, LOST))
+    # There is always one panel: that of the kinetic energy, which comes first.
+    shown = [each for index, each in enumerate(stored.values()) if np.any(each.values) or not index]
+    supplied = np.sum([each.values for each in coming.values()], axis=0)
     figure, (left, right) = sheet([(5.1, max(6.6, 1.35 * len(shown))), (5.9, 6.6)], width, titles)
-    strips = stack(left, [labelled(_STORED.get(name, name), "mJ") for name in shown])
+    strips = stack(left, [labelled(each.attrs["label"], "mJ") for each in shown])
     title(strips[0], "(a) stored energy")
-    for axes, values in zip(strips, shown.values(), strict=True):
-        trace(axes, time, _MILLI * values, color=BLUE, linewidth=thin())
+    for axes, energy in zip(strips, shown, strict=True):
+        trace(axes, time, _MILLI * energy.values, color=BLUE, linewidth=thin())
     labels = ["energy (mJ)", "|residual| / supplied"]
     above, below = stack(right, labels, heights=[2.2, 1.0])
-    lost = {name: each.values for name, each in energies.lost.items()}
-    _balance(above, time, supplied, lost, np.asarray(sum(stored.values())))
+    _balance(above, time, supplied, lost, np.sum([each.values for each in stored.values()], axis=0))
     handles = above.get_legend_handles_labels()[0]
     legend(right, [handles[-1], *handles[-2::-1]])
     _residual(below, result, supplied)
     return figure
 
 
-def _balance(axes: Axes, time: Array, supplied: Array, lost: dict[str, Array], stored: Array) -> None:
+def _balance(axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array) -> None:
     level = np.zeros(len(time))
-    for name in sorted(lost, key=[*_LOST, *lost].index):
-        label, look = _LOST.get(name, (name.replace("_", " "), _OTHER))
-        if np.any(lost[name]):
-            above = level + _MILLI * lost[name]
-            shade(axes, time, level, above, color=look, alpha=0.8, label=label)
+    for each, look in zip(lost.values(), cycle(_COLOURS), strict=False):
+        if np.any(each.values):
+            above = level + _MILLI * each.values
+            shade(axes, time, level, above, color=look, alpha=0.8, label=each.attrs["label"])
             level = above
     change = _MILLI * (stored - stored[0])
     shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")

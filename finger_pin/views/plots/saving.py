@@ -9,6 +9,7 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.description.embedded import described
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.views.plots.contact import plot_contact
@@ -19,7 +20,6 @@ from finger_pin.views.plots.hand_motion import plot_hand_motion
 from finger_pin.views.plots.losses import plot_losses
 from finger_pin.views.plots.servo import plot_servo
 from finger_pin.views.plots.style import Width, settings
-from finger_pin.views.trees import is_tree
 
 FORMATS = ("png", "pdf", "svg")
 #: What is drawn of every result of a finger, and of a hand.
@@ -29,7 +29,9 @@ FIGURES_OF_TREES = {"motion": plot_hand_motion, "energy": plot_energy}
 
 def figures_of(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
     """Return the figures that are drawn of a result, by name."""
-    figures: dict[str, Callable[..., Figure]] = dict(FIGURES_OF_TREES if is_tree(result) else FIGURES)
+    figures: dict[str, Callable[..., Figure]] = dict(
+        FIGURES if described(result.attrs).finger.tree is None else FIGURES_OF_TREES
+    )
     if "convergence_difference" in result:
         figures["convergence"] = plot_convergence
     if "contact_force" in result:

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.description.loading import scenario_of
+from finger_pin.description.embedded import described
 from finger_pin.description.parameters import Crossing
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
@@ -44,15 +44,15 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     """
     if "motor" not in result.dims:
         raise InputError("result", "is of a finger without servos")
-    described = scenario_of(result.attrs).finger
-    actuators = described.actuators
+    finger = described(result.attrs).finger
+    actuators = finger.actuators
     tendons = [name for actuator in actuators.values() for name in actuator.tendons]
     height = max(6.6, 1.7 * len(tendons))
     figure, (left, middle, right) = sheet([(4.3, height), (4.8, height), (4.9, height)], width, titles)
     loops: list[Axes] = list(left.subplots(len(actuators), 1, squeeze=False)[:, 0])
     title(loops[0], "(a) joints against spools")
     for axes, (name, actuator) in zip(loops, actuators.items(), strict=True):
-        _loop(axes, result, name, [described.tendons[each].crossings for each in actuator.tendons])
+        _loop(axes, result, name, [finger.tendons[each].crossings for each in actuator.tendons])
     loops[-1].set_xlabel("angle of the spool (°)")
     shown = {line.get_label(): line for axes in loops for line in axes.get_lines()}
     legend(left, list(shown.values()))

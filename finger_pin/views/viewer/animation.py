@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.embedded import described
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -27,8 +26,6 @@ from finger_pin.views.viewer.scene_objects import SceneObjects
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.simulation.recorded import Recording
-
 Indices = NDArray[np.intp]
 
 #: Frames per second of motion, and most frames of one page: a longer motion gets fewer per second.
@@ -38,7 +35,7 @@ _POSITIONS_IN_VIEW = 40
 
 
 def write_animation(
-    result: xr.Dataset | Recording,
+    result: xr.Dataset,
     path: str | os.PathLike[str],
     *,
     forces: ForcePolytope | None = None,
@@ -69,7 +66,7 @@ def write_animation(
 
 
 def animation_page(
-    result: xr.Dataset | Recording,
+    result: xr.Dataset,
     forces: ForcePolytope | None = None,
     ghost: xr.Dataset | None = None,
     finger: Finger | None = None,
@@ -142,7 +139,7 @@ class Playback:
         return Ghost(self.scene, self.title, self.scene.geometry.poses(position))
 
     @classmethod
-    def of(cls, result: xr.Dataset | Recording, rate: float = FRAME_RATE, finger: Finger | None = None) -> Playback:
+    def of(cls, result: xr.Dataset, rate: float = FRAME_RATE, finger: Finger | None = None) -> Playback:
         """Choose the frames of a result.
 
         Args:
@@ -153,10 +150,7 @@ class Playback:
         Raises:
             InputError: If the result lacks something that is shown.
         """
-        scenario = _scenario(result)
-        hand = scenario.get("hand")
-        described = FingerDescription.model_validate(scenario["finger"]) if hand is None else _joined(hand)
-        scene = Scene(finger or described)
+        scene = Scene(finger or described(result.attrs).finger)
         time = _variable(result, "time")
         if len(time) == 0:
             raise InputError("result.time", "must have at least one sample")
@@ -166,14 +160,14 @@ class Playback:
         for name, values in (("joint_position", position), ("tendon_tension", tension)):
             if not np.isfinite(values).all():
                 raise InputError(f"result.{name}", "must be finite")
-        title = scenario.get("title") or scene.geometry.description.title or scene.geometry.description.name
+        title = result.attrs.get("title") or scene.geometry.description.title or scene.geometry.description.name
         palm, few = _palm(result, frames), slice(None, None, max(1, len(frames) // _POSITIONS_IN_VIEW))
         tips = scene.tips(scene.geometry.poses(position[few])).reshape(-1, 3)
         objects = SceneObjects.of(result, time[frames], scene.size, tips.mean(axis=0), palm)
         return cls(scene, title, time[frames], position, tension, palm, objects)
 
 
-def _strand_tensions(scene: Scene, result: xr.Dataset | Recording, frames: Indices) -> Array:
+def _strand_tensions(scene: Scene, result: xr.Dataset, frames: Indices) -> Array:
     # The proximal half of a passive tendon has the result's `passive_tension_proximal`.
     description = scene.geometry.description
     tension = _variable(result, "tendon_tension")[frames]
@@ -186,7 +180,7 @@ def _strand_tensions(scene: Scene, result: xr.Dataset | Recording, frames: Indic
     return np.concatenate([tension[:, :actuated], halves], axis=1)
 
 
-def _palm(result: xr.Dataset | Recording, frames: Indices) -> LinkPoses | None:
+def _palm(result: xr.Dataset, frames: Indices) -> LinkPoses | None:
     if "palm_position" not in result:
         return None
     quaternions = _variable(result, "palm_orientation")[frames]
@@ -200,21 +194,7 @@ def _frame_indices(time: Array, rate: float) -> Indices:
     return np.unique(np.searchsorted((time[1:] + time[:-1]) / 2.0, np.linspace(time[0], time[-1], wanted)))
 
 
-def _variable(result: xr.Dataset | Recording, name: str) -> Array:
+def _variable(result: xr.Dataset, name: str) -> Array:
     if name not in result:
         raise InputError(f"result.{name}", "is missing; the viewer shows what simulate returned")
     return np.asarray(result[name], dtype=float)
-
-
-def _scenario(result: xr.Dataset | Recording) -> dict[str, Any]:
-    try:
-        scenario = tomllib.loads(result.attrs["scenario"])
-    except (KeyError, TypeError, tomllib.TOMLDecodeError) as error:
-        raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
-    if not isinstance(scenario.get("finger", scenario.get("hand")), dict):
-        raise InputError("result.attrs.scenario", "must hold the resolved table [finger] or [hand]")
-    return scenario
-
-
-def _joined(hand: dict[str, Any]) -> FingerDescription:
-    return HandDescription.model_validate(hand).joined()

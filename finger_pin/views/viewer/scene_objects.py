@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.embedded import described
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.geometry import LinkPoses
@@ -19,8 +19,6 @@ from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command,
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from finger_pin.simulation.recorded import Recording
 
 _FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
@@ -53,7 +51,7 @@ class SceneObjects:
 
     @classmethod
     def of(
-        cls, result: xr.Dataset | Recording, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
+        cls, result: xr.Dataset, time: Array, size: float, middle: Array, palm: LinkPoses | None = None
     ) -> SceneObjects | None:
         """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
 
@@ -66,8 +64,7 @@ class SceneObjects:
         """
         if "contact_force" not in result:
             return None
-        described = tomllib.loads(result.attrs["scenario"]).get("environment", {}).get("objects", {})
-        objects = {name: Object.model_validate(each) for name, each in described.items()}
+        objects = dict(described(result.attrs).objects)
         level, normal = np.asarray(result["contact_level"]), np.asarray(result["contact_normal_force"])
         steepness = np.max(np.divide(level, normal, out=np.zeros_like(level), where=normal > 1e-6), axis=0)
         frames, closed = np.searchsorted(np.asarray(result["time"]), time), np.flatnonzero(steepness > 0.0)

@@ -25,7 +25,6 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.files import replacing
 from finger_pin.mechanism.geometry import LinkPoses
-from finger_pin.simulation.recorded import Recording
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
@@ -87,7 +86,7 @@ def write_video(
 
 
 @styled
-def draw_picture(result: xr.Dataset | Recording, stage: Array) -> NDArray[np.uint8]:
+def draw_picture(result: xr.Dataset, stage: Array) -> NDArray[np.uint8]:
     """Return a picture of the last sample of a result, shape (height, width, 3).
 
     Args:

@@ -32,11 +32,11 @@ def test_a_result_without_joint_positions_is_refused_and_an_earlier_file_stays(r
     assert [path.name for path in tmp_path.iterdir()] == ["animation.html"]
 
 
-@pytest.mark.parametrize("scenario", [None, "no = [toml", "finger = 'ub'"])
-def test_a_result_without_its_finger_is_refused(result, tmp_path, scenario):
+@pytest.mark.parametrize("finger", [None, "{no json", "{}"])
+def test_a_result_without_its_finger_is_refused(result, tmp_path, finger):
     broken = result.copy()
-    broken.attrs = {} if scenario is None else {"scenario": scenario}
-    with pytest.raises(fp.InputError, match="scenario"):
+    broken.attrs = {} if finger is None else {"finger": finger}
+    with pytest.raises(fp.InputError, match="finger"):
         write_animation(broken, tmp_path / "animation.html")
 
 

@@ -7,8 +7,9 @@ from motion import fingertip, joint_position
 from pages import opened, seek
 
 import finger_pin as fp
+from finger_pin.description.embedded import embedded
 from finger_pin.description.exercise import exercise
-from finger_pin.description.loading import read_scenario, to_toml
+from finger_pin.description.loading import read_scenario
 from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
 from finger_pin.views.viewer import write_animation
 
@@ -83,7 +84,7 @@ def test_a_hand_that_no_tendon_pulls_shows_its_joints_and_no_scale_of_tensions(b
         "joint_position": (("time", "joint"), np.zeros((2, 1))),
         "tendon_tension": (("time", "tendon"), np.zeros((2, 0))),
     }
-    result = xr.Dataset(still, {"time": [0.0, 1.0]}, {"scenario": to_toml(scenario)})
+    result = xr.Dataset(still, {"time": [0.0, 1.0]}, embedded(scenario))
     page = opened(browser, write_animation(result, tmp_path / "alone.html").as_uri())
     assert page.find_element("id", "joints").text.startswith("knuckle")
     assert [each.is_displayed() for each in page.find_elements("css selector", "#legend, #tensions")] == [False, False]

@@ -7,7 +7,6 @@ import time
 import matplotlib
 import numpy as np
 import pytest
-import tomli_w
 import xarray as xr
 from motion import DURATION, fingertip, joint_position, link_frames, table, tensions
 from pages import console_errors, opened, ring_centres, seek, tendon_colour
@@ -173,7 +172,7 @@ def test_a_finger_of_two_joints_and_three_tendons_is_shown(browser, tmp_path):
             "tendon_tension": (("time", "tendon"), np.ones((101, 3))),
         },
         coords={"time": t},
-        attrs={"scenario": tomli_w.dumps({"finger": table("planar")})},
+        attrs={"finger": json.dumps(table("planar"))},
     )
     page = opened(browser, write_animation(planar, tmp_path / "planar.html").as_uri())
     assert page.execute_script("return fingerPlayer.scene.tendons.length") == 3

@@ -1,4 +1,4 @@
-"""A result as plain arrays, before it is a Dataset: to import xarray takes longer than to simulate."""
+"""What a prepared run returns: arrays of what was asked for, and no more."""
 
 from __future__ import annotations
 
@@ -7,25 +7,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from finger_pin.description.routing import Array
+from finger_pin.simulation.recording import Recorded
+
 if TYPE_CHECKING:
     import xarray as xr
 
-    from finger_pin.description.routing import Array
-
 
 @dataclass(eq=False)
-class Recording:
-    """All signals of a run.
+class RunArrays:
+    """Variables of a run, as plain arrays.
 
     Attributes:
         variables: Dimensions, of which time is the first, values and attributes, by name.
         coordinates: Likewise, or the values alone.
-        attrs: Of the whole.
+        attrs: How far the run went, and what it took.
         slopes: Derivatives of the variables by the values that the run was given, shape (p, ...), if they were asked
             for.
     """
 
-    variables: dict[str, tuple[Any, Array, dict[str, str]]]
+    variables: Recorded
     coordinates: dict[str, Any]
     attrs: dict[str, Any]
     slopes: dict[str, Array] = field(default_factory=dict)
@@ -33,13 +34,7 @@ class Recording:
     @property
     def time(self) -> Array:
         """The sample times, s, shape (m,)."""
-        times: Array = self.coordinates["time"][1]
-        return times
-
-    @property
-    def nbytes(self) -> int:
-        """Size of all variables."""
-        return sum(values.nbytes for _, values, _ in self.variables.values())
+        return self["time"]
 
     def __contains__(self, name: str) -> bool:
         """Return whether there is a variable or coordinate of a name."""
@@ -54,18 +49,8 @@ class Recording:
         """Return the unit of a variable."""
         return self.variables[name][2]["units"]
 
-    def cut(self, count: int) -> None:
-        """Keep the first samples only."""
-        self.variables = {name: (dims, all_[:count], own) for name, (dims, all_, own) in self.variables.items()}
-        self.coordinates["time"] = ("time", self.time[:count], self.coordinates["time"][2])
-
     def dataset(self) -> xr.Dataset:
-        """Return the Dataset."""
+        """Return the same as a Dataset."""
         import xarray as xr
 
-        return xr.Dataset(self.variables, coords=self.coordinates, attrs=self.attrs)
-
-
-def as_dataset(result: Recording | xr.Dataset) -> xr.Dataset:
-    """Return a result as a Dataset."""
-    return result.dataset() if isinstance(result, Recording) else result
+        return xr.Dataset(self.variables, self.coordinates, self.attrs)

@@ -1,0 +1,64 @@
+"""What a result says of its scenario, for those who draw it: the finger or hand, and the objects around it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from finger_pin.description.hand import HandDescription
+from finger_pin.description.objects import Object
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import Description, validate
+from finger_pin.exceptions import InputError
+
+
+class Embedded(NamedTuple):
+    """What a result is of.
+
+    Attributes:
+        finger: The finger, or all fingers of a hand together.
+        objects: Those around it, by name.
+    """
+
+    finger: FingerDescription
+    objects: Mapping[str, Object]
+
+
+def embedded(scenario: Scenario) -> dict[str, str]:
+    """Return the attributes of a result of a scenario from which `described` reads."""
+    kind, own = ("finger", scenario.finger) if scenario.hand is None else ("hand", scenario.hand)
+    objects = {name: _plain(each) for name, each in (scenario.environment.objects or {}).items()}
+    return {kind: json.dumps(_plain(own)), "objects": json.dumps(objects)}
+
+
+def described(attributes: Mapping[Any, Any]) -> Embedded:
+    """Return what a result is of, given its attributes.
+
+    Raises:
+        InputError: If they do not say.
+    """
+    for kind in ("finger", "hand"):
+        if kind in attributes:
+            return _read(kind, str(attributes[kind]), str(attributes.get("objects", "{}")))
+    raise InputError("result.attrs.finger", "is missing; give what simulate returned or saved, in this version")
+
+
+# What reads a result asks for it more than once.
+@lru_cache(maxsize=4)
+def _read(kind: str, own: str, objects: str) -> Embedded:
+    entry = f"result.attrs.{kind}"
+    try:
+        table, around = json.loads(own), json.loads(objects)
+    except ValueError as error:
+        raise InputError(entry, "must be a description in JSON") from error
+    found = {name: validate(Object, each, ("result.attrs.objects", name)) for name, each in around.items()}
+    if kind == "hand":
+        return Embedded(validate(HandDescription, table, (entry,)).joined(), found)
+    return Embedded(validate(FingerDescription, table, (entry,)), found)
+
+
+def _plain(description: Description) -> Any:
+    return description.model_dump(mode="python", exclude_none=True)

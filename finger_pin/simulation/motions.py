@@ -1,0 +1,100 @@
+"""A trajectory at the times that are saved, and all that follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.core.stepping.textbook import Trajectory
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.state import State
+from finger_pin.simulation.account import Account, account
+from finger_pin.simulation.contact_variables import contact_values
+from finger_pin.simulation.energy import Flows, energies, powers
+
+
+class Motions:
+    """A trajectory at times, and all that follows from it, computed when it is first asked for.
+
+    The signals are recomputed from the states by the evaluation that the dynamics use.
+
+    Attributes:
+        loop: The system.
+        trajectory: Its solution.
+        times: Shape (m,), s, as far as the trajectory goes.
+    """
+
+    def __init__(
+        self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
+    ) -> None:
+        """Compute nothing yet.
+
+        Args:
+            loop: The system.
+            trajectory: Its solution.
+            times: Shape (m,), in order, s.
+            names: What will be asked for, as names of `variables`; by default all.
+        """
+        self._accelerated = names is None or "joint_acceleration" in names
+        self.loop, self.trajectory = loop, trajectory
+        self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
+
+    @cached_property
+    def packed(self) -> Array:
+        """The packed states, shape (m, size)."""
+        return self.trajectory.interpolate(self.times)
+
+    @cached_property
+    def state(self) -> State:
+        """The states by name."""
+        return self.loop.finger.layout.unpack(self.packed)
+
+    @cached_property
+    def reference(self) -> ReferenceSignals:
+        """What was desired."""
+        return self.loop.reference.at(self.times)
+
+    @cached_property
+    def control(self) -> ControlSignals:
+        """What was planned."""
+        return self.signals.control
+
+    @cached_property
+    def contacts(self) -> dict[str, Array]:
+        """What contacts and free objects do."""
+        return contact_values(self.loop.finger, self.finger)
+
+    @cached_property
+    def signals(self) -> LoopSignals:
+        """Everything that the finger does."""
+        return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
+
+    @property
+    def finger(self) -> FingerSignals:
+        """What the finger does, by the names of the paper."""
+        return self.signals.finger
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Fingertips, and energies of the rigid body."""
+        return self.loop.motion(self.times, self.state)
+
+    @cached_property
+    def stored(self) -> dict[str, Array]:
+        """The energies by name, J."""
+        return energies(self.loop.finger, self.finger, self.motion)
+
+    @cached_property
+    def powers(self) -> Flows:
+        """What comes in and what is lost, W."""
+        return powers(self.finger)
+
+    @cached_property
+    def account(self) -> Account:
+        """The energy account."""
+        return account(self.loop, self.trajectory, self.times, self.signals, self.motion)
