@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import json
 import math
 from collections.abc import Mapping
@@ -11,7 +12,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class FingerPinError(Exception):
+class _Whole:
+    """Exceptions whose attributes go with them when they are copied, or sent by another process."""
+
+    args: tuple[Any, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
+
+
+class FingerPinError(_Whole, Exception):
     """Root of the project's exceptions."""
 
 
@@ -72,34 +82,21 @@ class IntegrationError(FingerPinError, RuntimeError):
         super().__init__(f"the integration stopped at t = {time:.6g} s: {reason}; try {advice}")
 
 
-class Interrupted(FingerPinError):
-    """The simulation was asked to stop before its end.
+class Interrupted(_Whole, KeyboardInterrupt):
+    """A simulation or a study ended before its end: after Ctrl-C, or because ``stop`` said so.
+
+    It is no `Exception`: nothing that takes errors takes it for one.
 
     Attributes:
-        time: Simulated time reached, s.
-        result: Everything up to ``time``, or None if nothing was computed.
+        time: Simulated time reached, s; NaN where there are several runs.
+        result: Everything up to then, or None if nothing was computed.
     """
 
-    def __init__(self, time: float, result: xr.Dataset | None = None) -> None:
-        """Keep what was computed."""
+    def __init__(self, time: float, result: xr.Dataset | None = None, reached: str = "") -> None:
+        """Keep what was computed, and say how far that goes."""
         self.time = time
         self.result = result
-        super().__init__(f"interrupted at t = {time:.6g} s")
-
-
-class InterruptedByKeyboard(KeyboardInterrupt):
-    """Ctrl-C ended a simulation before its end; no `except Exception` takes it for an error.
-
-    Attributes:
-        time: Simulated time reached, s.
-        result: Everything up to ``time``, or None if nothing was computed.
-    """
-
-    def __init__(self, time: float, result: xr.Dataset | None = None) -> None:
-        """Keep what was computed."""
-        self.time = time
-        self.result = result
-        super().__init__(f"interrupted at t = {time:.6g} s; the exception's result holds what was computed")
+        super().__init__(f"interrupted {reached or f'at t = {time:.6g} s'}")
 
 
 class StudyError(FingerPinError):

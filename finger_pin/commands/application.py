@@ -27,7 +27,7 @@ from finger_pin.commands import (
     sweep,
 )
 from finger_pin.commands.console import Unsuccessful, complain
-from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, Interrupted, StudyError
+from finger_pin.exceptions import FingerPinError, InputError, IntegrationError, StudyError
 
 # What is left when a process ends is not worth a search for garbage, which takes half a second.
 atexit.register(gc.freeze)
@@ -88,14 +88,13 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
                 return int(command(*arguments, **options) or DONE)
         except KeyboardInterrupt as error:
             problem: BaseException = error
-            code, text = INTERRUPTED, "interrupted"
+            code, text = INTERRUPTED, str(error) or "interrupted"
         except FingerPinError as error:
             kinds = {
                 InputError: WRONG_INPUT,
                 IntegrationError: FAILED,
                 StudyError: FAILED,
                 Unsuccessful: FAILED,
-                Interrupted: INTERRUPTED,
             }
             code = next((kinds[kind] for kind in type(error).__mro__ if kind in kinds), NOT_WRITTEN)
             problem, text = error, str(error)

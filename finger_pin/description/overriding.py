@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, get_origin
 
@@ -24,7 +24,7 @@ from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
 
 # Keys that put another finger or hand in place of what there is.
-_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?|hand\.fingers\.[^.]+")
+_OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")
 _PLACE = re.compile(r"hand\.fingers\.[^.]+")
 # Tables by joint or tendon, and which of the two.
 _BY_NAME = {
@@ -45,21 +45,30 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
         if given:
             table.pop(other, None)
         _apply(given, table)
+    for key in (*whole, *overrides):
+        if key.startswith("finger.") and "hand" in table:
+            raise InputError(key, "there is a hand; keys of its fingers begin with hand.fingers.NAME.finger")
+        if key.startswith("hand.") and "finger" in table:
+            raise InputError(key, 'there is one finger; hand = "ub_hand" puts a hand in its place')
     if "hand" in table:
         table["hand"] = resolve_hand(table["hand"], folder)
-        _apply(whole, table)
+        _apply(_spelt_out(whole, table), table)
         table["hand"] = resolve_hand(table["hand"], folder)
     elif "finger" not in table:
         raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
     else:
         table["finger"] = resolve_finger(table["finger"], folder)
-    spelt_out = {each: value for key, value in overrides.items() for each in _each(key, table)}
+    spelt_out = _spelt_out(overrides, table)
     # A kind comes before what belongs to it, and a motor before its entries.
     first = (".kind", ".motor")
     for early in (True, False):
         _apply({key: value for key, value in spelt_out.items() if key.endswith(first) == early}, table)
         for finger in [as_table(each).get("finger") for each in _fingers(table).values()] or [table.get("finger")]:
             with_motors(as_table(finger), Path())
+
+
+def _spelt_out(overrides: Table, table: Table) -> Table:
+    return {each: value for key, value in overrides.items() for each in _each(key, table)}
 
 
 def _each(key: str, table: Table) -> list[str]:
@@ -123,7 +132,7 @@ def _fingers(table: Table) -> Table:
 def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
     """Return overrides whose keys begin with an allowed one, with the path of a finger's file made absolute."""
     checked: Table = {}
-    for key, value in overrides.items():
+    for key, value in _placed(overrides):
         first, *rest = key.split(".")
         if first not in allowed:
             near = nearest(first, allowed)
@@ -138,6 +147,15 @@ def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
             value = {**value, "base": _absolute(value["base"])}
         checked[key] = value
     return checked
+
+
+def _placed(overrides: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield overrides, tables of a hand's fingers entry by entry: they go on top of what there is, as in a file."""
+    for key, value in overrides.items():
+        if isinstance(value, Mapping) and (key == "hand.fingers" or _PLACE.fullmatch(key)):
+            yield from _placed({f"{key}.{name}": entry for name, entry in value.items()})
+        else:
+            yield key, value
 
 
 def _absolute(finger: Any) -> Any:

@@ -152,7 +152,7 @@ def check_convergence(
         InputError: If the tolerances cannot be tightened, or the result is of another scenario, or had a controller,
             reference, force or initial state of its own that is not given here.
         IntegrationError: If an integrator cannot go on.
-        Interrupted: If ``stop`` returned true.
+        Interrupted: After Ctrl-C, or if ``stop`` returned true.
     """
     tighter = tightened(scenario, factor)
     if not 0.0 < limit < math.inf:

@@ -1,4 +1,4 @@
-"""Ctrl-C in a script or notebook: a run ends where it is, and what it has computed is kept."""
+"""Ctrl-C in a script or notebook: what runs ends where it is, and what has been computed is kept."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import signal
 import threading
 from collections.abc import Callable
 from types import FrameType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from finger_pin.core.stepping.textbook import Stop
-from finger_pin.exceptions import Interrupted, InterruptedByKeyboard
+from finger_pin.exceptions import Interrupted
 from finger_pin.simulation.run_arrays import RunArrays
 
 if TYPE_CHECKING:
@@ -18,42 +18,53 @@ if TYPE_CHECKING:
 Found = TypeVar("Found", "xr.Dataset", RunArrays)
 
 
-def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
-    """Return what a run returns, given what it asks whether it is to stop: after Ctrl-C, or when the caller says so.
+class CtrlC:
+    """Ctrl-C while entered; called like a `Stop`, it says whether it was pressed, or the caller's own stop is due.
 
     A second Ctrl-C ends at once, without a result. Where others than Python handle the signal, such as a command of
     this package, and in threads, which get none, it is theirs.
 
-    Args:
-        run: The run.
-        stop: The caller's own.
+    Attributes:
+        pressed: Whether it was.
+    """
+
+    def __init__(self, stop: Stop | None = None) -> None:
+        """Take the caller's own."""
+        self.pressed, self._own, self._caught = False, stop or (lambda: False), False
+
+    def __call__(self) -> bool:
+        """Return whether to end."""
+        return self.pressed or self._own()
+
+    def __enter__(self) -> Self:
+        """Catch the signal, if it is Python's."""
+        main = threading.current_thread() is threading.main_thread()
+        self._caught = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self._caught:
+            signal.signal(signal.SIGINT, self._catch)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Leave the signal as it was."""
+        if self._caught:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _catch(self, number: int, frame: FrameType | None) -> None:
+        if self.pressed:
+            raise KeyboardInterrupt
+        self.pressed = True
+
+
+def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
+    """Return what a run returns, given what it asks whether it is to stop.
 
     Raises:
-        InterruptedByKeyboard: After Ctrl-C, with what the run has computed.
+        Interrupted: After Ctrl-C or such a stop, with what the run has computed.
     """
-    asked = stop or (lambda: False)
-    main = threading.current_thread() is threading.main_thread()
-    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        return run(asked)
-    pressed = False
-
-    def catch(number: int, frame: FrameType | None) -> None:
-        nonlocal pressed
-        if pressed:
-            raise KeyboardInterrupt
-        pressed = True
-
-    signal.signal(signal.SIGINT, catch)
-    try:
-        found = run(lambda: pressed or asked())
-    except Interrupted as error:
-        if pressed:
-            raise InterruptedByKeyboard(error.time, error.result) from None
-        raise
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    if pressed:
+    with CtrlC(stop) as asked:
+        found = run(asked)
+    if asked.pressed:
         # It came after the last step.
         whole = found.dataset() if isinstance(found, RunArrays) else found
-        raise InterruptedByKeyboard(float(found.attrs["end_time"]), whole)
+        raise Interrupted(float(found.attrs["end_time"]), whole)
     return found

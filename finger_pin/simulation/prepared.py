@@ -118,8 +118,8 @@ class Prepared:
         Raises:
             InputError: Naming the entry that is wrong.
             IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
-            Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
-            InterruptedByKeyboard: After Ctrl-C, a KeyboardInterrupt; its ``result`` likewise.
+            Interrupted: After Ctrl-C, or if ``stop`` returned true; its ``result`` holds what was computed. It is a
+                KeyboardInterrupt.
         """
         return interruptible(lambda asked: self._run(values, initial, asked, sensitivities, accuracy), stop)
 

@@ -75,8 +75,8 @@ def simulate(
             what is given as controller, reference, force or initial state has a wrong size or is not finite, or the
             result cannot fit into memory.
         IntegrationError: If the integrator cannot go on; its ``result`` holds what was computed.
-        Interrupted: If ``stop`` returned true; its ``result`` holds what was computed.
-        InterruptedByKeyboard: After Ctrl-C, a KeyboardInterrupt; its ``result`` likewise.
+        Interrupted: After Ctrl-C, or if ``stop`` returned true; its ``result`` holds what was computed. It is a
+            KeyboardInterrupt.
 
     Warns:
         SelfLockingWarning: If the joints' friction comes close to what locks the finger on the scenario's reference;

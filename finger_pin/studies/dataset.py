@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -10,7 +11,7 @@ import xarray as xr
 
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import StudyError
+from finger_pin.exceptions import Interrupted, StudyError
 from finger_pin.studies.designs import SAMPLE, Design
 from finger_pin.studies.fingerprint import versions
 from finger_pin.studies.keys import describe
@@ -62,12 +63,15 @@ def assemble(
     return xr.Dataset(variables, coords=coordinates, attrs=origin(scenario))
 
 
-def checked(result: xr.Dataset) -> xr.Dataset:
-    """Return a result, which is none if every run failed.
+def checked(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
+    """Return a result, which is none if every run failed, or Ctrl-C ended the study.
 
     Raises:
-        StudyError: If so.
+        Interrupted: After Ctrl-C.
+        StudyError: If every run failed.
     """
+    if interrupted:
+        raise Interrupted(math.nan, result, f"after {int((result['status'] != MISSING).sum())} runs")
     if (result["status"] == FAILED).all():
         raise StudyError(str(result["reason"].values.flat[0]), result)
     return result

@@ -24,7 +24,7 @@ import cloudpickle
 from finger_pin.core.stepping.stepper import usable_cores
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import FingerPinError, InputError, ScenarioWarning
+from finger_pin.exceptions import FingerPinError, InputError, Interrupted, ScenarioWarning
 from finger_pin.simulation.simulate import simulate
 
 _Item = TypeVar("_Item")
@@ -48,7 +48,7 @@ class Lost:
     @property
     def undone(self) -> bool:
         """Whether the work has not been done, for it was the executor that failed."""
-        return isinstance(self.error, BrokenExecutor | CancelledError)
+        return isinstance(self.error, BrokenExecutor | CancelledError | Interrupted)
 
 
 class Crew:
@@ -119,7 +119,11 @@ class Crew:
                         found = answers.get(timeout=_POLL)
                     except queue.Empty:
                         continue
-                yield found[0], _result(found[1])
+                result = _result(found[1])
+                if isinstance(result, Lost) and result.undone and stop():
+                    # Ctrl-C ends processes of an executor too.
+                    return
+                yield found[0], result
         finally:
             # Threads end their runs where these are; what another executor has begun it ends.
             ended.set()
@@ -166,5 +170,5 @@ def _answer(answers: queue.SimpleQueue[tuple[int, Future[Any]]], index: int, fut
 def _result(future: Future[Any]) -> Any:
     try:
         return future.result()
-    except (Exception, CancelledError) as error:
+    except (Exception, CancelledError, Interrupted) as error:
         return Lost(" ".join(f"{type(error).__name__}: {error}".split()), error)

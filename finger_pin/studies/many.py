@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
@@ -15,7 +16,8 @@ from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import InputError, IntegrationError, SelfLockingWarning, StudyError
+from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
+from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import prepare
 from finger_pin.simulation.simulate import simulate
@@ -53,6 +55,7 @@ def simulate_many(
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
         StudyError: If every run failed.
+        Interrupted: After Ctrl-C, a KeyboardInterrupt; in its ``result`` the runs that were finished are whole.
 
     Warns:
         SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
@@ -63,17 +66,20 @@ def simulate_many(
     _check_alike(runs)
     run = partial(_run, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
-    with Crew(executor, workers) as crew:
+    found: dict[int, xr.Dataset | Lost] = {}
+    with CtrlC() as interrupted, Crew(executor, workers) as crew:
         crew.compile(runs[0])
-        found: dict[int, xr.Dataset | Lost] = {}
-        for index, result in crew.do(run, runs, lambda: False):
+        for index, result in crew.do(run, runs, interrupted):
             if isinstance(result, Lost) and isinstance(result.error, InputError):
                 raise result.error
             found[index] = result
             if progress is not None:
                 progress(len(found), len(runs))
-    results = [found[index] for index in range(len(runs))]
-    stacked = _stack(runs, results)
+    reached = f"after {len(found)} of {len(runs)} runs"
+    unfinished = Lost("not finished: interrupted", Interrupted(math.nan, None, reached))
+    stacked = _stack(runs, [found.get(index, unfinished) for index in range(len(runs))])
+    if interrupted.pressed:
+        raise Interrupted(math.nan, stacked, reached)
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
     margins = stacked["self_locking_margin"].values

@@ -17,6 +17,7 @@ from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Listing
@@ -112,6 +113,7 @@ def optimise(
     Raises:
         InputError: Naming the argument, key or value that is wrong; nothing is written then.
         StudyError: If every run failed.
+        Interrupted: After Ctrl-C, a KeyboardInterrupt; its ``result`` has the runs that were finished.
         OSError: If a record cannot be written.
         ExecutorError: If the executor cannot go on.
     """
@@ -127,6 +129,7 @@ def optimise(
         _shares(variables, own),
     )  # fmt: skip
     with ExitStack() as stack:
+        asked_to_stop = stack.enter_context(CtrlC(stop))
         crew = stack.enter_context(Crew(executor))
         if output is None:
             store = stack.enter_context(Store())
@@ -135,12 +138,13 @@ def optimise(
             asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
             folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
             store = stack.enter_context(folder).store
-        course = _Course(starting, goals, variables, store, crew, effort, progress or notebook_bar("runs"), stop)
+        bar = progress or notebook_bar("runs")
+        course = _Course(starting, goals, variables, store, crew, effort, bar, asked_to_stop)
         result = _assembled(starting, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")
             _write_front(result, starting, Path(output))
-    return checked(result)
+    return checked(result, asked_to_stop.pressed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from typing import Any, Protocol, Self
 
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import FingerPinError, InputError, Interrupted
+from finger_pin.exceptions import FingerPinError, InputError
 from finger_pin.studies.executing import Crew, Lost
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, source_digest, versions
 from finger_pin.studies.keys import Point, Starting
@@ -183,8 +183,6 @@ def execute(task: Task, stop: Stop) -> Record:
     run = Run(task.scenario, stop)
     try:
         values = {metric.name: float(metric.measure(run)) for metric in task.metrics}
-    except Interrupted:
-        raise
     except Exception as error:
         # Whatever goes wrong with one point is kept with it, and the others go on.
         kind = "" if isinstance(error, FingerPinError) else f"{type(error).__name__}: "

@@ -10,6 +10,7 @@ from typing import Any
 
 import xarray as xr
 
+from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Design, Grid
@@ -65,6 +66,7 @@ def sweep(
     Raises:
         InputError: Naming the argument, key or value that is wrong; nothing is written then.
         StudyError: If every run failed.
+        Interrupted: After Ctrl-C, a KeyboardInterrupt; its ``result`` has the runs that were finished.
         OSError: If a record cannot be written.
         ExecutorError: If the executor cannot go on.
     """
@@ -74,6 +76,7 @@ def sweep(
     for key, values in design.values.items():
         starting.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:
+        asked_to_stop = stack.enter_context(CtrlC(stop))
         crew = stack.enter_context(Crew(executor))
         if output is None:
             store = stack.enter_context(Store())
@@ -87,10 +90,10 @@ def sweep(
             store,
             crew,
             progress=progress or notebook_bar("runs"),
-            stop=stop,
+            stop=asked_to_stop,
             retry_failed=retry_failed,
         )
         result = assemble(starting.scenario, design, chosen, records)
         if output is not None:
             write(result, Path(output) / "sweep.nc")
-    return checked(result)
+    return checked(result, asked_to_stop.pressed)

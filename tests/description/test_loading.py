@@ -85,6 +85,26 @@ def test_an_override_may_replace_the_finger_and_change_the_new_one_in_either_ord
         assert scenario.finger.gravity == (1.0, 2.0, 3.0)
 
 
+def test_an_override_of_a_hand_s_fingers_says_what_the_same_lines_in_a_file_say(tmp_path):
+    path = tmp_path / "hand.toml"
+    for lines, overrides in (
+        ('thumb = "dexmart_index"', {"hand.fingers": {"thumb": "dexmart_index"}}),
+        (
+            'thumb = "ub"\nindex = {scale = 1.2}',
+            {"hand.fingers": {"thumb": "ub"}, "hand.fingers.index": {"scale": 1.2}},
+        ),
+        (
+            'thumb = {finger = {base = "ub"}, scale = 2.0}',
+            {"hand.fingers.thumb": {"finger": {"base": "ub"}, "scale": 2}},
+        ),
+    ):
+        path.write_text(f'extends = "hand"\nname = "hand"\n[hand.fingers]\n{lines}\n')
+        assert load_scenario("hand", overrides) == load_scenario(path)
+    for name, key in (("fig6", "hand.fingers.thumb.finger"), ("hand", "finger.gravity")):
+        with pytest.raises(InputError, match=f"{key}: there is (one finger|a hand)"):
+            load_scenario(name, {key: "ub"})
+
+
 def test_overrides_are_not_changed_by_loading():
     overrides = {"finger": {"base": "ub", "joint_friction": {"viscous": 0.01}}, "finger.joint_friction.stiffness": 7.0}
     load_scenario("fig6", overrides)

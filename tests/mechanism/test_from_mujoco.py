@@ -1,5 +1,7 @@
 """Hands read from MuJoCo models: their geometry, their inertia and what acts on them, against MuJoCo."""
 
+import copy
+
 import mujoco
 import numpy as np
 import pytest
@@ -71,20 +73,56 @@ def test_accelerations_are_mujoco_s_without_its_constraints(name):
             np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
 
 
-@pytest.mark.parametrize("flag", ["spring", "damper", "actuation", "frictionloss", "clampctrl"])
-def test_flags_of_a_model_are_obeyed(flag):
-    """Where a flag switches something off in MuJoCo, it is off here: forces at one state."""
-    text = ROUTED.replace('contact="disable"', f'contact="disable" {flag}="disable"')
-    model, random = mujoco.MjModel.from_xml_string(text), np.random.default_rng(5)
-    finger = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH).finger
-    hand, data = fp.Hand(finger), mujoco.MjData(model)
-    data.qpos, data.qvel = [0.2, 0.5, 0.012], 0.3 * random.normal(size=model.nv)
-    data.ctrl = [0.7, 3.0, -1.5]
-    mujoco.mj_forward(model, data)
-    given = [] if flag == "actuation" else inputs(hand, model, data.ctrl)
-    found = hand.evaluate(hand.rest_state(data.qpos, data.qvel), given)
-    np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
-    assert any("disabled" in line for line in finger.tree.left_out) == (flag == "actuation")
+COUPLED = '<equality><joint joint1="j2" joint2="j1" polycoef="0.4 0.5 0 0 0"/></equality></mujoco>'
+
+
+def flagged(model, *bits):
+    """Return a copy of a model in which no flag but some is set."""
+    found = copy.copy(model)
+    found.opt.disableflags = sum(int(bit) for bit in bits if isinstance(bit, mujoco.mjtDisableBit))
+    found.opt.enableflags = sum(int(bit) for bit in bits if isinstance(bit, mujoco.mjtEnableBit))
+    return found
+
+
+@pytest.mark.parametrize(
+    "flag", ["spring", "damper", "gravity", "actuation", "clampctrl", "limit", "equality", "constraint"]
+)
+def test_what_a_flag_switches_off_in_mujoco_is_off_here(flag):
+    """Accelerations at one state: a control beyond its range, a slider too where no limit is left to stop it."""
+    coupled = flag in ("equality", "constraint")
+    model = mujoco.MjModel.from_xml_string(ROUTED.replace("</mujoco>", COUPLED) if coupled else ROUTED)
+    switched = flagged(model, getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}"))
+    switched.geom_contype[:] = switched.geom_conaffinity[:] = 0
+    data = mujoco.MjData(switched)
+    data.qpos = [0.2, 0.5, 0.036 if flag in ("limit", "constraint") else 0.012]
+    data.qvel, data.ctrl = 0.3 * np.random.default_rng(5).normal(size=3), [0.7, 25.0, -1.5]
+    mujoco.mj_forward(switched, data)
+
+    def acceleration(read):
+        hand = fp.Hand(read_scenario(exercise(fp.from_mujoco(read)), SMOOTH).finger)
+        given = inputs(hand, model, data.ctrl) if hand.description.tree.actuators else []
+        return hand.evaluate(hand.rest_state(data.qpos, data.qvel), given).acceleration
+
+    np.testing.assert_allclose(acceleration(switched), data.qacc, rtol=1e-7, atol=1e-7)
+    assert np.abs(acceleration(flagged(model)) - data.qacc).max() > 1e-2
+
+
+def test_no_flag_is_passed_over():
+    """Each changes what is read, or is listed by name; a loss that is disabled is none."""
+    lossy = ROUTED.replace('name="j1"', 'name="j1" frictionloss="0.3"').replace(
+        'name="top"', 'name="top" frictionloss="1"'
+    )
+    lossy = lossy.replace("<option ", '<option o_friction="0.3 0.3 1 1 1" ').replace("</mujoco>", COUPLED)
+    lossy = lossy.replace('euler="0.3 0 0"/>', 'euler="0.3 0 0"/><geom type="sphere" size="0.2" contype="3"/>')
+    model = mujoco.MjModel.from_xml_string(lossy)
+    plain = fp.from_mujoco(flagged(model))
+    for bits in (mujoco.mjtDisableBit, mujoco.mjtEnableBit):
+        for name, bit in bits.__members__.items():
+            if not name.startswith("mjN"):
+                assert fp.from_mujoco(flagged(model, bit)) != plain, name
+    without = fp.from_mujoco(flagged(model, mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS))
+    lossless = fp.from_mujoco(flagged(mujoco.MjModel.from_xml_string(lossy.replace("frictionloss", "margin"))))
+    assert without == lossless
 
 
 def test_actuators_that_are_disabled_delayed_or_of_other_kinds_are_listed_and_the_others_keep_their_controls():
@@ -210,11 +248,11 @@ def test_what_is_not_carried_over_is_listed():
     assert description.tree.left_out == (
         "free joint of thing: it stays where it is",
         "body w: gravity compensation",
+        "contacts are disabled in the model: its geoms touch nothing",
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
         "equality equality_0: of kind weld",
         "equality equality_1: its polynomial is not linear",
-        "geom geom_1: its body stands still and carries nothing",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w"]

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import pytest
 from mujoco_models import MODELS
 
 import finger_pin as fp
@@ -28,17 +29,26 @@ CROWD = """<mujoco><worldbody>
 <tendon><fixed name="t"><joint joint="ja" coef="1"/></fixed></tendon></mujoco>"""
 
 
-def test_the_pairs_that_touch_are_those_that_mujoco_lets_collide():
-    model = mujoco.MjModel.from_xml_string(CROWD)
+@pytest.mark.parametrize(
+    "flags", ["", 'filterparent="disable" override="enable"', 'contact="disable"', 'constraint="disable"']
+)
+def test_the_pairs_that_touch_are_those_that_mujoco_lets_collide(flags):
+    text = CROWD.replace("<mujoco>", f'<mujoco><option o_friction="0.3 0.3 1 1 1"><flag {flags}/></option>')
+    model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     met = {frozenset(model.geom(int(g)).name for g in pair) for pair in data.contact.geom}
     tree = fp.from_mujoco(model).tree
     assert {frozenset(pair) for pair in tree.touching} == {pair for pair in met if not pair & {"floor", "d2"}}
-    assert 5 < len(tree.touching) < 15
+    shapes = {name: shape.surface for body in tree.bodies.values() for name, shape in body.shapes.items()}
+    if "con" in flags:
+        assert not shapes and "contacts are disabled in the model: its geoms touch nothing" in tree.left_out
+        return
+    assert 5 < len(tree.touching) < 25
     assert "geom floor: it belongs to the world, where objects of a scenario stand" in tree.left_out
     assert "geom d2: a ellipsoid touches nothing here" in tree.left_out
-    assert tree.bodies["c"].shapes["c1"].surface.friction == 0.4
+    assert shapes["c1"].friction == (0.3 if flags else 0.4)
+    assert not flags or set(data.contact.friction[:, 0]) == {0.3} == {each.friction for each in shapes.values()}
 
 
 def scene(description, gravity, duration, closing):

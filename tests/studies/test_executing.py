@@ -1,12 +1,15 @@
 """Executors: what is given to them comes back once, whatever they are; stops, and scripts without a guard."""
 
 import os
+import pickle
+import signal
 import subprocess
 import sys
 import threading
 import time
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 
+import numpy as np
 import planted
 import pytest
 
@@ -65,6 +68,55 @@ def test_a_stop_ends_what_runs_in_threads_and_leaves_the_rest():
         assert ended.wait(10.0)
         assert dict(crew.do(planted.tripled, [1], never)) == {0: 3}
     assert begun == [0]
+
+
+GAINS, SHORT = (0.5, 1.0, 2.0), {"simulation.duration": 0.02}
+STUDIES = {
+    "many": lambda **options: fp.simulate_many(
+        [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in GAINS], workers=1, **options
+    ),
+    "sweep": lambda **options: fp.sweep(
+        "fig6", {"controller.gain": GAINS}, overrides=SHORT, executor=Serial(), **options
+    ),
+    "optimise": lambda **options: fp.optimise(
+        "fig6", ["controller.gain=0.5:4"], overrides=SHORT, constraints=[], executor=Serial(), **options
+    ),
+}
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_ctrl_c_in_python_keeps_the_runs_that_are_finished(study):
+    def press(done, *others):
+        if done == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt, match="interrupted after 1 ") as caught:
+        STUDIES[study](progress=press)
+    result = caught.value.result
+    if study == "many":
+        assert result.failure.values.tolist() == ["", *["not finished: interrupted"] * 2]
+        alone = fp.simulate(fp.load_scenario("fig6", {**SHORT, "controller.gain": GAINS[0]})).joint_position
+        assert (result.joint_position[0].values == alone.values).all()
+        assert np.isnan(result.joint_position[1:]).all()
+    else:
+        assert result.status.values[0] == "done" and set(result.status.values[1:]) <= {"missing"}
+        assert np.isfinite(result.tracking_rms.values[0])
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        fp.InputError("a.b", "must be 1", 2),
+        fp.IntegrationError(0.5, "stuck", "less"),
+        fp.exceptions.StudyError("why", None),
+        fp.exceptions.Interrupted(0.5),
+    ],
+)
+def test_what_is_raised_comes_out_of_another_process_with_all_that_it_says(error):
+    error.add_note("a note")
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error) and str(again) == str(error) and vars(again) == vars(error)
 
 
 @pytest.mark.parametrize(("options", "entry"), [({"executor": 3}, "executor"), ({"workers": 0}, "workers")])

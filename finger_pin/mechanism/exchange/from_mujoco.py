@@ -94,10 +94,9 @@ class _Reader:
 
     def table(self, name: str) -> Table:
         """Return the description as a table."""
-        model, flags = self.model, self.mujoco.mjtDisableBit
+        model = self.model
         if not self.kept_joints:
             raise InputError("model", "has no joints that turn or slide")
-        weightless = model.opt.disableflags & int(flags.mjDSBL_GRAVITY)
         dofs = model.jnt_dofadr[self.kept_joints]
         sliding = model.jnt_type[self.kept_joints] == self.mujoco.mjtJoint.mjJNT_SLIDE
         reader = TendonReader(self.mujoco, model, self.names, self.rest)
@@ -105,7 +104,7 @@ class _Reader:
         bodies = self._bodies()
         return {
             "name": entry_name(name),
-            "gravity": [0.0, 0.0, 0.0] if weightless else model.opt.gravity.tolist(),
+            "gravity": model.opt.gravity.tolist(),
             "joints": {self.names.joints[i]: self._joint(i) for i in self.kept_joints},
             "tendons": self._pulled(),
             "joint_friction": {

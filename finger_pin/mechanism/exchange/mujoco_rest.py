@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.mujoco_flags import undriven
+from finger_pin.mechanism.exchange.mujoco_flags import disabled, undriven, without_counterpart
 
 
 class Rest:
@@ -40,6 +40,11 @@ class Rest:
         self._every("tendon", "tendon_stiffnesspoly", "a stiffness that grows with the stretch")
         self._every("tendon", "tendon_dampingpoly", "damping that grows with the speed")
         self._every("tendon", "tendon_springyield", "a spring that yields")
+        if "contact" in disabled(mujoco, model):
+            self.add("contacts are disabled in the model: its geoms touch nothing")
+        flags = without_counterpart(mujoco, model)
+        if flags:
+            self.add(f"flags about how MuJoCo computes: {', '.join(flags)}")
         if model.opt.density or model.opt.viscosity:
             self.add("the medium: nothing is dragged")
         for count, what in (

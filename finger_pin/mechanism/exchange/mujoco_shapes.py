@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
+from finger_pin.mechanism.exchange.mujoco_flags import disabled
 from finger_pin.mechanism.exchange.mujoco_names import Names, Table, quaternion
 from finger_pin.mechanism.exchange.mujoco_rest import Rest
 
@@ -22,7 +23,9 @@ class Shapes:
             int(kinds.mjGEOM_CYLINDER): "cylinder",
             int(kinds.mjGEOM_BOX): "box",
         }
-        paired = {int(each) for each in (*model.pair_geom1, *model.pair_geom2)}
+        self._disabled = disabled(mujoco, model)
+        touching = "contact" not in self._disabled
+        paired = {int(each) for each in (*model.pair_geom1, *model.pair_geom2) if touching}
         self._colliding = [
             i for i in range(model.ngeom) if model.geom_contype[i] or model.geom_conaffinity[i] or i in paired
         ]
@@ -65,7 +68,7 @@ class Shapes:
         model, weld = self.model, self.model.body_weldid
         known = {i for i in self._colliding if self._kept(i) and int(model.geom_bodyid[i]) in bodies}
         excluded = {int(each) for each in model.exclude_signature}
-        filtered = not model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+        filtered = "filterparent" not in self._disabled
         for i in filter(self._kept, self._colliding):
             if i not in known:
                 self.rest.add(f"geom {self._name(i)}: its body stands still and carries nothing")
