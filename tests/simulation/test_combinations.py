@@ -1,4 +1,4 @@
-"""Whatever is combined, a run is computed, summed up, drawn, shown on a page, saved, loaded, and continued."""
+"""Whatever is combined, a command runs it, sums it up, draws it, shows it on a page; a film and more runs follow."""
 
 from __future__ import annotations
 
@@ -6,24 +6,47 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 import tomli_w
 
 import finger_pin as fp
+from finger_pin.commands import application
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.simulation.results import ResultFolder
-from finger_pin.views.plots.saving import figures_of
+from finger_pin.views.plots.saving import draw_all, figures_of
 from finger_pin.views.summary import summarize
-from finger_pin.views.viewer.animation import write_animation
+from finger_pin.views.viewer import write_animation, write_video
 
 SERVO = {"motor": "XL330-M288", "spool_radius": 0.005}
 FAR, NEAR, BESIDE = ({"shape": "sphere", "radius": 0.008, "position": [0.3, 0.3, z]} for z in (-0.4, -0.3, 0.0))
 SWING = {"amplitude": 0.003, "frequency": 5.0}
 COMPENSATED = {"sampling": {"period": 2e-3}, "tendon_friction_feedforward": {}, "passive_tension_loop": {}}
+#: A link between two tendons that run through space.
+TREE = {
+    "name": "link",
+    "joints": {"medial": {"range": [-0.25, 0.25]}},
+    "tendons": {"T1": {"along": "upper"}, "T3": {"along": "lower"}},
+    "tree": {
+        "bodies": {"link": {"mass": 0.02, "inertia": [1e-5, 1e-5, 1e-5, 0.0, 0.0, 0.0]}},
+        "joints": {"medial": {"body": "link"}},
+        "tendons": {
+            name: {
+                "path": {
+                    "base": {"kind": "point", "position": [-0.02, 0.0, z]},
+                    "end": {"kind": "point", "body": "link", "position": [0.03, 0.0, z]},
+                }
+            }
+            for name, z in (("upper", 0.01), ("lower", -0.01))
+        },
+        "tip": {"body": "link", "position": [0.04, 0.0, 0.0]},
+    },
+}
 #: Entries of a scenario by what they add; those of a finger stand under `finger`, wherever it is.
 FEATURES: dict[str, dict[str, Any]] = {
-    "finger": {},
+    "finger": {"finger": {"base": "ub"}},
+    "tree": {"finger": TREE},
     "hand": {"hand": {"name": "two", "fingers": {"thumb": {"position": [0.0, -0.1, 0.0]}, "index": {}}}},
     "servo": {"finger": {"actuators": {"M3": {**SERVO, "tendons": ["T3"], "drive": "tension"}}}},
     "position drive": {"finger": {"actuators": {"M1": {**SERVO, "tendons": ["T1"], "drive": "position"}}}},
@@ -38,15 +61,16 @@ FEATURES: dict[str, dict[str, Any]] = {
     "own": {},
 }
 APART = [
-    {"finger", "hand"},
-    {"finger", "moving palm"},
+    *({"finger", other} for other in ("tree", "hand", "moving palm")),
+    *({"tree", other} for other in ("hand", "moving palm", "compensated")),
     {"moved object", "moving palm"},
     *({one, other} for one, other in combinations(("own", "open loop", "compensated"), 2)),
 ]
 
 
 def whole(features: set[str]) -> set[str]:
-    return features | {"hand"} if "moving palm" in features else features
+    features = features | {"hand"} if "moving palm" in features else features
+    return features | {"sampled"} if {"tree", "position drive"} <= features else features
 
 
 def fits(features: set[str]) -> bool:
@@ -65,7 +89,7 @@ def rows() -> list[set[str]]:
     return found
 
 
-def scenario_with(features: set[str], folder: Path) -> fp.Scenario:
+def scenario_with(features: set[str], path: Path) -> fp.Scenario:
     table: dict[str, Any] = {"name": "combined", "controller": {}, "simulation": {"duration": 0.01}}
 
     def add(entries: dict[str, Any], to: dict[str, Any]) -> None:
@@ -77,13 +101,13 @@ def scenario_with(features: set[str], folder: Path) -> fp.Scenario:
 
     for name in sorted(features):
         add(FEATURES[name], table)
-    finger = {"base": "ub", **table.pop("finger", {})}
+    finger = table.pop("finger", {})
     if "hand" in table:
+        finger["base"] = "ub"
         for placed in table["hand"]["fingers"].values():
             placed["finger"] = finger
     else:
         table["finger"] = finger
-    path = folder / "combined.toml"
     path.write_text(tomli_w.dumps(table))
     return fp.load_scenario(path)
 
@@ -97,30 +121,45 @@ class Held:
         self.pulled = sum(tendon.kind == "actuated" for tendon in finger.tendons.values())
 
     def at(self, time: float) -> ReferenceSignals:
-        return ReferenceSignals(np.full(self.joints, 0.3), np.zeros(self.joints))
+        return ReferenceSignals(np.full(self.joints, 0.2), np.zeros(self.joints))
 
     def command(self, time: float, reference: object, position: object, velocity: object) -> np.ndarray:
         return np.full(self.pulled, 2.0)
 
 
+def made(scenario: fp.Scenario, folder: Path, own: dict[str, Any]) -> None:
+    """Do with parts of one's own, which no command line takes, what the command does."""
+    result = fp.simulate(scenario, **own)
+    print(summarize(result))
+    with ResultFolder(folder) as results:
+        results.write(result)
+        write_animation(result, results.stage / "animation.html")
+        draw_all(result, results.stage / "figures")
+        results.publish()
+
+
 @pytest.mark.parametrize("features", rows(), ids=lambda row: "+".join(sorted(row)).replace(" ", "-"))
 def test_every_pair_of_features_runs_to_the_end_of_what_is_done_with_a_result(
-    features: set[str], tmp_path: Path
+    features: set[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scenario, own = scenario_with(features, tmp_path), {}
+    # Quickly drawn.
+    monkeypatch.setitem(matplotlib.rcParams, "savefig.dpi", 20)
+    file, folder, own = tmp_path / "combined.toml", tmp_path / "run", {}
+    scenario = scenario_with(features, file)
     if "own" in features:
         held = Held(scenario.finger)
         own = {"controller": held, "reference": held, "control_period": 2e-3}
-    result = fp.simulate(scenario, **own)
+        made(scenario, folder, own)
+    else:
+        assert application.run("simulate", [str(file), "--output", str(folder)]) == 0
+    printed = capsys.readouterr()
+    assert "Energy" in printed.out and not printed.err
+    result = fp.load_result(folder)
     assert ("motor" in result.dims) == bool(features & {"servo", "position drive"})
-    assert "Energy" in summarize(result)
-    with ResultFolder(tmp_path / "run") as folder:
-        folder.write(result)
-        write_animation(result, folder.stage / "animation.html")
-        folder.publish()
-    assert fp.load_result(tmp_path / "run").identical(result)
-    assert fp.load_scenario(tmp_path / "run" / "scenario.toml") == scenario
-    for draw in figures_of(result).values():
-        assert draw(result).axes
+    assert fp.load_scenario(folder / "scenario.toml") == scenario
+    assert {path.stem for path in (folder / "figures").iterdir()} == set(figures_of(result))
+    assert (folder / "animation.html").stat().st_size > 100_000
+    assert write_video(result, tmp_path / "film.gif", speed=0.1).read_bytes().startswith(b"GIF8")
+    assert application.run("export", [str(folder), str(tmp_path / "signals.csv")]) == 0
     again = fp.simulate(scenario, initial=result, **own)
     np.testing.assert_array_equal(again.joint_position[0], result.joint_position[-1])

@@ -140,8 +140,10 @@ def flatten_rounding(axes: Axes) -> None:
 
 
 def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
-    """Write a legend below a part, in as many columns as its width holds."""
-    longest = max((len(str(each.get_label())) for each in handles), default=1)
+    """Write a legend below a part, in as many columns as its width holds, if there is anything to name."""
+    if not handles:
+        return
+    longest = max(len(str(each.get_label())) for each in handles)
     entry = _HANDLE + _LETTER * _points("legend.fontsize") * longest / 72.0
     columns = max(1, min(len(handles), int(part.bbox.width / part.dpi / entry)))
     # As many columns as the rows that these make need: the last one is no stump.

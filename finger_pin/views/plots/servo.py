@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.description.embedded import described
-from finger_pin.description.parameters import Crossing
+from finger_pin.description.parameters import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import names, series, shade, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
@@ -52,7 +52,7 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     loops: list[Axes] = list(left.subplots(len(actuators), 1, squeeze=False)[:, 0])
     title(loops[0], "(a) joints against spools")
     for axes, (name, actuator) in zip(loops, actuators.items(), strict=True):
-        _loop(axes, result, name, [finger.tendons[each].crossings for each in actuator.tendons])
+        _loop(axes, result, name, _turned(finger, actuator.tendons))
     loops[-1].set_xlabel("angle of the spool (°)")
     shown = {line.get_label(): line for axes in loops for line in axes.get_lines()}
     legend(left, list(shown.values()))
@@ -72,10 +72,20 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
     return figure
 
 
-def _loop(axes: Axes, result: xr.Dataset, motor: str, crossed: Sequence[Mapping[str, Crossing]]) -> None:
+def _turned(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
+    """Return the joints that tendons turn."""
+    found: set[str] = set()
+    for tendon in (finger.tendons[name] for name in tendons):
+        if tendon.along is not None and finger.tree is not None:
+            found |= finger.tree.crossed(tendon.along)
+        found |= {joint for joint, crossing in tendon.crossings.items() if crossing.radius != 0.0}
+    return found
+
+
+def _loop(axes: Axes, result: xr.Dataset, motor: str, turned: set[str]) -> None:
     spool = np.rad2deg(result["motor_position"].sel(motor=motor).values)
     for index, joint in enumerate(names(result, "joint")):
-        if any(joint in tendon and tendon[joint].radius != 0.0 for tendon in crossed):
+        if joint in turned:
             angle = np.rad2deg(result["joint_position"].sel(joint=joint).values)
             axes.plot(spool, angle, label=joint, linewidth=thin(), **series(index))
     axes.set_ylabel(f"{motor}: joints (°)")

@@ -127,7 +127,7 @@ class _Film:
         """Set the stage: camera, legend, and what stays; further points that are in view have shape (k, 3), m."""
         scene = motion.scene
         self.motion = motion
-        self.poses = scene.geometry.poses(motion.position, motion.palm)
+        self.poses = self.links = scene.geometry.poses(motion.position, motion.palm)
         self.solids, objects = tuple(_solids(scene)), motion.objects
         # Objects are further links; what is seen of them does not move the camera far away.
         own = self.solids
@@ -145,7 +145,7 @@ class _Film:
         right /= np.linalg.norm(right)
         # Rows: to the right, up, and towards the camera, in the base frame.
         self.camera = np.array([right, np.cross(away, right), away]) @ scene.view()
-        self.tips = scene.tips(self.poses) @ self.camera[:2].T
+        self.tips = scene.tips(self.links) @ self.camera[:2].T
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         few = np.unique(np.linspace(0, len(motion.time) - 1, _FEW).round().astype(int))
@@ -155,6 +155,7 @@ class _Film:
                 stage @ self.camera[:2].T,
                 np.zeros((0, 2)) if objects is None else objects.seen() @ self.camera[:2].T,
                 *(self._outline(solid, frame) for frame in few for solid in own),
+                *(line for frame in few for line in self._lines(frame)),
             ]
         )
         low, high = seen.min(axis=0), seen.max(axis=0)
@@ -185,10 +186,7 @@ class _Film:
         colours = [self.solids[index].colour for index in order]
         self.bodies.set_facecolor(colours)
         self.bodies.set_edgecolor([(0.8, 0.8, 0.8, 1.3 * opacity) for *_, opacity in colours])
-        poses = LinkPoses(self.poses.rotation[frame], self.poses.translation[frame])
-        tension = motion.tension[frame]
-        paths = scene.geometry.paths(motion.position[frame], scene.looseness(tension), poses)
-        lines = [path.points @ self.camera[:2].T for path in paths]
+        lines, tension = self._lines(frame), motion.tension[frame]
         strands = np.concatenate([tendon["strand"][:-1] for tendon in scene.tendons])
         self.tubes.set_segments([pair for line in lines for pair in np.stack([line[:-1], line[1:]], axis=1)])
         self.tubes.set_color(tension_colours(tension, self.scale)[strands])
@@ -197,6 +195,13 @@ class _Film:
         if motion.objects is not None:
             self.arrows.set_segments(list(motion.objects.arrows()[frame] @ self.camera[:2].T))
         self.clock.set_text(f"{motion.time[frame]:.2f} s")
+
+    def _lines(self, frame: int) -> list[Array]:
+        """Return the paths of the strands."""
+        motion, scene = self.motion, self.motion.scene
+        poses = LinkPoses(self.links.rotation[frame], self.links.translation[frame])
+        paths = scene.geometry.paths(motion.position[frame], scene.looseness(motion.tension[frame]), poses)
+        return [path.points @ self.camera[:2].T for path in paths]
 
     def _placed(self, solid: _Solid, frame: int) -> Array:
         rotation, translation = self.poses.rotation[frame, solid.link], self.poses.translation[frame, solid.link]
