@@ -40,7 +40,7 @@ def tendon(
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)
     if int(p[KIND]) == LINK:
-        drive = about[integer_in(m, at.jnt_dofadr, row)] * abs(p[SHARE]) / p[RATIO]
+        drive = about[integer_in(m, at.jnt_dofadr, row)] * (abs(p[SHARE]) if p[RATIO] > 0.0 else -abs(p[SHARE]))
         pull += drive if p[SHARE] > 0.0 else min(drive, 0.0)
     tension = abs(pull) + held
     # Against what pulls: of a pulled tendon its length's speed is negative when it is wound in.
@@ -48,8 +48,8 @@ def tendon(
     speed = number_in(d, of.ten_velocity, tendon)
     loss = way * (force + p[VISCOUS] * speed)
     delivered = max(tension - loss, 0.0)
-    bend, level = p[OFFSET], p[FLOOR]
-    if tension > 0.0 or abs(force) > p[FLOOR] or p[DRAG] > 0.0:
+    bend, level = p[OFFSET], max(p[DRAG], p[FLOOR])
+    if tension + delivered > 0.0:
         bend += _turn(m, d, at, of, kinds, e, tendon)
         least = _capstan(p[COULOMB], bend)
         coefficient = least
@@ -100,11 +100,12 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
 
 
 @compiled
-def pin(m: Any, d: Any, at: Any, of: Any, e: Any, outside: Any, reactions: Any) -> Any:
+def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> Any:
     """Return speed, level, most, load and turn of a joint's pin: (9b), (17)."""
     p, joint = numbers(m, at.tuple_objprm, e), integer_in(m, at.tuple_objid, e)
     dof = integer_in(m, at.jnt_dofadr, joint)
     speed, load = number_in(d, of.qvel, dof), reactions[dof]
+    outside = numbers(d, of.act, held)
     x, y, z = outside[0], outside[1], outside[2]
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)

@@ -39,8 +39,10 @@ def frictions(model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str
         row, of_joint, ratio = _row(model, name, first)
         share = _share(model, model.tendon(name).id, list(tendons))
         kind = LINK if share else TENDON
-        numbers, crossed = _tendon_law(model, name, law), _crossed(model, name, law)
-        found.append(Friction(kind, name, row, of_joint, ratio, numbers, crossed, share))
+        numbers = _tendon_law(model, name, law)
+        # What neither bends it nor has a pin that it loads would be passed over at every step.
+        crossed = tuple(each for each in _crossed(model, name, law) if each[2] or each[1] in joints)
+        found.append(Friction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio)))
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])

@@ -14,8 +14,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from finger_pin.mechanism.exchange.mujoco_friction import (
     FLOOR,
     FORCE,
@@ -38,7 +36,6 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
 from finger_pin.mujoco.elements import mass, pin, tendon
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
-    borrowed,
     compiled,
     flags,
     integer,
@@ -48,8 +45,10 @@ from finger_pin.mujoco.memory import (
     number_in,
     numbers,
     numbers_at,
+    scratch,
     size,
     words,
+    zeros,
 )
 
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
@@ -104,56 +103,47 @@ def copy(to: Any, d: Any, instance: Any, of: Any) -> None:
 @compiled
 def reset(m: Any, state: Any, instance: Any, at: Any) -> None:
     """Forget all signals."""
-    numbers_at(state)[: signals(m, instance, at)] = 0.0
+    for k in range(signals(m, instance, at)):
+        numbers_at(state)[k] = 0.0
 
 
 @compiled
 def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None:
     """Write the rows of all frictions, the rates of their bristles, and their signals."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
-    _, end = _entries(m, at, key >> 32)
+    e, end = _entries(m, at, key >> 32)
+    z, x, place = _start(m, at, key, instance)
     values, objects, types = numbers(m, at.tuple_objprm), integers(m, at.tuple_objid), integers(m, at.tuple_objtype)
     dofs, states = integers(m, at.jnt_dofadr), numbers(d, of.plugin_state)
     act, rate, dt = numbers(d, of.act), numbers(d, of.act_dot), number(m, at.timestep)
     count = width + size(m, at.ntendon)
-    room = np.zeros(5 * count)
     # Of every degree of freedom, then of every tendon: what drives it, what presses pins, and three of its row.
-    about, along, reactions = borrowed(room), borrowed(room, width), borrowed(room, count)
-    rows = borrowed(room, 2 * count)
+    room = zeros(scratch(5 * count), 5 * count)
+    about, along, reactions = numbers_at(room), numbers_at(room + 8 * width), numbers_at(room + 8 * count)
+    rows = numbers_at(room + 16 * count)
     driven(m, d, at, of, kinds, along, about)
-    # Tendons load pins, and so come before them: pins are left for a second turn, from the first one on.
-    e, z, x, place = later = _start(m, at, key, instance)
-    left = False
-    for turn in range(2):
-        while e < end:
-            kind, ratio, row = int(values[e + KIND]), values[e + RATIO], objects[e + 1]
-            row = dofs[row] if types[e + 1] == kinds.of_joint else width + row
-            if kind == PIN and turn == 0 and not left:
-                left, later = True, (e, z, x, place)
-            if (kind == PIN) == (turn == 1):
-                if kind == PIN:
-                    found = pin(m, d, at, of, e, numbers(d, of.act, x), reactions)
-                elif kind == MASS:
-                    found = mass(m, d, at, of, kinds, e, reactions)
-                else:
-                    found = tendon(m, d, at, of, kinds, e, act[z], act[x], along, about, reactions)
-                speed, level, most, load, bend = found
-                states[place + LEVEL], states[place + LOAD], states[place + TURN] = level, load, bend
-                # `advance` moves the bristles, with the speed that the step ends with.
-                rate[z] = 0.0
-                for k in range(x, x + LOADS[kind]):
-                    rate[k] = 0.0
-                force, drag, limit = _exerted(numbers(m, at.tuple_objprm, e), act[z], speed, level, load, dt)
-                rows[3 * row] += ratio * force
-                rows[3 * row + 1] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
-                rows[3 * row + 2] += abs(ratio) * min(limit, most)
-            e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
-        if not left:
-            break
-        e, z, x, place = later
+    # Tendons load pins: the table has pins last.
+    while e < end:
+        kind, ratio, row = int(values[e + KIND]), values[e + RATIO], objects[e + 1]
+        row = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
+        if kind == PIN:
+            found = pin(m, d, at, of, e, x, reactions)
+        elif kind == MASS:
+            found = mass(m, d, at, of, kinds, e, reactions)
+        else:
+            found = tendon(m, d, at, of, kinds, e, act[z], act[x], along, about, reactions)
+        speed, level, most, load, bend = found
+        states[place + LEVEL], states[place + LOAD], states[place + TURN] = level, load, bend
+        # `advance` moves the bristles, with the speed that the step ends with.
+        rate[z] = 0.0
+        for k in range(x, x + LOADS[kind]):
+            rate[k] = 0.0
+        force, drag, limit = _exerted(numbers(m, at.tuple_objprm, e), act[z], speed, level, load, dt)
+        rows[row] += ratio * force
+        rows[row + 1] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
+        rows[row + 2] += abs(ratio) * min(limit, most)
+        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
     _write(m, d, at, of, kinds, rows, dt)
-    # Held until here.
-    room[0] = 0.0
 
 
 @compiled
@@ -182,10 +172,10 @@ def _entries(m: Any, at: Any, which: Any) -> Any:
 
 @compiled
 def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
-    """Return where the first friction has its elements, its bristles, its loads and its signals."""
+    """Return where the first friction has its bristles, its loads and its signals."""
     bristles = integer_in(m, at.actuator_actadr, key & _LOW)
     loads = bristles + signals(m, instance, at) // SIGNALS
-    return _entries(m, at, key >> 32)[0], bristles, loads, integer_in(m, at.plugin_stateadr, instance)
+    return bristles, loads, integer_in(m, at.plugin_stateadr, instance)
 
 
 @compiled
@@ -240,15 +230,15 @@ def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -
 def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds: Any) -> None:
     """Move bristles by (9a), and note what the solver has found: the force of each friction, what will load it next."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
-    _, end = _entries(m, at, key >> 32)
+    e, end = _entries(m, at, key >> 32)
+    z, x, place = _start(m, at, key, instance)
     values, objects, types = numbers(m, at.tuple_objprm), integers(m, at.tuple_objid), integers(m, at.tuple_objtype)
     states, act = numbers(d, of.plugin_state), numbers(d, of.act)
     dt, count = number(m, at.timestep), width + size(m, at.ntendon)
-    room, pins = np.zeros(2 * count), False
-    forces, places, held = borrowed(room), borrowed(room, count), borrowed(room, count + width)
+    room, pins = zeros(scratch(2 * count), 2 * count), False
+    forces, places, held = numbers_at(room), numbers_at(room + 8 * count), numbers_at(room + 8 * (count + width))
     held_tensions(m, d, at, of, kinds, held)
     _row_forces(m, d, at, of, kinds, width, forces)
-    e, z, x, place = _start(m, at, key, instance)
     while e < end:
         kind, row = int(values[e + KIND]), objects[e + 1]
         row = integer_in(m, at.jnt_dofadr, row) if types[e + 1] == kinds.of_joint else width + row
@@ -263,12 +253,10 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
             act[x] = held[objects[e]]
         elif kind == PIN:
             places[objects[e]], pins = x, True
-            act[x : x + 3] = 0.0
+            act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0
         e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
     if pins:
         contact_loads(m, d, at, of, contact, kinds, places, act)
-    # Held until here.
-    room[0] = 0.0
 
 
 @compiled

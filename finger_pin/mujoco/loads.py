@@ -18,6 +18,9 @@ from finger_pin.mujoco.memory import (
     size,
 )
 
+# A product of lengths is scaled up from here on, before it underflows.
+_TINY = 1e-200
+
 
 @compiled
 def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any) -> None:
@@ -67,11 +70,11 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     """Return the sum of the angles by which a spatial tendon's path turns, rad.
 
     Of a wrap both tangent points are in the path. The chord between them makes half the arc's angle with either
-    tangent.
+    tangent. Angles add up as the complex numbers dot + i |cross| multiply, half turns being counted: one arc tangent.
     """
     first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
-    point, of_wrap, found = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
-    x0, y0, z0, known = 0.0, 0.0, 0.0, False
+    point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0
+    x0, y0, z0, known, real, imaginary = 0.0, 0.0, 0.0, False, 1.0, 0.0
     for k in range(first, first + count - 1):
         if of_wrap[k] == -2 or of_wrap[k + 1] == -2:
             known = False
@@ -81,9 +84,14 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
             continue
         if known:
             cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
-            found += math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0)
+            across, along = math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0
+            real, imaginary = real * along - imaginary * across, real * across + imaginary * along
+            if imaginary < 0.0:
+                real, imaginary, halves = -real, -imaginary, halves + 1
+            if abs(real) + imaginary < _TINY:
+                real, imaginary = real / _TINY, imaginary / _TINY
         x0, y0, z0, known = x, y, z, True
-    return found
+    return halves * math.pi + math.atan2(imaginary, real)
 
 
 @compiled

@@ -8,21 +8,27 @@ import numba
 import numpy as np
 from numba.extending import intrinsic
 
-_array: Any = numba.carray  # type: ignore[attr-defined]
 _intrinsic: Any = intrinsic
+_types: Any = numba.types
 #: Compiles a function of numbers and addresses into what calls it, where offsets are constants: else all of them would
 #: be passed at every call. What it divides by zero is infinite, as in NumPy.
 compiled: Any = numba.njit(error_model="numpy", forceinline=True)
 
 
-@_intrinsic
-def _pointer(typing_context: Any, address: Any) -> Any:
-    """Return an address as a pointer."""
+def _viewer(kind: Any) -> Any:
+    """Return a function of an address that gives the numbers there, by index.
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(numba.types.voidptr))
+    An array of numba's would ask of each index whether it is negative.
+    """
 
-    return numba.types.voidptr(address), generate
+    @_intrinsic
+    def view(typing_context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_data_type(kind).as_pointer())
+
+        return _types.CPointer(kind)(address), generate
+
+    return view
 
 
 def _loader(kind: Any) -> Any:
@@ -38,10 +44,19 @@ def _loader(kind: Any) -> Any:
     return load
 
 
-_load_number, _load_int, _load_word = (
-    _loader(each) for each in (numba.types.float64, numba.types.int32, numba.types.int64)
-)
-_load_flag = _loader(numba.types.uint8)
+@_intrinsic
+def scratch(typing_context: Any, count: Any) -> Any:
+    """Return the address of room for numbers on the callback's stack: an array of NumPy's would be allocated anew."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = context.get_value_type(_types.float64)
+        return builder.ptrtoint(builder.alloca(kind, size=arguments[0]), context.get_value_type(_types.intp))
+
+    return _types.intp(_types.intp), generate
+
+
+_load_number, _load_int, _load_word = (_loader(each) for each in (_types.float64, _types.int32, _types.int64))
+_load_flag = _loader(_types.uint8)
 
 
 @compiled
@@ -80,50 +95,50 @@ def flag_in(owner: Any, offset: Any, index: Any) -> Any:
     return _load_flag(_load_word(owner + offset) + index)
 
 
-# Arrays are read as far as an index of MuJoCo's leads, so that their lengths are not asked for.
-_ANY = 1 << 40
+_view_numbers, _view_ints, _view_words, _view_flags = (
+    _viewer(each) for each in (_types.float64, _types.int32, _types.int64, _types.uint8)
+)
 
 
 @compiled
 def numbers(owner: Any, offset: Any, first: Any = 0) -> Any:
     """Return an array of mjtNum from one of them on."""
-    return _array(_pointer(size(owner, offset) + 8 * first), _ANY, np.float64)
+    return _view_numbers(size(owner, offset) + 8 * first)
 
 
 @compiled
 def integers(owner: Any, offset: Any, first: Any = 0) -> Any:
     """Return an array of int from one of them on."""
-    return _array(_pointer(size(owner, offset) + 4 * first), _ANY, np.int32)
+    return _view_ints(size(owner, offset) + 4 * first)
 
 
 @compiled
 def flags(owner: Any, offset: Any) -> Any:
     """Return an array of mjtBool or char."""
-    return _array(_pointer(size(owner, offset)), _ANY, np.uint8)
+    return _view_flags(size(owner, offset))
 
 
 @compiled
 def words(owner: Any, offset: Any) -> Any:
     """Return an array of uintptr_t."""
-    return _array(_pointer(size(owner, offset)), _ANY, np.int64)
+    return _view_words(size(owner, offset))
 
 
 @compiled
 def numbers_at(address: Any) -> Any:
     """Return an array of mjtNum that begins at an address."""
-    return _array(_pointer(address), _ANY, np.float64)
-
-
-@compiled
-def borrowed(array: Any, first: Any = 0) -> Any:
-    """Return an array's numbers from one on, for its owner to use while it holds it: holders are not counted.
-
-    Counting them, atomically at every call and slice, costs more than most of what is done with the numbers.
-    """
-    return numbers_at(array.ctypes.data + 8 * first)
+    return _view_numbers(address)
 
 
 @compiled
 def integers_at(address: Any) -> Any:
     """Return an array of int that begins at an address."""
-    return _array(_pointer(address), _ANY, np.int32)
+    return _view_ints(address)
+
+
+@compiled
+def zeros(room: Any, count: Any) -> Any:
+    """Return the address of `scratch`, where there are zeros now."""
+    for k in range(count):
+        numbers_at(room)[k] = 0.0
+    return room

@@ -45,9 +45,8 @@ class Friction:
         law: coulomb, static, stiffness, viscous, stribeck_velocity, floor, stribeck_exponent, micro_damping, drag,
             curvature_offset.
         more: What bends or loads it: whether it is a joint, its name, and a number.
-        share: Of a `LINK`, how much of the joint's drive it takes: one over the number of tendons that pull the same
-        way;
-            negative where another one pulls the other way, so that it is slack while that is driven.
+        share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
+            same way; negative where another one pulls the other way, so that it is slack while that is driven.
     """
 
     kind: int
