@@ -30,12 +30,13 @@ class Chains(NamedTuple):
     """The bodies of `Tables`, and where the joints of the model are among them.
 
     Attributes:
-        parents, kinds, bodies, charts, chart_frames: As in `Tables`.
+        parents, roots, kinds, bodies, charts, chart_frames: As in `Tables`.
         last: Of every joint of the model, the base first, its last body; -1 for the base.
         turns: Rotation of the joint's frame to that body's, shape (3, 3) each.
     """
 
     parents: NDArray[np.int64]
+    roots: NDArray[np.int64]
     kinds: NDArray[np.int64]
     bodies: Array
     charts: NDArray[np.int64]
@@ -85,9 +86,11 @@ def read_chains(model: pin.Model) -> Chains:
         bodies[above, INERTIA : INERTIA + 6] = moments[np.triu_indices(3)]
         last.append(above)
         turns.append(turn)
-    return Chains(
-        parents, kinds, bodies, np.array(charts, dtype=np.int64), np.array(frames).reshape(-1, 3, 3), last, turns
-    )
+    roots: NDArray[np.int64] = np.arange(size)
+    for body in np.flatnonzero(parents >= 0):
+        roots[body] = roots[parents[body]]
+    attitudes = np.array(charts, dtype=np.int64), np.array(frames).reshape(-1, 3, 3)
+    return Chains(parents, roots, kinds, bodies, *attitudes, last, turns)
 
 
 def _coordinates(model: pin.Model, index: int) -> list[_Body]:

@@ -84,7 +84,9 @@ class PathWork(NamedTuple):
     Attributes:
         out: What the shapes say, shape (E, OUT).
         active: Zero for gaps that are open, shape (E,).
-        closed: Gaps that are not, in order, shape (E,).
+        awake: Contacts that are not asleep, in order, shape (E,).
+        awake_count: How many, shape (1,).
+        closed: Gaps that are not open, in order, shape (E,).
         closed_count: How many, shape (1,).
         asleep: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
             step, as the next.
@@ -111,6 +113,8 @@ class PathWork(NamedTuple):
 
     out: Matrix
     active: Indices
+    awake: Indices
+    awake_count: Indices
     closed: Indices
     closed_count: Indices
     asleep: Indices
@@ -255,6 +259,8 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
     return PathWork(
         out=np.zeros((pieces, OUT)),
         active=np.ones(pieces, dtype=np.int64),
+        awake=np.arange(pieces),
+        awake_count=np.array([np.count_nonzero(paths.columns > 1)]),
         closed=np.zeros(pieces, dtype=np.int64),
         closed_count=np.zeros(1, dtype=np.int64),
         asleep=np.zeros(count, dtype=np.int64),
@@ -265,8 +271,9 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         travel=np.zeros(width),
         control=np.zeros((width, 5)),
         looks=np.zeros((LOOKS, 6)),
-        frame=np.zeros((pieces, 3, 3)),
-        origin=np.zeros((pieces, 3)),
+        # Of what stands on the base they stay.
+        frame=paths.rotation.copy(),
+        origin=paths.origin.copy(),
         ends=np.zeros((pieces, 6)),
         wrench=np.zeros((pieces, COLUMNS, WRENCH)),
         push=np.zeros((pieces, 3)),

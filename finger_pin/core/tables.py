@@ -28,6 +28,7 @@ class Tables(NamedTuple):
 
     Attributes:
         parents: Of the bodies, -1 for the base, shape (n,).
+        roots: First body of the tree that each belongs to, shape (n,): trees do not feel each other's inertia.
         kinds: 1 where a body slides, 0 where it turns, shape (n,).
         bodies: Placement and inertia, columns of `rigid_body`, shape (n, BODY_COLUMNS).
         charts: First of the three bodies that turn a free one, shape (f,).
@@ -73,6 +74,7 @@ class Tables(NamedTuple):
     """
 
     parents: Indices
+    roots: Indices
     kinds: Indices
     bodies: Matrix
     charts: Indices
@@ -188,6 +190,7 @@ def _read(mechanism: Mechanism) -> Tables:
     bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
     return Tables(
         parents=parents,
+        roots=chains.roots,
         kinds=chains.kinds,
         bodies=chains.bodies,
         charts=chains.charts,

@@ -37,7 +37,7 @@ def _rigid(address, _number):
     inverse_dynamics(tables, v, a, work, rigid.bias, False)
     for j in range(q.size):
         rigid.acceleration[j] = rigid.torque[j] - rigid.bias[j]
-    solve_mass(q.size, work, rigid.acceleration)
+    solve_mass(tables, q.size, work, rigid.acceleration)
     inverse_dynamics(tables, v, a, work, rigid.needed, True)
     inverse_dynamics_derivatives(tables, v, work)
     return 1

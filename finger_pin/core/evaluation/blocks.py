@@ -35,6 +35,7 @@ class Blocks(NamedTuple):
         place: Of every coordinate in its block, shape (N,).
         state_place: Of every state in its block, shape (Z,).
         loose: For the states of contacts that are open, -dz'/dz, shape (Z,); zero for all others.
+        awake, awake_count: States of contacts that are awake, shape (Z,), and how many, shape (1,).
         current: The block that is being condensed, shape (1,).
     """
 
@@ -53,6 +54,8 @@ class Blocks(NamedTuple):
     place: Indices
     state_place: Indices
     loose: Vector
+    awake: Indices
+    awake_count: Indices
     current: Indices
 
 
@@ -87,6 +90,8 @@ def build_blocks(tables: Tables, control: Control) -> Blocks:
         place=np.arange(width),
         state_place=np.arange(states),
         loose=np.zeros(states),
+        awake=room(states),
+        awake_count=room(1),
         current=room(1),
     )
 
@@ -135,14 +140,14 @@ def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
             for c in range(gain.shape[1]):
                 gain[k, c] = 0.0
     _join(tables, work, blocks)
-    coordinates = rows = touches = states = 0
-    for s in range(blocks.loose.size):
-        blocks.loose[s] = 0.0
-    for e in range(paths.columns.size):
-        k = paths.row[e]
-        if paths.columns[e] > 1 and work.paths.asleep[k] == 0:
-            blocks.loose[tables.state[k + 1]] = -work.slopes[at.R_LENGTH + 4, k + 1]
-            blocks.loose[tables.state[k + 2]] = -work.slopes[at.R_LENGTH + 5, k + 2]
+    coordinates = rows = touches = states = awake = 0
+    for index in range(work.paths.awake_count[0]):
+        k = paths.row[work.paths.awake[index]]
+        for m in range(1, 3):
+            blocks.awake[awake] = tables.state[k + m]
+            blocks.loose[tables.state[k + m]] = -work.slopes[at.R_LENGTH + 3 + m, k + m]
+            awake += 1
+    blocks.awake_count[0] = awake
     for b in range(blocks.number[0]):
         for j in range(blocks.atom.size):
             if blocks.label[blocks.atom[j]] == b:
@@ -161,8 +166,8 @@ def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
                 blocks.states[states], blocks.loose[state] = state, 0.0
                 blocks.state_place[state] = states - blocks.state_start[b]
                 states += 1
-        for k in range(blocks.row_atom.size):
-            if blocks.row_atom[k] < 0 or blocks.label[blocks.row_atom[k]] != b:
+        for k in range(tables.touching, blocks.row_atom.size):
+            if blocks.label[blocks.row_atom[k]] != b:
                 continue
             blocks.rows[rows] = k
             rows += 1

@@ -176,7 +176,8 @@ def _substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> N
 def condense(model: Any, address: int, g: float) -> bool:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
     linear, blocks = model.linear, model.linear.blocks
-    for s in range(blocks.loose.size):
+    for index in range(blocks.awake_count[0]):
+        s = blocks.awake[index]
         linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
     for b in range(blocks.number[0]):
         if not _condense_block(model, address, g, b):
@@ -241,7 +242,7 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
 
 @compiled_loosely
 def solve(linear: Any, r: Any, u: Any) -> None:
-    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i."""
+    """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of contacts asleep stay."""
     blocks, right, solution = linear.blocks, linear.right, linear.solution
     whole = linear.mass.shape[0]
     if blocks.touches.size == 0:
@@ -252,7 +253,8 @@ def solve(linear: Any, r: Any, u: Any) -> None:
                 value += row[c] * r[c]
             u[i] = value
         return
-    for s in range(linear.loose.size):
+    for index in range(blocks.awake_count[0]):
+        s = blocks.awake[index]
         u[2 * whole + s] = linear.loose[s] * r[2 * whole + s]
     for b in range(blocks.number[0]):
         places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]

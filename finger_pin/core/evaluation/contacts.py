@@ -14,17 +14,22 @@ from finger_pin.core.tables import END, FIRST
 @compiled
 def exert_contacts(tables: Any, v: Any, z: Any, work: Any) -> None:
     """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
-    rows, asleep = work.rows, work.paths.asleep
+    rows, paths = work.rows, work.paths
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
-        for k in range(begin, end if begin < tables.touching else begin, 3):
-            if asleep[k]:
+        if begin >= tables.touching:
+            continue
+        for index in range(paths.awake_count[0]):
+            e = paths.awake[index]
+            k = tables.paths.row[e]
+            if not begin <= k < end:
                 continue
             for m in range(k, k + 3):
                 speed = 0.0
-                for e in range(tables.arm_start[m], tables.arm_start[m + 1]):
-                    speed += work.arm[e] * v[tables.arm_at[e]]
-                rows[at.LENGTH, m], rows[at.SPEED, m] = work.paths.length[m], speed
+                # One that is open moves nothing, and sees no speed.
+                for a in range(tables.arm_start[m], tables.arm_start[m + 1] if paths.active[e] else 0):
+                    speed += work.arm[a] * v[tables.arm_at[a]]
+                rows[at.LENGTH, m], rows[at.SPEED, m] = paths.length[m], speed
                 if m > k:
                     rows[at.STATE, m] = z[tables.state[m]]
             call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 3)

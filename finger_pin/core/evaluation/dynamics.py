@@ -124,7 +124,11 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
     rows, torque = work.rows, work.torque
     for e in range(tables.arm_start[tables.touching], tables.arm_at.size):
         torque[tables.arm_at[e]] += work.arm[e] * rows[FORCE, tables.arm_row[e]]
-    for i in range(tables.state_row.size):
+    for index in range(work.paths.awake_count[0]):
+        k = tables.paths.row[work.paths.awake[index]]
+        for m in range(k + 1, k + 3):
+            rate[tables.state[m]] = rows[RATE, m]
+    for i in range(2 * tables.touching // 3, tables.state_row.size):
         rate[i] = rows[RATE, tables.state_row[i]]
 
 
@@ -161,7 +165,7 @@ def evaluate(model: Any, address: int, time: float) -> None:
     inverse_dynamics(tables, v, work.acceleration, work, work.bias, False)
     for j in range(size):
         work.acceleration[j] = work.torque[j] + work.external[j] - work.bias[j]
-    solve_mass(size, work, work.acceleration)
+    solve_mass(tables, size, work, work.acceleration)
     for j in range(size, width):
         work.acceleration[j] = work.torque[j] / tables.lumps[j - size]
     if work.guide.size > 0:

@@ -183,9 +183,12 @@ def linearise(model: Any, address: int, time: float) -> None:
     inverse_dynamics_derivatives(tables, velocity, work)
     for i in range(size):
         for j in range(size):
-            linear.mass[i, j] = work.square[MASS_MATRIX, i, j]
             linear.by_position[i, j] = work.square[BY_POSITION, i, j]
+        # A body and those that it carries stand between their root and the last of them.
+        for j in range(tables.roots[i], i + 1):
+            linear.mass[i, j] = linear.mass[j, i] = work.square[MASS_MATRIX, i, j]
             linear.by_velocity[i, j] = work.square[BY_VELOCITY, i, j]
+            linear.by_velocity[j, i] = work.square[BY_VELOCITY, j, i]
     if control.palm.harmonics.shape[0] > 0:
         call_at(model.sway, address, time)
     if tables.loaded:
@@ -200,8 +203,9 @@ def linearise(model: Any, address: int, time: float) -> None:
         if begin >= tables.touching:
             call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, begin, end)
             continue
-        for k in range(begin, end, 3):
-            if work.paths.asleep[k] == 0:
+        for index in range(work.paths.awake_count[0]):
+            k = tables.paths.row[work.paths.awake[index]]
+            if begin <= k < end:
                 call_filling(tables.laws[g, 1], work.rows, tables.parameters, work.slopes, k, k + 3)
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])

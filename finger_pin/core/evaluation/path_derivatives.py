@@ -12,7 +12,7 @@ from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wren
 from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.jit import call_shape, compiled
-from finger_pin.core.path_tables import WRENCH
+from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
 @compiled
@@ -129,21 +129,19 @@ def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
 @compiled
 def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
     """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
-    paths, own = tables.paths, work.paths
-    for e in range(paths.columns.size):
-        if own.active[e]:
-            _slopes_of_piece(paths, e, work)
+    paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.touching
+    for index in range(own.closed_count[0]):
+        _slopes_of_piece(paths, own.closed[index], work)
+    for e in range(touching // COLUMNS, paths.columns.size):
+        _slopes_of_piece(paths, e, work)
     axes, gather, net, crossed = work.spatial[AXIS], own.gather, work.vectors[0], work.vectors[1]
-    for index in range(paths.rows.size):
+    for at in range(closed + paths.rows.size - touching):
+        index = paths.row[own.closed[at // COLUMNS]] + at % COLUMNS if at < closed else at - closed + touching
         k = paths.rows[index]
-        if tables.touch[k] == 0:
+        if k >= touching:
             _add_turns(tables, work, linear, index)
-        elif own.active[paths.piece[paths.leg_start[index]]] == 0:
-            continue
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
-            if own.active[e] == 0:
-                continue
             weight = paths.weights[leg, 0]
             force = weight * work.rows[FORCE, k]
             begin, end = paths.start[e], paths.start[e + 1]

@@ -10,7 +10,7 @@ from finger_pin.core.evaluation.law_code import FORCE, SIDE
 from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import dot
 from finger_pin.core.jit import call_shape, compiled
-from finger_pin.core.path_tables import WRENCH
+from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
 @compiled
@@ -27,10 +27,6 @@ def _frame(paths: Any, e: int, work: Any) -> None:
     own = work.paths
     rotation, origin, ends = own.frame[e], own.origin[e], own.ends[e]
     body = paths.carriers[e, 2]
-    for r in range(3):
-        origin[r] = paths.origin[e, r]
-        for c in range(3):
-            rotation[r, c] = paths.rotation[e, r, c]
     if body >= 0:
         above = work.rotation[body]
         for r in range(3):
@@ -89,11 +85,11 @@ def _measure(paths: Any, e: int, work: Any) -> None:
     out, columns = own.out[e], paths.columns[e]
     own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[SIDE, paths.row[e]] > 0.0 else 0
     rotation, ends, point = own.frame[e], own.ends[e], work.centre
+    if own.active[e] == 0:
+        return
     for m in range(columns):
         for i in range(WRENCH):
             own.wrench[e, m, i] = 0.0
-    if own.active[e] == 0:
-        return
     if columns == 1:
         wrench = own.wrench[e, 0]
         for p in range(2):
@@ -129,21 +125,27 @@ def angle_between(first: Any, second: Any) -> Any:
 
 @compiled
 def measure_paths(tables: Any, work: Any) -> None:
-    """Fill lengths, turns and arms of all rows with paths, after `move`."""
-    paths, own = tables.paths, work.paths
+    """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if awake."""
+    paths, own, first = tables.paths, work.paths, tables.touching
     closed = 0
-    for e in range(paths.columns.size):
-        if own.asleep[paths.row[e]] == 0:
-            _measure(paths, e, work)
-            if paths.columns[e] > 1 and own.active[e]:
-                own.closed[closed] = e
-                closed += 1
+    for index in range(own.awake_count[0]):
+        e = own.awake[index]
+        _measure(paths, e, work)
+        if own.active[e]:
+            own.closed[closed] = e
+            closed += 1
+        else:
+            own.length[paths.row[e]] = own.out[e, 0]
     own.closed_count[0] = closed
+    for e in range(first // COLUMNS, paths.columns.size):
+        _measure(paths, e, work)
     axes, gather, net = work.spatial[AXIS], own.gather, work.vectors[0]
-    for index in range(paths.rows.size):
+    for at in range(COLUMNS * closed + paths.rows.size - first):
+        # The rows of contacts are their places, too.
+        index = at - COLUMNS * closed + first
+        if at < COLUMNS * closed:
+            index = paths.row[own.closed[at // COLUMNS]] + at % COLUMNS
         k = paths.rows[index]
-        if own.asleep[k]:
-            continue
         length, turn = 0.0, 0.0
         begin, end = tables.arm_start[k], tables.arm_start[k + 1]
         for a in range(begin, end):

@@ -167,14 +167,11 @@ def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
 
 @compiled
 def mass_matrix(tables: Any, work: Any) -> None:
-    """Fill work.square[MASS_MATRIX] = M after `move`."""
+    """Fill work.square[MASS_MATRIX] = M after `move`; what no tree joins is zero from the start."""
     size = tables.parents.size
     for i in range(size):
         momentum = work.spatial[MOMENTUM, i]
         apply_inertia(work.composite[i], work.spatial[AXIS, i], momentum)
-        for j in range(i):
-            work.square[MASS_MATRIX, i, j] = 0.0
-            work.square[MASS_MATRIX, j, i] = 0.0
         j = i
         while j >= 0:
             value = dot(work.spatial[AXIS, j], momentum)
@@ -186,31 +183,26 @@ def mass_matrix(tables: Any, work: Any) -> None:
 
 @compiled
 def factorise_mass(tables: Any, size: int, work: Any) -> None:
-    """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted."""
+    """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted, tree by tree."""
     factor = work.square[CHOLESKY]
     for i in range(size):
-        # Trees on the base do not feel each other's inertia.
-        first = i
-        while tables.parents[first] >= 0:
-            first = tables.parents[first]
-        for j in range(first, i + 1):
+        for j in range(tables.roots[i], i + 1):
             value = work.square[MASS_MATRIX, i, j]
-            for k in range(first, j):
+            for k in range(tables.roots[i], j):
                 value -= factor[i, k] * factor[j, k]
             factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
 
 
 @compiled
-def solve_mass(size: int, work: Any, vector: Any) -> None:
+def solve_mass(tables: Any, size: int, work: Any, vector: Any) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
     factor = work.square[CHOLESKY]
     for i in range(size):
         value = vector[i]
-        for k in range(i):
+        for k in range(tables.roots[i], i):
             value -= factor[i, k] * vector[k]
         vector[i] = value * factor[i, i]
     for i in range(size - 1, -1, -1):
-        value = vector[i]
-        for k in range(i + 1, size):
-            value -= factor[k, i] * vector[k]
-        vector[i] = value * factor[i, i]
+        vector[i] *= factor[i, i]
+        for k in range(tables.roots[i], i):
+            vector[k] -= factor[i, k] * vector[i]

@@ -60,7 +60,10 @@ def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
 
 @compiled
 def inverse_dynamics_derivatives(tables: Any, velocity: Any, work: Any) -> None:
-    """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`."""
+    """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`.
+
+    Of bodies that neither carries the other they are zero from the start.
+    """
     size = tables.parents.size
     by_position, by_velocity = work.square[BY_POSITION], work.square[BY_VELOCITY]
     for i in range(size):
@@ -73,9 +76,6 @@ def inverse_dynamics_derivatives(tables: Any, velocity: Any, work: Any) -> None:
         motion_cross(carried, work.spatial[AXIS_RATE, i], work.vectors[0])
         for k in range(6):
             work.spatial[AXIS_CURVE, i, k] += work.vectors[0][k]
-        for j in range(size):
-            by_position[i, j] = 0.0
-            by_velocity[i, j] = 0.0
     for i in range(size - 1, -1, -1):
         block, axis = work.coriolis[i], work.spatial[AXIS, i]
         rate, curve = work.spatial[AXIS_RATE, i], work.spatial[AXIS_CURVE, i]

@@ -12,7 +12,7 @@ from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.jit import Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, call_filling, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.broad_phase import arrive, glide, settle, wake
+from finger_pin.core.stepping.broad_phase import arrive, glide, list_awake, settle, wake
 from finger_pin.core.tables import END, FIRST
 
 
@@ -88,11 +88,15 @@ def _book(tables: Any, work: Any, totals: Any) -> None:
     for g in range(tables.groups.shape[0]):
         begin, end = tables.groups[g, FIRST], tables.groups[g, END]
         if begin < tables.touching:
-            for k in range(begin, end, 3):
-                if work.paths.asleep[k] == 0:
+            for index in range(work.paths.awake_count[0]):
+                k = tables.paths.row[work.paths.awake[index]]
+                if begin <= k < end:
                     call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + 3)
-        else:
-            call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
+                    for i in range(tables.books.shape[1]):
+                        if tables.books[g, i] >= 0:
+                            totals[tables.books[g, i]] += work.powers[i, k]
+            continue
+        call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
         for i in range(tables.books.shape[1]):
             if tables.books[g, i] >= 0:
                 for k in range(begin, end):
@@ -160,6 +164,7 @@ def evaluate_many(address: int, _time: float) -> int:
         work.paths.asleep[k] = 0
     for e in range(work.paths.path.size):
         work.paths.path[e] = 0.0
+    list_awake(tables, work.paths)
     for m in range(states.shape[0]):
         for i in range(commands.shape[1]):
             control.tension[i] = commands[m, i]
@@ -170,6 +175,7 @@ def evaluate_many(address: int, _time: float) -> int:
             model.state[c] = states[m, c]
         if sleepy and m > 0:
             _wake(tables, work, attitudes, m, before, model.state)
+            list_awake(tables, work.paths)
         _set_base(bases, m, tables, work)
         place_bodies(tables, attitudes[m])
         if rates.shape[0] > 0 or bases.shape[0] > 0:

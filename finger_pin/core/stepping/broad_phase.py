@@ -13,6 +13,7 @@ import numpy as np
 
 from finger_pin.core.evaluation.law_code import RATE
 from finger_pin.core.jit import compiled
+from finger_pin.core.path_tables import COLUMNS
 
 # A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.
 KNOWN, _AHEAD = 1e-9, 3.0
@@ -109,6 +110,23 @@ def set_asleep(k: int, value: int, asleep: Any) -> None:
         asleep[m] = value
 
 
+def wake_all(tables: Any, own: Any) -> None:
+    """Wake all contacts, outside compiled code."""
+    own.asleep[:], own.awake[:] = 0, np.arange(own.awake.size)
+    own.awake_count[0] = tables.touching // COLUMNS
+
+
+@compiled
+def list_awake(tables: Any, own: Any) -> None:
+    """List the contacts that are awake."""
+    awake = 0
+    for e in range(tables.touching // COLUMNS):
+        if own.asleep[tables.paths.row[e]] == 0:
+            own.awake[awake] = e
+            awake += 1
+    own.awake_count[0] = awake
+
+
 @compiled
 def wake(tables: Any, own: Any) -> None:
     """Wake the contacts that may close on the way that was traced; note the paths of all."""
@@ -144,9 +162,13 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
 
 
 @compiled
-def settle(tables: Any, rows: Any, own: Any, states: Any) -> None:
-    """Let contacts fall asleep or wake up where a step has ended, with what is known of their gaps there."""
-    paths = tables.paths
+def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
+    """Let contacts fall asleep or wake up where a step has ended, with what is known of their gaps there.
+
+    Returns:
+        Whether any did.
+    """
+    paths, changed = tables.paths, False
     for e in range(paths.columns.size):
         k = paths.row[e]
         if paths.columns[e] == 1:
@@ -156,7 +178,10 @@ def settle(tables: Any, rows: Any, own: Any, states: Any) -> None:
             own.clear[e] = own.ahead[e]
             own.far[e] += own.path[e]
             if near:
+                changed = True
                 set_asleep(k, 0, own.asleep)
         elif not near and own.active[e] == 0 and _straighten(tables, rows, k, states):
             own.clear[e], own.far[e] = own.ahead[e], own.far[e] + own.path[e]
+            changed = True
             set_asleep(k, 1, own.asleep)
+    return changed

@@ -15,6 +15,7 @@ from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.jit import Unit, bound
 from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.stepping.islands import Island
 from finger_pin.core.stepping.knots import KNOTTED, Knotted, advance_knotted
@@ -167,7 +168,7 @@ class Part:
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
         """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
         self.x[:], self.attitude[:] = x, attitude
-        self.work.paths.asleep[:] = 0
+        wake_all(self.tables, self.work.paths)
         place_all(self.tables, self.attitude)
         self.memory[[core.LAST_STEP, core.LAST_ERROR, core.CULPRIT, core.HELD_STEP]] = 0.0
         self.memory[core.STEP] = FIRST_STEP

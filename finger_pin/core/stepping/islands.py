@@ -107,6 +107,7 @@ def select(tables: Tables, island: Island) -> Tables:
     terms = np.concatenate([inputs, loads])
     return tables._replace(
         parents=_mapped(body, tables.parents[bodies]),
+        roots=body[tables.roots[bodies]],
         kinds=tables.kinds[bodies],
         bodies=tables.bodies[bodies],
         charts=body[tables.charts[charts]],

@@ -11,7 +11,7 @@ from finger_pin.core.evaluation.charts import rechart
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.broad_phase import depart, settle
+from finger_pin.core.stepping.broad_phase import depart, list_awake, settle
 from finger_pin.core.stepping.drift import carry, weigh
 from finger_pin.core.stepping.error_norm import step_error, worst
 from finger_pin.core.stepping.flights import NOTHING, UNSEEN, survey
@@ -143,6 +143,19 @@ def _step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> i
     return outcome
 
 
+@compiled
+def _still(tables: Any, model: Any, integration: Any) -> None:
+    """Clear what earlier steps have left of the states of contacts that sleep, which are zero and stay so."""
+    first = 2 * model.linear.mass.shape[0]
+    for row in range(0, tables.touching, 3):
+        if model.work.paths.asleep[row]:
+            for m in range(row + 1, row + 3):
+                c = first + tables.state[m]
+                integration.start[c] = integration.drift[c] = model.rate[c] = 0.0
+                for j in range(integration.k.shape[0]):
+                    integration.k[j, c] = 0.0
+
+
 @Unit
 def advance(address: int, end: float) -> int:
     """Take steps of the `Stretch` at an address until a time, s, or until its record is full; return a status."""
@@ -157,6 +170,7 @@ def advance(address: int, end: float) -> int:
     size, count = x.size, tableau.nodes.size
     exponent = 1.0 / tableau.order
     fresh, whole = True, 0.0
+    list_awake(tables, model.work.paths)
     # Right after a full record nothing has jumped.
     jumped = control.kind == HELD and memory[HELD_STEP] >= 0.0
     memory[HELD_STEP] = abs(memory[HELD_STEP])
@@ -217,6 +231,7 @@ def advance(address: int, end: float) -> int:
             touch = NOTHING if seen else survey(integration, model)
             if touch == UNSEEN:
                 # The same step once more, with what slept.
+                list_awake(tables, model.work.paths)
                 fresh = True
                 continue
             if dear or touch < NOTHING:
@@ -261,8 +276,9 @@ def advance(address: int, end: float) -> int:
             )
             memory[DRIFT] += h * weigh(integration.joints, width, drift)
             memory[OBJECT_DRIFT] += h * weigh(integration.objects, width, drift)
-            if tables.touching:
-                settle(tables, rows, model.work.paths, reached[2 * width :])
+            if tables.touching and settle(tables, rows, model.work.paths, reached[2 * width :]):
+                list_awake(tables, model.work.paths)
+                _still(tables, model, integration)
             for c in range(size):
                 x[c] = reached[c]
             memory[TIME] = end if last else time + h

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from finger_pin.core.control import HELD, Control
 from finger_pin.core.evaluation.charts import Charts
 from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
 from finger_pin.core.stepping.islands import Island, find_islands, select, select_control
@@ -231,7 +232,7 @@ class Stepper:
                 self.parts[index] = self.parts[index].with_loads(loaded)
             part = self.parts[index]
             part.drives, part.knots = drives, knots
-            part.work.paths.asleep[:] = 0
+            wake_all(part.tables, part.work.paths)
             for own, other in zip(part.moment, moment, strict=True):
                 own[...] = other
 
