@@ -14,7 +14,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 
 # Postures from which the search for the worst goes on.
 _DEEPER = 3
@@ -56,7 +56,7 @@ class ClosureRange(BriefRepr):
         return f"no force closure at {where}"
 
 
-def posed(finger: Finger, position: Sequence[float] | Array) -> Finger:
+def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     """Return a finger whose tendons have the arms everywhere that they have at a posture, for statics there.
 
     What this room says of a finger at a posture, such as `critical_friction` and `force_polytope`, it says of one with
@@ -66,6 +66,7 @@ def posed(finger: Finger, position: Sequence[float] | Array) -> Finger:
         finger: A finger.
         position: theta, shape (n,), rad.
     """
+    finger = as_finger(finger)
     theta = finite_vector("position", position, len(finger.routing.joints))
     if finger.paths is None:
         return finger
@@ -83,7 +84,7 @@ def posed(finger: Finger, position: Sequence[float] | Array) -> Finger:
     return twin
 
 
-def closure_over_range(finger: Finger, samples: int = 512) -> ClosureRange:
+def closure_over_range(finger: FingerLike, samples: int = 512) -> ClosureRange:
     """Return force closure over the joints' ranges: at evenly spread postures, and at the worst that is found.
 
     Postures are a Sobol sequence; from the worst of them a simplex search goes on within the ranges.
@@ -92,6 +93,7 @@ def closure_over_range(finger: Finger, samples: int = 512) -> ClosureRange:
         finger: A finger; what its tendons run along may depend on the posture.
         samples: Postures, best a power of two.
     """
+    finger = as_finger(finger)
     lower, upper = finger.stroke_limiter.lower, finger.stroke_limiter.upper
     spread = scipy.stats.qmc.Sobol(len(lower), seed=0).random(samples)
     positions = list(lower + spread * (upper - lower))
@@ -115,7 +117,7 @@ def closure_over_range(finger: Finger, samples: int = 512) -> ClosureRange:
     )
 
 
-def locking_over_range(finger: Finger, samples: int = 64) -> tuple[CriticalFriction, Array]:
+def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalFriction, Array]:
     """Return the least margin to self-locking over the joints' ranges, and its posture, shape (n,), rad.
 
     All joints move in their worst directions, which are 2^n, at evenly spread postures with force closure; tendons
@@ -128,6 +130,7 @@ def locking_over_range(finger: Finger, samples: int = 64) -> tuple[CriticalFrict
     Raises:
         InputError: If no posture has force closure.
     """
+    finger = as_finger(finger)
     found = closure_over_range(finger, samples)
     taut = found.positions[np.all(found.tension > 0.0, axis=1)]
     if not len(taut):

@@ -12,7 +12,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 
 # The descent: its length, s2, and the acceleration, in parts of the first, at which it has arrived.
 _LONGEST, _ARRIVED = 1e4, 1e-6
@@ -38,11 +38,11 @@ class Equilibrium(BriefRepr):
 
 
 def equilibrium(
-    finger: Finger,
-    tension: Sequence[float] | Array,
+    finger: FingerLike,
+    inputs: Sequence[float] | Array,
     *,
     position: Sequence[float] | Array | None = None,
-    force: Sequence[float] | Array = (0.0, 0.0, 0.0),
+    fingertip_force: Sequence[float] | Array = (0.0, 0.0, 0.0),
 ) -> Equilibrium:
     """Return the state at rest under given tensions, that which a finger without friction comes to.
 
@@ -52,21 +52,22 @@ def equilibrium(
 
     Args:
         finger: One finger, with ideal sources of tension.
-        tension: f^a, shape (a,), N.
+        inputs: Tensions f^a, shape (a,), N.
         position: theta to begin at, shape (n,), rad; by default the angles of the ranges nearest to zero.
-        force: F at the fingertip, shape (3,), N, base frame.
+        fingertip_force: F, shape (3,), N, base frame.
 
     Raises:
         InputError: If a size is wrong, a tension is negative, the finger has servos, objects or rows with states of
             their own, or it comes to no rest.
     """
+    finger = as_finger(finger)
     layout = finger.layout
     if finger.description.hand is not None or layout.motors or layout.objects or layout.contacts or layout.further:
         raise InputError("finger", "must be one finger with ideal sources of tension, without objects")
-    command = np.array(finite_vector("tension", tension, finger.routing.actuated))
+    command = np.array(finite_vector("inputs", inputs, finger.routing.actuated))
     if np.any(command < 0.0):
-        raise InputError("tension", "must not be negative", command.tolist())
-    pushed = np.array(finite_vector("force", force, 3))
+        raise InputError("inputs", "a tension must not be negative", command.tolist())
+    pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))
     joints = len(finger.routing.joints)
     limits = np.array([joint.range for joint in finger.description.joints.values()], dtype=float)
     start = np.clip(0.0, *limits.T) if position is None else np.array(finite_vector("position", position, joints))
@@ -104,7 +105,7 @@ def equilibrium(
         places = scale * nearer
     left = float(np.max(np.abs(acceleration(places) / scale)))
     if not left < max(_REST, 1e-9 * begun):
-        raise InputError("tension", "the finger comes to no rest under it", command.tolist())
+        raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
     x = placed(places)
     torque = finger.evaluate(x, command, pushed).tendon_torque
     return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)

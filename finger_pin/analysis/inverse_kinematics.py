@@ -14,7 +14,7 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 
 # A fingertip this close, m, is there.
 _THERE = 1e-6
@@ -45,7 +45,7 @@ class TipPosture(BriefRepr):
 
 
 def inverse_kinematics(
-    finger: Finger, point: Sequence[float] | Array, *, near: Sequence[float] | Array | None = None
+    finger: FingerLike, point: Sequence[float] | Array, *, near: Sequence[float] | Array | None = None
 ) -> TipPosture:
     """Return the posture, within the joints' ranges, whose fingertip is nearest to a point.
 
@@ -60,6 +60,7 @@ def inverse_kinematics(
     Raises:
         InputError: If the point or the preferred posture has a wrong size, or it is a hand.
     """
+    finger = as_finger(finger)
     one_finger(finger.description)
     target = np.array(finite_vector("point", point, 3))
     limits = np.array([joint.range for joint in finger.description.joints.values()], dtype=float)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,7 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.family import Family
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import finite_vector
@@ -46,7 +45,7 @@ _Map = Callable[[Finger, Array, Array], Array]
 
 
 def linearise(
-    finger_or_scenario: Finger | Scenario | str | Path,
+    finger_or_scenario: Finger | ScenarioLike,
     state: ArrayLike,
     inputs: ArrayLike,
     dt: float | None = None,
@@ -72,13 +71,8 @@ def linearise(
         InputError: If state or inputs have a wrong size, free objects are among the coordinates, ``dt`` is not
             positive, or parameters are asked of a finger without a scenario or are not single numbers.
     """
-    scenario: Scenario | None = None
-    if isinstance(finger_or_scenario, str | Path):
-        finger_or_scenario = load_scenario(finger_or_scenario)
-    if isinstance(finger_or_scenario, Scenario):
-        scenario = finger_or_scenario
-    finger = _built(scenario) if scenario is not None else finger_or_scenario
-    assert isinstance(finger, Finger)
+    scenario = None if isinstance(finger_or_scenario, Finger) else load_scenario(finger_or_scenario)
+    finger = finger_or_scenario if isinstance(finger_or_scenario, Finger) else _built(load_scenario(finger_or_scenario))
     if finger.layout.objects:
         raise InputError(
             "scenario.environment.objects", "a free object has no linear coordinates", finger.layout.objects

@@ -13,12 +13,11 @@ from finger_pin.analysis.directions import directions_of_motion, sliding_velocit
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.hand import one_finger
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.loading import describe
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.finger import Finger, FingerLike
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +41,7 @@ class CriticalFriction(BriefRepr):
 
 
 def critical_friction(
-    finger: Finger | FingerDescription,
+    finger: FingerLike,
     position: Sequence[float] | Array | None = None,
     *,
     joints: Sequence[str] | None = None,
@@ -94,9 +93,10 @@ def critical_friction(
     )
 
 
-def _tendons(finger: Finger | FingerDescription) -> Tendons:
-    one_finger(finger.description if isinstance(finger, Finger) else finger)
-    return finger.tendons if isinstance(finger, Finger) else Tendons.from_description(finger)
+def _tendons(finger: FingerLike) -> Tendons:
+    description = finger.description if isinstance(finger, Finger) else describe(finger)
+    one_finger(description)
+    return finger.tendons if isinstance(finger, Finger) else Tendons.from_description(description)
 
 
 def _moving(names: tuple[str, ...], joints: Sequence[str] | None) -> NDArray[np.bool_]:

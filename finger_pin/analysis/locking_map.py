@@ -15,7 +15,7 @@ from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,7 @@ class SelfLockingMap(BriefRepr):
 
 
 def self_locking_map(
-    finger: Finger,
+    finger: FingerLike,
     joints: tuple[str, ...] | None = None,
     *,
     fixed: Mapping[str, float] | None = None,
@@ -69,6 +69,7 @@ def self_locking_map(
         InputError: If a joint does not exist, is named twice or is driven by a passive tendon, or there is no force
             closure.
     """
+    finger = as_finger(finger)
     one_finger(finger.description)
     routing, limiter = finger.routing, finger.stroke_limiter
     coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))

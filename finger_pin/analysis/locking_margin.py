@@ -12,6 +12,7 @@ from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.control.reference import SignalReference
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
@@ -46,7 +47,7 @@ class SelfLockingMargin(BriefRepr):
 
 
 def self_locking_margin(
-    scenario: Scenario, samples: int = 500, most: int | None = None, servos: bool = False
+    scenario: ScenarioLike, samples: int = 500, most: int | None = None, servos: bool = False
 ) -> SelfLockingMargin:
     """Return the margin to self-locking along a scenario's reference.
 
@@ -56,7 +57,7 @@ def self_locking_margin(
     Against joints that keep sliding, whose friction is M^d, the margin is the larger by M^c / M^d.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, its name, or the path of a file.
         samples: Instants of the reference; directions that last for less than their distance may be missed.
         most: Greatest number of combinations to look at, those that seem closest to locking; all by default. A finger
             of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
@@ -65,7 +66,7 @@ def self_locking_margin(
 
     Of a hand it is that of the finger that is closest, with the position and the directions of its own joints.
     """
-    parts = scenario.parts()
+    parts = load_scenario(scenario).parts()
     if len(parts) > 1:
         return min(
             (self_locking_margin(part, samples, most, servos=servos) for part in parts.values()),

@@ -28,7 +28,7 @@ import pinocchio as pin
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
 
 
@@ -61,7 +61,7 @@ class PinWrench(BriefRepr):
 
 
 def pin_wrench(
-    finger: Finger,
+    finger: FingerLike,
     position: Array,
     velocity: Array,
     acceleration: Array,
@@ -83,6 +83,7 @@ def pin_wrench(
     Raises:
         InputError: If a joint carries no link.
     """
+    finger = as_finger(finger)
     geometry, body, routing = TendonGeometry(finger.description), finger.rigid_body, finger.routing
     carried = -body.distal_weights()
     links = _links(finger, position, velocity, acceleration)

@@ -14,7 +14,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.analysis.tip_statics import UNBOUNDED, Friction, TipStatics, command_bounds, posture
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 
 _RANK = 1e-6
 _FLAT = 1e-7
@@ -92,11 +92,11 @@ class ForcePolytope(BriefRepr):
 
 
 def force_polytope(
-    finger: Finger,
+    finger: FingerLike,
     position: Sequence[float] | Array,
-    limit: float | tuple[float, ...],
+    maximum_tension: float | tuple[float, ...],
     *,
-    minimum: float | tuple[float, ...] = 0.0,
+    minimum_tension: float | tuple[float, ...] = 0.0,
     friction: Friction = Friction.NONE,
 ) -> ForcePolytope:
     """Return the forces that the fingertip can exert within tension limits, weight included.
@@ -107,17 +107,18 @@ def force_polytope(
     Args:
         finger: A finger with force closure.
         position: theta, shape (n,), rad.
-        limit: Greatest f^a, N, one number or one per actuated tendon.
-        minimum: Least f^a, N, likewise.
+        maximum_tension: Greatest f^a, N, one number or one per actuated tendon.
+        minimum_tension: Least f^a, N, likewise.
         friction: NONE or HELPING.
 
     Raises:
         InputError: If an argument is wrong, or no tensions within the limits hold the finger without a contact or with
             one.
     """
+    finger = as_finger(finger)
     if friction is Friction.HINDERING:
         raise InputError("friction", "must be none or helping; what hinders depends on the direction", friction.value)
-    theta, bounds = posture(finger, position), command_bounds(finger, minimum, limit)
+    theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     statics = TipStatics.of(finger, theta, friction, (), np.zeros(len(theta)))
     left, values, _ = np.linalg.svd(statics.jacobian)
     basis = left[:, : int(np.sum(values > _RANK * np.max(values)))]

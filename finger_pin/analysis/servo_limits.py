@@ -13,10 +13,10 @@ import numpy as np
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 
 
-def tension_limits(finger: Finger, *, holding: bool = False) -> tuple[float, ...]:
+def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float, ...]:
     """Return the greatest tension at every actuated tendon's spool, N, in slow motion or at rest.
 
     The current is at most I_max, and V / R. Of two tendons on one spool each has it while the other one is slack.
@@ -25,6 +25,7 @@ def tension_limits(finger: Finger, *, holding: bool = False) -> tuple[float, ...
         finger: With actuators; a tendon without one has no limit: infinity.
         holding: Whether gears may help, as against a load that pulls; by default they have to be overcome.
     """
+    finger = as_finger(finger)
     limits = np.full(finger.routing.actuated, np.inf)
     for actuator in finger.description.actuators.values():
         motor, gears = actuator.motor, actuator.motor.friction

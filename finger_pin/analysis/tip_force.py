@@ -20,7 +20,7 @@ from finger_pin.analysis.tip_statics import (
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,12 +42,12 @@ class RequiredTension(BriefRepr):
 
 
 def largest_force(
-    finger: Finger,
+    finger: FingerLike,
     position: Sequence[float] | Array,
     direction: Sequence[float] | Array,
-    limit: float | tuple[float, ...],
+    maximum_tension: float | tuple[float, ...],
     *,
-    minimum: float | tuple[float, ...] = 0.0,
+    minimum_tension: float | tuple[float, ...] = 0.0,
     friction: Friction = Friction.NONE,
 ) -> float:
     """Return the largest force that the fingertip can exert straight along a direction, N; negative if only backwards.
@@ -56,8 +56,8 @@ def largest_force(
         finger: A finger with force closure.
         position: theta, shape (n,), rad.
         direction: Of E, shape (3,), base frame; its length does not matter.
-        limit: Greatest f^a, N, one number or one per actuated tendon.
-        minimum: Least f^a, N, likewise.
+        maximum_tension: Greatest f^a, N, one number or one per actuated tendon.
+        minimum_tension: Least f^a, N, likewise.
         friction: Of any kind.
 
     Returns:
@@ -66,7 +66,8 @@ def largest_force(
     Raises:
         InputError: If an argument is wrong.
     """
-    theta, bounds = posture(finger, position), command_bounds(finger, minimum, limit)
+    finger = as_finger(finger)
+    theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     along = _unit(direction)
     worst = np.inf
     for slide, signs in slips(finger, finger.rigid_body.jacobian(theta), along, friction):
@@ -83,11 +84,11 @@ def largest_force(
 
 
 def tension_for_force(
-    finger: Finger,
+    finger: FingerLike,
     position: Sequence[float] | Array,
     force: Sequence[float] | Array,
     *,
-    minimum: float | tuple[float, ...] = 0.0,
+    minimum_tension: float | tuple[float, ...] = 0.0,
     friction: Friction = Friction.NONE,
 ) -> RequiredTension:
     """Return the tensions with the least maximum at which the fingertip exerts a force.
@@ -96,13 +97,14 @@ def tension_for_force(
         finger: A finger with force closure.
         position: theta, shape (n,), rad.
         force: E = -F, shape (3,), N, base frame; zero holds the finger against its weight.
-        minimum: Least f^a, N, one number or one per actuated tendon.
+        minimum_tension: Least f^a, N, one number or one per actuated tendon.
         friction: Of any kind; HELPING gives what holds at least, HINDERING what surely pushes.
 
     Raises:
         InputError: If an argument is wrong, or no tensions whatever give this force.
     """
-    theta, bounds = posture(finger, position), command_bounds(finger, minimum, np.inf)
+    finger = as_finger(finger)
+    theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, np.inf)
     wanted = finite_vector("force", force, 3)
     jacobian = finger.rigid_body.jacobian(theta)
     needed: list[RequiredTension] = []

@@ -26,7 +26,7 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 from finger_pin.mechanism.tendons import Tendons
 
 if TYPE_CHECKING:
@@ -74,13 +74,14 @@ class TransmissionInMotion(BriefRepr):
     direction: Array
 
 
-def transmission_efficiency(finger: Finger, position: Array) -> TransmissionEfficiency:
+def transmission_efficiency(finger: FingerLike, position: Array) -> TransmissionEfficiency:
     """Return the transmission efficiency of every tendon in steady sliding and at rest.
 
     Args:
         finger: Any finger.
         position: theta, shape (..., n), rad.
     """
+    finger = as_finger(finger)
     tendons = finger.tendons
     routing = tendons.routing
     curvature = routing.curvature(np.asarray(position, dtype=float))
@@ -112,7 +113,7 @@ def coupling_in_motion(tendons: Tendons, position: Array, velocity: Array) -> Ar
     return np.concatenate([share * routing.actuated_coupling, passive])
 
 
-def workspace_postures(finger: Finger, samples: int = 9) -> Array:
+def workspace_postures(finger: FingerLike, samples: int = 9) -> Array:
     """Return a grid of postures over the ranges of all joints, shape (m, n), rad.
 
     Joints that passive tendons drive follow the others as inextensible tendons demand, (4); postures in which one of
@@ -122,6 +123,7 @@ def workspace_postures(finger: Finger, samples: int = 9) -> Array:
         finger: Any finger.
         samples: Angles per free joint.
     """
+    finger = as_finger(finger)
     limiter, coupling = finger.stroke_limiter, _inextensible(finger)
     low, high = limiter.lower, limiter.upper
     axes = [
@@ -133,7 +135,7 @@ def workspace_postures(finger: Finger, samples: int = 9) -> Array:
     return np.asarray(postures[inside])
 
 
-def flexion_postures(finger: Finger, samples: int = 41) -> Array:
+def flexion_postures(finger: FingerLike, samples: int = 41) -> Array:
     """Return postures over the ranges of the last two free joints, rad, shape (samples, samples, n); others near zero.
 
     A finger of one free joint moves that one alone along the first axis. (4) holds, ranges of driven joints are not
@@ -143,6 +145,7 @@ def flexion_postures(finger: Finger, samples: int = 41) -> Array:
         finger: Any finger.
         samples: Angles per joint.
     """
+    finger = as_finger(finger)
     limiter, coupling = finger.stroke_limiter, _inextensible(finger)
     low, high = limiter.lower, limiter.upper
     postures = np.tile(np.clip(np.zeros(len(low)), low, high), (samples, samples, 1))
@@ -153,13 +156,14 @@ def flexion_postures(finger: Finger, samples: int = 41) -> Array:
     return np.asarray(postures @ coupling.matrix.T)
 
 
-def transmission_in_motion(finger: Finger, result: xr.Dataset) -> TransmissionInMotion:
+def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> TransmissionInMotion:
     """Return the transmission of every tendon along a simulation, beside that of steady sliding.
 
     Args:
         finger: The finger that was simulated.
         result: Dataset of `simulate`.
     """
+    finger = as_finger(finger)
     tendons = finger.tendons
     actuated = tendons.routing.actuated
     command, delivered, speed, normal, curvature = (

@@ -51,9 +51,9 @@ def export(
     text = "" if results else written(described(source, settings), target.suffix)
     target.parent.mkdir(parents=True, exist_ok=True)
     if results:
-        from finger_pin.simulation.netcdf import load_result, save
+        from finger_pin.simulation.netcdf import load, save
 
-        save(load_result(source), target)
+        save(load(source), target)
     else:
         with replacing(target) as temporary:
             Path(temporary).write_text(text, encoding="utf-8", newline="\n")

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
@@ -31,6 +31,10 @@ from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
 
 _Described = TypeVar("_Described", bound=Description)
+#: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
+ScenarioLike: TypeAlias = Scenario | str | Path
+#: Likewise a finger; a hand is one, too.
+DescriptionLike: TypeAlias = FingerDescription | HandDescription | str | Path
 
 
 def list_fingers() -> dict[str, str]:
@@ -84,7 +88,18 @@ def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> H
     return _load("hand", HandDescription, name, overrides)
 
 
-def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) -> Scenario:
+def describe(finger: DescriptionLike) -> FingerDescription:
+    """Return the description of a finger, or of all fingers of a hand together, that is given in any way.
+
+    Raises:
+        InputError: Naming the entry that is wrong.
+    """
+    if isinstance(finger, str | Path):
+        finger = load_hand(finger) if finger in list_hands() else load_finger(finger)
+    return finger.joined() if isinstance(finger, HandDescription) else finger
+
+
+def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """Load a scenario by the name of a shipped one or the path of a TOML file.
 
     A scenario file may say ``extends = "fig6"`` to start from another scenario, and ``finger = "ub"`` or, to change
@@ -92,7 +107,7 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     where there are several; each of ``hand.fingers`` has a ``finger`` of its own.
 
     Args:
-        name: Such as ``fig6`` or ``my_scenario.toml``.
+        name: Such as ``fig6`` or ``my_scenario.toml``; or a scenario, which the overrides change.
         overrides: Values by dotted key, such as ``{"controller.gain": 2.0}``; they win over the file. A star stands for
             every name, as in ``finger.actuators.*.spool_radius``. Paths among them are relative to the working
             directory, paths in a file to the file.
@@ -100,6 +115,8 @@ def load_scenario(name: str | Path, overrides: Mapping[str, Any] | None = None) 
     Raises:
         InputError: Naming the entry that is wrong.
     """
+    if isinstance(name, Scenario):
+        return read_scenario(name.model_dump(mode="python", exclude_unset=True), overrides) if overrides else name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
     overrides = from_here(overrides or {}, set(Scenario.model_fields))
@@ -115,25 +132,30 @@ def _shipped_scenario(name: str) -> Scenario:
 
 
 def load_bench(
-    name: str | Path, overrides: Mapping[str, Any] | None = None, identify: Mapping[str, Any] | None = None
+    name: ScenarioLike, overrides: Mapping[str, Any] | None = None, identify: Mapping[str, Any] | None = None
 ) -> tuple[Scenario, IdentifySettings]:
     """Load a scenario with its table ``[identify]``: what was recorded of it, and what is to be found.
 
     Args:
-        name: Name of a bench or scenario that ships, or path of a TOML file.
+        name: Name of a bench or scenario that ships, path of a TOML file, or a scenario.
         overrides: As for `load_scenario`.
         identify: Entries of the table, on top of the file's.
 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    overrides = from_here(overrides or {}, set(Scenario.model_fields))
+    checked = from_here(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
-        table, folder = read_scenario_file(str(name), Path())
+        table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path())
         wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))
         if not wanted:
             raise InputError("identify", "is missing: which parameters are to be found, and from which recordings")
-        return _scenario(table, folder, str(name), overrides), validate(IdentifySettings, wanted, ("identify",))
+        made = (
+            load_scenario(name, overrides)
+            if isinstance(name, Scenario)
+            else _scenario(table, folder, str(name), checked)
+        )
+        return made, validate(IdentifySettings, wanted, ("identify",))
 
 
 def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenario:

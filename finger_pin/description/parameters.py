@@ -259,6 +259,19 @@ class FingerDescription(Description):
         return self
 
     @property
+    def outline(self) -> str:
+        """Name, joints and tendons, in a line."""
+        if self.hand is not None:
+            sizes = f"{len(self.joints)} joints, {len(self.tendons)} tendons"
+            return f"{self.name}: fingers {', '.join(self.hand.fingers)}; {sizes}"
+        if self.tree is not None:
+            tree, pulled = self.tree, len(self.tendons)
+            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
+            return f"{self.name}: a tree of {sizes}, {len(tree.actuators)} actuators"
+        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in self.tendons.items())
+        return f"{self.name}: joints {', '.join(self.joints)}; tendons {tendons}"
+
+    @property
     def hand(self) -> HandDescription | None:
         """The hand whose fingers together this is; None for a finger."""
         hand: HandDescription | None = self._hand

@@ -65,8 +65,7 @@ class World:
         Raises:
             InputError: Naming the key or variable that is wrong.
         """
-        if isinstance(scenario, str | Path):
-            scenario = load_scenario(scenario)
+        scenario = load_scenario(scenario)
         if scenario.simulation.method not in TABLEAUS:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
-from finger_pin.description.loading import list_hands, load_finger, load_hand
+from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -19,6 +19,7 @@ from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.exchange.foreign_model import on_model
 from finger_pin.mechanism.exchange.urdf import build_rigid_body
+from finger_pin.mechanism.excursions import Excursions
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
@@ -56,7 +57,7 @@ class Finger:
 
     def __init__(
         self,
-        description: FingerDescription | HandDescription | str | Path,
+        description: DescriptionLike,
         rigid_body: RigidBody | None = None,
         rows: Sequence[Rows] = (),
         objects: Mapping[str, Object] | None = None,
@@ -75,11 +76,7 @@ class Finger:
             InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no
                 size, or an object the name of a joint.
         """
-        if isinstance(description, str | Path):
-            description = load_hand(description) if description in list_hands() else load_finger(description)
-        if isinstance(description, HandDescription):
-            description = description.joined()
-        self.description = description
+        self.description = description = describe(description)
         self._made_with = rigid_body, rows, objects
         self.paths: Routes | None = None
         if description.tree is None:
@@ -93,32 +90,19 @@ class Finger:
                 raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
         self.tendons = Tendons.from_description(description)
         self.routing = self.tendons.routing
+        self._excursions = Excursions(self.routing, description, self.paths)
         self.actuators = Actuators.from_description(description, self.routing)
         self.joint_friction = JointFriction.from_description(description, self.routing.loads)
         self.stroke_limiter = StrokeLimiter.from_description(description)
         self.springs = JointSprings.from_description(description)
+        self.visuals: pin.GeometryModel | None = None
         joints, motors = self.routing.joints, self.actuators.names
         width = len(joints) + self.routing.passive + len(motors)
-        of_springs = self.springs.hysteresis_rows(joints, width)
-        self.further = (*of_springs, *(tree_rows(description, self.paths, width) if self.paths else ()), *rows)
-        self.visuals: pin.GeometryModel | None = None
-        ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
-        states = further_states(self.further)
-        held = tuple(self.routing.tendons[self.actuators.tendons[k]] for k in self.actuators.held)
-        self.layout = Layout(joints, self.routing.tendons, self.routing.passive, states, ringing, motors, held=held)
-        pulling = self.tendons.rows(self.actuators)
-        if self.paths:
-            pulling = [along_paths(description, self.paths, table) for table in pulling]
-        self.mechanism = Mechanism(
+        of_tree = tree_rows(description, self.paths, width) if self.paths else ()
+        self.further = (*self.springs.hysteresis_rows(joints, width), *of_tree, *rows)
+        mechanism = Mechanism(
             self.rigid_body,
-            [
-                *pulling,
-                self.joint_friction.rows(joints, self.actuators, width),
-                self.stroke_limiter.rows(joints, width),
-                self.springs.rows(joints, width),
-                *(self.actuators.rotor_rows(width) if motors else []),
-                *self.further,
-            ],
+            self._tables(width),
             (*self.routing.passive_names, *motors),
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
             # Also where a tendon's input goes nowhere: the second one of a spool has none.
@@ -126,26 +110,38 @@ class Finger:
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
         placed = None if self.paths is None else self.paths.placed
-        around = None if objects is None else Surroundings.of(objects, description, self.mechanism, placed)
+        around = None if objects is None else Surroundings.of(objects, description, mechanism, placed)
         self.surroundings = around
-        if self.surroundings is not None:
-            self.mechanism = self.surroundings.around(self.mechanism)
-            free, contacts = tuple(self.surroundings.free), self.surroundings.contacts.names
-            self.layout = replace(self.layout, objects=free, contacts=contacts)
+        self.mechanism = mechanism if around is None else around.around(mechanism)
+        self.layout = self._laid_out()
+
+    def _tables(self, width: int) -> list[Rows]:
+        """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
+        joints, pulling = self.routing.joints, self.tendons.rows(self.actuators)
+        if self.paths:
+            pulling = [along_paths(self.description, self.paths, table) for table in pulling]
+        return [
+            *pulling,
+            self.joint_friction.rows(joints, self.actuators, width),
+            self.stroke_limiter.rows(joints, width),
+            self.springs.rows(joints, width),
+            *(self.actuators.rotor_rows(width) if self.actuators.names else []),
+            *self.further,
+        ]
+
+    def _laid_out(self) -> Layout:
+        tendons, motors, around = self.routing.tendons, self.actuators, self.surroundings
+        ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
+        held = tuple(tendons[motors.tendons[k]] for k in motors.held)
+        states, passive = further_states(self.further), self.routing.passive
+        layout = Layout(self.routing.joints, tendons, passive, states, ringing, motors.names, held=held)
+        if around is None:
+            return layout
+        return replace(layout, objects=tuple(around.free), contacts=around.contacts.names)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
-        described = self.description
-        if described.hand is not None:
-            sizes = f"{len(described.joints)} joints, {len(described.tendons)} tendons"
-            return f"<Finger {described.name}: fingers {', '.join(described.hand.fingers)}; {sizes}>"
-        if described.tree is not None:
-            tree, pulled = described.tree, len(described.tendons)
-            sizes = f"{len(tree.joints)} joints, {len(tree.tendons)} tendons ({pulled} pulled)"
-            sizes += f", {len(tree.actuators)} actuators"
-            return f"<Finger {described.name}: a tree of {sizes}>"
-        tendons = ", ".join(f"{name} ({tendon.kind})" for name, tendon in described.tendons.items())
-        return f"<Finger {described.name}: joints {', '.join(described.joints)}; tendons {tendons}>"
+        return f"<Finger {self.description.outline}>"
 
     @classmethod
     def from_model(
@@ -223,26 +219,26 @@ class Finger:
         return x
 
     def evaluate(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
         """Return all signals of (18) at a packed state.
 
         Args:
             x: Packed state, shape (size,) or (m, size).
-            command: f^a, shape (a,) or (m, a), N; of a motor in position drive its voltage, V, at its first tendon.
+            inputs: u, shape (a,) or (m, a): tensions f^a, N; of a motor in position drive its voltage, V.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
             base: How the palm of a hand moves, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
         """
-        return self.signals(x, command, fingertip_force, self.mechanism.evaluate(x, command, fingertip_force, base))
+        return self.signals(x, inputs, fingertip_force, self.mechanism.evaluate(x, inputs, fingertip_force, base))
 
     def exerted(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
         """Return the same; who evaluates sooner without accelerations may leave them out here."""
-        return self.evaluate(x, command, fingertip_force, base)
+        return self.evaluate(x, inputs, fingertip_force, base)
 
-    def signals(self, x: Array, command: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
+    def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         halves = found.rows["passive_halves"]
         torque = (halves.force @ halves.rows.arm)[..., : len(self.routing.joints)]
@@ -251,29 +247,15 @@ class Finger:
                 torque = torque + self._pulled_torque(x, found.rows[pulling])
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
         bodies, pulled = int(self.mechanism.body.model.nv), self.actuators.wired(self.actuators.pulled)
-        return FingerSignals.of(found, self.layout.unpack(x), command, force, torque, bodies, pulled)
+        return FingerSignals.of(found, self.layout.unpack(x), inputs, force, torque, bodies, pulled)
 
     def coupling_at(self, position: Array) -> Array:
         """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
-        position = np.asarray(position, dtype=float)
-        coupling = np.broadcast_to(self.routing.coupling, (*position.shape[:-1], *self.routing.coupling.shape)).copy()
-        along = [tendon.along for tendon in self.description.tendons.values()]
-        routed = [k for k, name in enumerate(along) if name is not None]
-        if self.paths is not None and routed:
-            places = [list(self.paths.routes).index(str(along[k])) for k in routed]
-            coupling[..., routed, :] = -self.paths.arms(position)[..., places, :]
-        return coupling
+        return self._excursions.slopes(np.asarray(position, dtype=float))
 
     def excursion(self, position: Array) -> Array:
         """Return l of the actuated tendons at theta, shape (..., n), also of those along paths; shape (..., a), m."""
-        drawn = position @ self.coupling.T
-        if self.paths is not None and self.description.tree is not None:
-            rest = np.array([joint.reference for joint in self.description.tree.joints.values()])
-            lengths = self.paths.length(rest) - self.paths.length(position)
-            for k, tendon in enumerate(self.description.tendons.values()):
-                if tendon.along is not None:
-                    drawn[..., k] = lengths[..., list(self.paths.routes).index(tendon.along)]
-        return np.asarray(drawn[..., : self.routing.actuated])
+        return self._excursions.lengths(position)[..., : self.routing.actuated]
 
     def _pulled_torque(self, x: Array, pulling: RowSignals) -> Array:
         """Return what driven or elastic tendons exert, shape (..., n), N m."""
@@ -285,10 +267,10 @@ class Finger:
         return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])
 
     def powers(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+        self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
         """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
-        found = self.mechanism.evaluate(x, command, fingertip_force, base)
+        found = self.mechanism.evaluate(x, inputs, fingertip_force, base)
         return np.stack(list(found.account()[1].values()), axis=-1), found.external
 
     def static_torque(self, position: Array) -> Array:
@@ -303,10 +285,17 @@ class Finger:
         found = self.rigid_body.kinematics(position, velocity, base)
         return Motion(found.tip, found.kinetic_energy, found.potential_energy)
 
-    def rhs(self, time: float, x: Array, command: Array, fingertip_force: Array | None = None) -> Array:
+    def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
-        return self.mechanism.evaluate(x, command, fingertip_force).rate
+        return self.mechanism.evaluate(x, inputs, fingertip_force).rate
 
 
 #: A hand is a finger whose joints form a tree.
 Hand = Finger
+#: Wherever a finger is taken: itself, its description, the name of one that ships, or the path of a file.
+FingerLike: TypeAlias = Finger | DescriptionLike
+
+
+def as_finger(finger: FingerLike) -> Finger:
+    """Return a finger that is given in any way."""
+    return finger if isinstance(finger, Finger) else Finger(finger)

@@ -55,6 +55,16 @@ class State:
     contact_bend: Array | None = None
     elastic_stiction: Array | None = None
 
+    @property
+    def q(self) -> Array:
+        """The position, as Pinocchio calls it."""
+        return self.position
+
+    @property
+    def v(self) -> Array:
+        """The velocity, as Pinocchio calls it."""
+        return self.velocity
+
 
 @dataclass(frozen=True)
 class Layout:

@@ -15,10 +15,11 @@ from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.textbook import Stop
-from finger_pin.description.loading import to_toml
+from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
+from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.initial_state import own_parts
 from finger_pin.simulation.simulate import simulate
@@ -120,7 +121,7 @@ def tightened(scenario: Scenario, factor: float = FACTOR) -> Scenario:
 
 
 def check_convergence(
-    scenario: Scenario,
+    scenario: ScenarioLike,
     result: xr.Dataset | None = None,
     *,
     factor: float = FACTOR,
@@ -128,6 +129,7 @@ def check_convergence(
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
     fingertip_force: Samples | None = None,
+    finger: Finger | None = None,
     initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -136,13 +138,14 @@ def check_convergence(
     """Repeat a run at a tighter tolerance, and find how far and where the two part.
 
     Args:
-        scenario: What was or is to be simulated.
+        scenario: What was or is to be simulated, its name, or the path of a file.
         result: What `simulate` returned for it; simulated now by default.
         factor: By which both tolerances are divided.
         limit: Joints that differ by more than this have parted, rad.
         controller: As for `simulate`.
         reference: As for `simulate`.
         fingertip_force: As for `simulate`.
+        finger: As for `simulate`.
         initial: As for `simulate`.
         control_period: As for `simulate`.
         progress: Called with the simulated time of each run, s.
@@ -150,16 +153,17 @@ def check_convergence(
 
     Raises:
         InputError: If the tolerances cannot be tightened, or the result is of another scenario, or had a controller,
-            reference, force or initial state of its own that is not given here.
+            reference, force, finger or initial state of its own that is not given here.
         IntegrationError: If an integrator cannot go on.
         Interrupted: After Ctrl-C, or if ``stop`` returned true.
     """
+    scenario = load_scenario(scenario)
     tighter = tightened(scenario, factor)
     if not 0.0 < limit < math.inf:
         raise InputError("limit", "must be above 0 and finite", limit)
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
-    own = own_parts(controller, reference, fingertip_force, initial)
+    own = own_parts(controller, reference, fingertip_force, initial, finger)
     if result is not None and result.attrs.get("own", "") != own:
         raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")
 
@@ -169,6 +173,7 @@ def check_convergence(
             controller=controller,
             reference=reference,
             fingertip_force=fingertip_force,
+            finger=finger,
             initial=initial,
             control_period=control_period,
             progress=progress,

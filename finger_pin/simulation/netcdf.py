@@ -53,7 +53,7 @@ def _write_csv(dataset: xr.Dataset, path: str | Path) -> None:
         writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
 
 
-def load_result(path: str | Path) -> xr.Dataset:
+def load(path: str | Path) -> xr.Dataset:
     """Read a result that `save` wrote into memory.
 
     Args:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +13,12 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.family import Family
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import Motions
@@ -36,7 +36,11 @@ RECORDED = ("joint_position", "tendon_tension")
 
 
 def prepare(
-    scenario: Scenario | str | Path, parameters: Sequence[str] = (), record: Sequence[str] = RECORDED
+    scenario: ScenarioLike,
+    parameters: Sequence[str] = (),
+    record: Sequence[str] = RECORDED,
+    *,
+    finger: Finger | None = None,
 ) -> Prepared:
     """Prepare a scenario for many runs with other numbers.
 
@@ -45,17 +49,16 @@ def prepare(
         print(run.time, run["joint_position"], run.units("joint_position"))
 
     Args:
-        scenario: From `load_scenario`, or what that takes: the name of one, or the path of a file.
+        scenario: What to simulate, its name, or the path of a file.
         parameters: Dotted keys, as of `load_scenario`, whose values every run is given; ``[2]`` at the end of one
             stands for one number of a list, a star for every name.
         record: The variables of the result that runs return, by their names in a Dataset.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
 
     Raises:
         InputError: If there is no such key or variable.
     """
-    if isinstance(scenario, str | Path):
-        scenario = load_scenario(scenario)
-    return Prepared(Family(scenario, tuple(parameters)), tuple(record))
+    return Prepared(Family(load_scenario(scenario), tuple(parameters)), tuple(record), finger)
 
 
 class Prepared:
@@ -67,10 +70,10 @@ class Prepared:
         start: The packed state at the start, shape (size,), with the scenario's own values.
     """
 
-    def __init__(self, family: Family, record: tuple[str, ...]) -> None:
+    def __init__(self, family: Family, record: tuple[str, ...], finger: Finger | None = None) -> None:
         """Build what the runs share; use `prepare`."""
-        self.family, self.record = family, record
-        loop = ClosedLoop.from_scenario(family.scenario)
+        self.family, self.record, self._finger = family, record, finger
+        loop = self._loop(family.scenario)
         self._check(loop)
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
@@ -159,7 +162,7 @@ class Prepared:
         steps: Steps | None = None,
     ) -> tuple[RunArrays, Trajectory]:
         """Make a run, on given steps if there are any."""
-        setup = Setup.of(scenario, _started(scenario, initial))
+        setup = Setup.of(scenario, self._loop(scenario, initial))
         self._check(setup.loop)
         trajectory = setup.integrate(stop=stop, steps=steps)
         motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
@@ -189,9 +192,16 @@ class Prepared:
             stop: Asked now and then; when it returns true the run ends there.
         """
         scenario = self.scenario(values)
-        own = own_parts(None, None, None, initial)
-        started = _started(scenario, initial)
-        return interruptible(lambda asked: run(scenario, started, own, progress=progress, stop=asked), stop)
+        own, loop = own_parts(None, None, None, initial, self._finger), self._loop(scenario, initial)
+        return interruptible(lambda asked: run(scenario, loop, own, progress=progress, stop=asked), stop)
+
+    def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
+        """Return the loop of one of the family."""
+        finger, described = self._finger, scenario.finger
+        if finger is not None and described is not self.family.scenario.finger:
+            finger = finger.changed(described)
+        loop = ClosedLoop.from_scenario(scenario, finger=finger)
+        return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
 
     def _check(self, loop: ClosedLoop) -> None:
         """Raise unless the result of a loop has everything that is recorded."""
@@ -201,11 +211,6 @@ class Prepared:
                 near = nearest(name, known)
                 hint = f"; did you mean {near}?" if near else ""
                 raise InputError("record", f"the result has no such variable; it has {', '.join(known)}{hint}", name)
-
-
-def _started(scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> ClosedLoop:
-    loop = ClosedLoop.from_scenario(scenario)
-    return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
 
 
 def _tight(scenario: Scenario, tolerance: float) -> Scenario:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
@@ -14,8 +13,7 @@ from finger_pin.control.proportional import Controller
 from finger_pin.control.reference import Reference
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.textbook import Stop
-from finger_pin.description.loading import load_scenario
-from finger_pin.description.scenario import Scenario
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    scenario: Scenario | str | Path,
+    scenario: ScenarioLike,
     *,
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
@@ -48,7 +46,7 @@ def simulate(
     method: that takes seconds for a simulated second.
 
     Args:
-        scenario: What to simulate, from `load_scenario`, or what that takes: the name of one, or the path of a file.
+        scenario: What to simulate, its name, or the path of a file.
         controller: Replaces the scenario's controller: an object with ``command``, asked for one time at a time, or
             tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N.
         reference: Replaces the scenario's reference: an object with ``at``, asked for one time at a time, or times,
@@ -86,8 +84,7 @@ def simulate(
             by how much, rad rms over joints and time. It has none where the core does not integrate in one piece.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
-    if isinstance(scenario, str | Path):
-        scenario = load_scenario(scenario)
+    scenario = load_scenario(scenario)
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))

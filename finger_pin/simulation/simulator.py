@@ -6,7 +6,6 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,12 +20,10 @@ from finger_pin.core.control import held_control
 from finger_pin.core.stepping.batch import advance_together
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.family import Family
-from finger_pin.description.hand import HandDescription
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.initial_state import numbers
@@ -51,7 +48,7 @@ class Simulator:
 
     def __init__(
         self,
-        finger: Finger | FingerDescription | HandDescription | str | Path,
+        finger: FingerLike,
         position: ArrayLike | None = None,
         *,
         method: str = "Rodas5P",
@@ -83,7 +80,7 @@ class Simulator:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
         self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
         self._family: Family | None = None
-        self._build(finger if isinstance(finger, Finger) else Finger(finger))
+        self._build(as_finger(finger))
         limiter = self.finger.stroke_limiter
         self._posture = 0.5 * (limiter.lower + limiter.upper)
         if position is not None:
@@ -187,12 +184,12 @@ class Simulator:
         """The state by name; a copy."""
         return self.finger.layout.unpack(self.x)
 
-    def step(self, tension: ArrayLike, dt: float, fingertip_force: ArrayLike | None = None) -> State:
+    def step(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None = None) -> State:
         """Advance by a time under constant tensions; return the state then.
 
         Args:
-            tension: f^a, shape (a,), N; of a motor in position drive its voltage, V, at its first tendon. Inputs of a
-                tree's actuators follow.
+            inputs: u, shape (a,): tensions f^a, N; of a motor in position drive its voltage, V, at its first tendon.
+                Inputs of a tree's actuators follow.
             dt: s.
             fingertip_force: F over the step, shape (3,), of several fingers (f, 3), N, base frame; none by default.
 
@@ -201,15 +198,15 @@ class Simulator:
                 then.
             IntegrationError: If the integrator cannot go on; the state is where it stopped.
         """
-        self._hold(*self._checked(tension, dt, fingertip_force))
+        self._hold(*self._checked(inputs, dt, fingertip_force))
         status = self._stepper.advance(self._stepper.time + dt)
         self._keep()
         return self._reached(status)
 
-    def _checked(self, tension: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
-        command, force = numbers("tension", tension, self._tension.shape), self._unloaded
+    def _checked(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
+        command, force = numbers("inputs", inputs, self._tension.shape), self._unloaded
         if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
-            raise InputError("tension", "must not be negative: a tendon cannot push", command.tolist())
+            raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
         if not isinstance(dt, Real) or not 0.0 < dt < math.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
         if fingertip_force is not None:

@@ -9,10 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
@@ -28,23 +27,23 @@ class Starting:
     """The scenario that a study varies.
 
     Attributes:
-        name: Name or path, as `load_scenario` takes it.
+        given: What `load_scenario` takes.
         overrides: Entries that hold at all points.
         scenario: What the two make.
     """
 
-    name: str
+    given: ScenarioLike
     overrides: Mapping[str, Any]
     scenario: Scenario
 
     @classmethod
-    def load(cls, name: str | Path, overrides: Mapping[str, Any] | None = None) -> Starting:
+    def load(cls, given: ScenarioLike, overrides: Mapping[str, Any] | None = None) -> Starting:
         """Load a scenario.
 
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return cls(str(name), dict(overrides or {}), load_scenario(name, overrides))
+        return cls(given, dict(overrides or {}), load_scenario(given, overrides))
 
     def at(self, point: Point) -> Scenario:
         """Return the scenario with other numbers or names at some keys.
@@ -64,7 +63,7 @@ class Starting:
             else:
                 changed[name] = [*self._list(key, name, index, changed)]
                 changed[name][index] = value
-        return load_scenario(self.name, changed)
+        return load_scenario(self.given, changed)
 
     def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
         """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.

@@ -7,16 +7,16 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.core.stepping.textbook import Stop
-from finger_pin.description.loading import load_scenario, to_toml
+from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import prepare
@@ -27,8 +27,9 @@ _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time"
 
 
 def simulate_many(
-    scenarios: Iterable[Scenario | str | Path],
+    scenarios: Iterable[ScenarioLike],
     *,
+    finger: Finger | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     variables: Sequence[str] | None = None,
@@ -37,8 +38,9 @@ def simulate_many(
     """Simulate scenarios in parallel threads, or by another executor.
 
     Args:
-        scenarios: Scenarios, or what `load_scenario` takes, whose fingers have the same joints and tendons, with the
+        scenarios: Scenarios, their names, or paths of files, whose fingers have the same joints and tendons, with the
             same sample times.
+        finger: Replaces the finger of all, as for `fp.simulate`.
         executor: Any of `concurrent.futures`, for controllers in Python, which threads would do one after the other.
         workers: Number of threads; by default one for each core that this process may use.
         variables: Names of the variables to keep; all by default. Fewer need less memory and less time: then only what
@@ -60,11 +62,11 @@ def simulate_many(
     Warns:
         SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
     """
-    runs = [each if isinstance(each, Scenario) else load_scenario(each) for each in scenarios]
+    runs = [load_scenario(each) for each in scenarios]
     if not runs:
         raise InputError("scenarios", "at least one is needed")
     _check_alike(runs)
-    run = partial(_run, keep=None if variables is None else tuple(variables))
+    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | Lost] = {}
     with CtrlC() as interrupted, Crew(executor, workers) as crew:
@@ -92,14 +94,14 @@ def simulate_many(
     return stacked
 
 
-def _run(scenario: Scenario, stop: Stop, keep: tuple[str, ...] | None) -> xr.Dataset:
+def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None) -> xr.Dataset:
     failure = ""
     try:
         # The study has a bar of its own.
         result = (
-            simulate(scenario, progress=lambda time: None, stop=stop)
+            simulate(scenario, finger=finger, progress=lambda time: None, stop=stop)
             if keep is None
-            else _recorded(scenario, stop, keep)
+            else _recorded(scenario, stop, finger, keep)
         )
     except IntegrationError as error:
         assert error.result is not None
@@ -107,9 +109,9 @@ def _run(scenario: Scenario, stop: Stop, keep: tuple[str, ...] | None) -> xr.Dat
     return result.assign_attrs(failure=failure)
 
 
-def _recorded(scenario: Scenario, stop: Stop, keep: tuple[str, ...]) -> xr.Dataset:
+def _recorded(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...]) -> xr.Dataset:
     try:
-        prepared = prepare(scenario, record=keep)
+        prepared = prepare(scenario, record=keep, finger=finger)
     except InputError as error:
         raise InputError("variables", error.allowed, error.value) from None
     return prepared.run(stop=stop).dataset()

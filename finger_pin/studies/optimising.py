@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.loading import to_toml
+from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
@@ -69,7 +69,7 @@ class Effort:
 
 
 def optimise(
-    scenario: str | Path,
+    scenario: ScenarioLike,
     over: Iterable[Variable | str] | None = None,
     *,
     minimise: Iterable[str | Metric] = DEFAULT_OBJECTIVES,
@@ -91,7 +91,7 @@ def optimise(
     ``output`` every finished run is on disk at once, and the same search again continues where it ended.
 
     Args:
-        scenario: Name or path, as `load_scenario` takes it.
+        scenario: What is varied: a scenario, its name, or the path of a file.
         over: Variables, or how `parse_variable` reads them; by default the winding `radii` of the finger.
         minimise: Metrics to be made small.
         maximise: Metrics to be made large.

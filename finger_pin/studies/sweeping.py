@@ -10,6 +10,7 @@ from typing import Any
 
 import xarray as xr
 
+from finger_pin.description.loading import ScenarioLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
@@ -24,7 +25,7 @@ PRODUCTS = ["sweep.nc", "figures/sweep.png"]
 
 
 def sweep(
-    scenario: str | Path,
+    scenario: ScenarioLike,
     over: Design | Mapping[str, Sequence[Value]],
     *,
     metrics: Iterable[str | Metric] = DEFAULT_METRICS,
@@ -46,7 +47,7 @@ def sweep(
     fails, or a point at which there is no valid scenario, is NaN, with its reason.
 
     Args:
-        scenario: Name or path, as `load_scenario` takes it.
+        scenario: What is varied: a scenario, its name, or the path of a file.
         over: A design, or the values of every key, which make a grid. Keys are those of `load_scenario`; an index as in
             ``environment.fingertip_force[2]`` means one number of a list.
         metrics: Names of `METRICS`, or metrics of one's own.

@@ -18,6 +18,7 @@ from finger_pin.analysis import (
     tension_for_force,
 )
 from finger_pin.analysis.transmission import transmission_efficiency, transmission_in_motion
+from finger_pin.description.embedded import embedded
 from finger_pin.views import plots
 from finger_pin.views.viewer.animation import animation_page, posture_page
 
@@ -100,7 +101,7 @@ def still(finger, samples=3):
     return xr.Dataset(
         {**at_joints, **at_tendons, **angles, "fingertip_force": (("time", "axis"), np.zeros((samples, 3)))},
         {**places, "tendon": list(finger.routing.tendons)},
-        {"scenario": fp.to_toml(bending(finger.description))},
+        embedded(bending(finger.description)),
     )
 
 

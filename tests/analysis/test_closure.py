@@ -95,7 +95,7 @@ def test_statics_of_a_posed_finger_are_those_of_its_arms_there():
     internal = posed.routing.force_closure().tension
     assert internal[0] / internal[1] == pytest.approx(-lower / upper)
     # What one tendon at its limit exerts at the tip, with the other slack.
-    forces = fp.analysis.force_polytope(posed, [0.2], limit=10.0)
+    forces = fp.analysis.force_polytope(posed, [0.2], maximum_tension=10.0)
     pushes = np.linalg.norm(forces.vertices, axis=1)
     np.testing.assert_allclose(np.sort(pushes), np.sort([-10.0 * upper / REACH, 10.0 * lower / REACH]), rtol=1e-9)
     # Moving up, friction M S of the sum of tensions takes all that the pulling tendon adds where M is its arm.
@@ -144,7 +144,7 @@ def test_a_fingertip_that_no_joint_moves_has_no_forces():
     del table["tree"]["tip"]
     still = fp.analysis.posed(fp.Finger(fp.FingerDescription.model_validate(table)), [0.2])
     with pytest.raises(fp.InputError, match="no joint moves the fingertip"):
-        fp.analysis.force_polytope(still, [0.2], limit=10.0)
+        fp.analysis.force_polytope(still, [0.2], maximum_tension=10.0)
 
 
 def test_locking_over_the_range_is_worst_where_an_arm_is_shortest():

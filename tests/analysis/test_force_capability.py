@@ -19,7 +19,7 @@ def weightless():
 
 @pytest.fixture(scope="module")
 def polytope(finger):
-    return force_polytope(finger, POSTURE, 20.0, minimum=1.0)
+    return force_polytope(finger, POSTURE, 20.0, minimum_tension=1.0)
 
 
 def test_planar_finger_exerts_the_hexagon_that_a_hand_calculation_gives():
@@ -108,8 +108,8 @@ def test_friction_helps_to_hold_and_hinders_to_push(weightless):
 def test_needed_tension_and_largest_force_are_inverse_to_each_other(finger, friction):
     for direction in np.random.default_rng(8).normal(size=(10, 3)):
         direction /= np.linalg.norm(direction)
-        reach = largest_force(finger, POSTURE, direction, 20.0, minimum=0.5, friction=friction)
-        needed = tension_for_force(finger, POSTURE, reach * direction, minimum=0.5, friction=friction)
+        reach = largest_force(finger, POSTURE, direction, 20.0, minimum_tension=0.5, friction=friction)
+        needed = tension_for_force(finger, POSTURE, reach * direction, minimum_tension=0.5, friction=friction)
         assert needed.largest == pytest.approx(20.0, rel=1e-6)
         assert needed.command.min() >= 0.5 - 1e-9
 
@@ -187,7 +187,7 @@ def test_a_push_at_a_joint_s_axis_is_no_stronger_than_those_that_pass_it_on_eith
 
 def test_wrong_arguments_are_named(finger):
     with pytest.raises(fp.InputError, match="limit"):
-        force_polytope(finger, POSTURE, 1.0, minimum=2.0)
+        force_polytope(finger, POSTURE, 1.0, minimum_tension=2.0)
     with pytest.raises(fp.InputError, match="friction"):
         force_polytope(finger, POSTURE, 10.0, friction=Friction.HINDERING)
     with pytest.raises(fp.InputError, match="position"):

@@ -63,7 +63,7 @@ def test_a_finger_rests_where_its_weight_balances_the_tensions_and_stays_there()
 
 def test_a_finger_with_a_passive_tendon_rests_and_what_cannot_is_told():
     finger = fp.Finger("ub")
-    found = equilibrium(finger, [1.0, 1.0, 1.2, 0.3], position=[0.0, 0.8, 0.8, 0.5], force=[0.0, 0.02, 0.0])
+    found = equilibrium(finger, [1.0, 1.0, 1.2, 0.3], position=[0.0, 0.8, 0.8, 0.5], fingertip_force=[0.0, 0.02, 0.0])
     rate = finger.rhs(0.0, found.state, np.array([1.0, 1.0, 1.2, 0.3]), np.array([0.0, 0.02, 0.0]))
     assert np.abs(rate).max() < 1e-5
     # Where nothing pulls either way it stays where it was.

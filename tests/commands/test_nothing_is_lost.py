@@ -39,7 +39,7 @@ def started(tmp_path):
 
 def whole(folder: Path) -> float:
     """Return the duration asked for by the results in a folder, which belong together."""
-    result = fp.load_result(folder / "trajectory.nc")
+    result = fp.load(folder / "trajectory.nc")
     assert (folder / "scenario.toml").read_text(encoding="utf-8").endswith(result.attrs["scenario"])
     return fp.load_scenario(folder / "scenario.toml").simulation.duration
 
@@ -65,6 +65,6 @@ def test_a_run_asked_to_end_keeps_what_was_computed(started, tmp_path, number):
     assert process.returncode == 130
     assert "what was computed is in out" in said
     assert whole(tmp_path / "out") == 1000.0
-    result = fp.load_result(tmp_path / "out" / "trajectory.nc")
+    result = fp.load(tmp_path / "out" / "trajectory.nc")
     assert 0.0 <= float(result["time"][-1]) <= result.attrs["end_time"] < 1000.0
     assert not list((tmp_path / "out").glob(".unfinished-*"))

@@ -29,7 +29,7 @@ def test_of_a_failed_integration_what_was_computed_is_saved(run, here, quick, mo
     assert len(lines) == 1
     for says in ("t = 0.002 s", "the step size became too small", "a smaller simulation.rtol", "is in out"):
         assert says in lines[0]
-    assert fp.load_result("out/trajectory.nc").equals(partial)
+    assert fp.load("out/trajectory.nc").equals(partial)
     assert "flexor_distal" in out
 
 
@@ -57,7 +57,7 @@ def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_t
         lines[0],
     )
     assert said
-    kept, scenario = fp.load_result("out/trajectory.nc"), load_scenario("out/scenario.toml")
+    kept, scenario = fp.load("out/trajectory.nc"), load_scenario("out/scenario.toml")
     assert 0.0 < kept.attrs["end_time"] < 1.0 == scenario.simulation.duration
     assert kept.attrs["end_time"] == pytest.approx(float(said[1]), rel=1e-5)
     assert len(kept.time) > 10 and kept.time[-1] <= kept.attrs["end_time"]
@@ -121,7 +121,7 @@ def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, mon
     assert len(lines) == 1
     assert re.search(r"interrupted at t = [\d.e-]+ s; what was computed is in out", lines[0])
     assert set(contents(here / "out")) == {"scenario.toml", "trajectory.nc"}
-    assert fp.load_result("out/trajectory.nc").attrs["end_time"] < 5.0
+    assert fp.load("out/trajectory.nc").attrs["end_time"] < 5.0
     assert load_scenario("out/scenario.toml").simulation.duration == 5.0
     assert "Tension" in out
 

@@ -46,7 +46,7 @@ def test_a_variant_leaves_the_results_of_the_scenario_alone_and_says_where_its_o
 def test_the_resolved_scenario_gives_the_same_trajectory(run, here, quick):
     assert run("s.toml", "--set", "controller.gain=[1.1, 0.7]", "--output", "first")[0] == 0
     assert run("first/scenario.toml", "--output", "second")[0] == 0
-    first, second = (fp.load_result(here / name / "trajectory.nc") for name in ("first", "second"))
+    first, second = (fp.load(here / name / "trajectory.nc") for name in ("first", "second"))
     assert first.equals(second)
     assert (here / "first" / "scenario.toml").read_bytes() == (here / "second" / "scenario.toml").read_bytes()
 
@@ -116,7 +116,7 @@ def test_duration_and_method_are_short_for_set_and_win_over_it(run, here, quick)
     assert run("s.toml", *changed)[0] == 0
     scenario = load_scenario(here / "out" / "scenario.toml")
     assert (scenario.simulation.duration, scenario.simulation.method) == (0.003, "LSODA")
-    assert fp.load_result(here / "out" / "trajectory.nc")["time"][-1] == 0.003
+    assert fp.load(here / "out" / "trajectory.nc")["time"][-1] == 0.003
 
 
 def test_list_names_scenarios_fingers_and_methods(run, here):

@@ -97,7 +97,7 @@ def test_mujoco_has_the_same_springs(sprung):
 def test_the_tensions_that_a_fingertip_force_needs_hold_the_springs_too(sprung):
     """H_c^T f = J^T E + G + k (theta - theta_0), free of friction."""
     theta, force = np.array([0.5, 0.8]), np.array([0.1, -0.2, 0.0])
-    found = tension_for_force(sprung, theta, force, minimum=0.5)
+    found = tension_for_force(sprung, theta, force, minimum_tension=0.5)
     body = sprung.rigid_body
     springs = [K * (theta[0] - REST), 0.01 * (theta[1] - 0.4)]
     needed = body.jacobian(theta).T @ force + body.gravity_torque(theta) + springs

@@ -150,7 +150,7 @@ def test_a_simulator_refuses_what_is_no_time_and_tensions_that_push(finger):
     simulator = fp.Simulator(finger)
     with pytest.raises(fp.InputError, match=r"^dt = .*above 0"):
         simulator.step([1.0] * 4, "a")
-    with pytest.raises(fp.InputError, match=r"^tension = .*must not be negative"):
+    with pytest.raises(fp.InputError, match=r"^inputs = .*must not be negative"):
         simulator.step([1.0, -1.0, 1.0, 1.0], 1e-3)
     assert simulator.time == 0.0
 

@@ -154,7 +154,7 @@ def test_every_pair_of_features_runs_to_the_end_of_what_is_done_with_a_result(
         assert application.run("simulate", [str(file), "--output", str(folder)]) == 0
     printed = capsys.readouterr()
     assert "Energy" in printed.out and not printed.err
-    result = fp.load_result(folder)
+    result = fp.load(folder)
     assert ("motor" in result.dims) == bool(features & {"servo", "position drive"})
     assert fp.load_scenario(folder / "scenario.toml") == scenario
     assert {path.stem for path in (folder / "figures").iterdir()} == set(figures_of(result))

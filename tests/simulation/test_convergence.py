@@ -137,7 +137,7 @@ def test_difference_and_verdict_are_in_the_dataset_survive_its_file_and_are_summ
         assert "convergence_difference" not in result
         assert checked.convergence_difference.attrs["units"] == "rad"
         fp.save(checked, tmp_path / "r.nc")
-        kept = fp.load_result(tmp_path / "r.nc")
+        kept = fp.load(tmp_path / "r.nc")
         xr.testing.assert_identical(kept.convergence_difference, checked.convergence_difference)
         assert kept.attrs["convergence"] == found.verdict
         assert np.isnan(kept.attrs["convergence_parting_time"]) == found.converged
@@ -190,7 +190,7 @@ def test_the_command_line_checks_on_request_and_stores_what_it_found(run, tmp_pa
     code, out, lines = run()
     assert (code, lines) == (0, [])
     assert "Converged: repeated at rtol 1e-05" in out
-    kept = fp.load_result(tmp_path / "out" / "trajectory.nc")
+    kept = fp.load(tmp_path / "out" / "trajectory.nc")
     assert 0.0 < float(abs(kept.convergence_difference).max()) < 1e-3
     # The repetition leaves no trace in what is resolved: it is the run that was asked for.
     assert fp.load_scenario(tmp_path / "out" / "scenario.toml").simulation.rtol == 1e-3
@@ -228,7 +228,7 @@ def test_a_check_that_fails_keeps_the_run(run, tmp_path, monkeypatch, error, exp
     assert (code, len(lines)) == (expected, 1)
     assert says in lines[0]
     assert "Tension" in out
-    assert "convergence_difference" not in fp.load_result(tmp_path / "out" / "trajectory.nc")
+    assert "convergence_difference" not in fp.load(tmp_path / "out" / "trajectory.nc")
 
 
 def test_a_tolerance_that_cannot_be_tightened_is_told_before_anything_is_simulated(run, tmp_path):

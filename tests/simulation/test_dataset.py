@@ -160,7 +160,7 @@ def test_attributes_say_how_the_result_was_made(result):
 def test_a_result_survives_its_file(result, tmp_path):
     path = tmp_path / "trajectory.nc"
     fp.save(result, path)
-    loaded = fp.load_result(path)
+    loaded = fp.load(path)
     xr.testing.assert_identical(loaded, result)
     with netCDF4.Dataset(path) as raw:
         assert raw.data_model == "NETCDF4"
@@ -178,7 +178,7 @@ def test_a_finger_without_passive_tendon_has_no_passive_variables(tmp_path):
     assert result.tendon_tension.shape == (11, 3)
     assert float(abs(result.energy_residual).max()) < 1e-10
     fp.save(result, tmp_path / "r.nc")
-    xr.testing.assert_identical(fp.load_result(tmp_path / "r.nc"), result)
+    xr.testing.assert_identical(fp.load(tmp_path / "r.nc"), result)
 
 
 def test_two_passive_tendons_get_a_dimension_of_their_own():

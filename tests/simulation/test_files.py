@@ -98,7 +98,7 @@ def test_results_appear_when_they_are_published(tmp_path, result):
         assert not (folder / "trajectory.nc").exists()
         results.publish()
     assert set(contents(folder)) == {"scenario.toml", "trajectory.nc"}
-    assert fp.load_result(folder / "trajectory.nc").equals(result)
+    assert fp.load(folder / "trajectory.nc").equals(result)
 
 
 def test_without_publishing_the_folder_is_as_it_was(tmp_path, result):
@@ -212,4 +212,4 @@ def test_a_disk_that_is_full_is_said_to_be_so(tmp_path, result):
 
 def test_a_result_is_loaded_from_its_folder(tmp_path, result):
     publish(tmp_path, result)
-    assert fp.load_result(tmp_path).equals(result)
+    assert fp.load(tmp_path).equals(result)

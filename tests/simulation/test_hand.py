@@ -74,7 +74,7 @@ def test_a_hand_can_be_written_and_read_again(scenario, result, tmp_path):
     again = fp.Scenario.model_validate(tomllib.loads(fp.to_toml(scenario)))
     assert again == scenario and fp.to_toml(again) == result.attrs["scenario"]
     fp.save(result, tmp_path / "hand.nc")
-    assert fp.load_result(tmp_path / "hand.nc").equals(result)
+    assert fp.load(tmp_path / "hand.nc").equals(result)
 
 
 def test_settings_of_one_finger_are_its_own_and_the_others_keep_theirs():

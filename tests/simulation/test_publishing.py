@@ -121,7 +121,7 @@ def test_a_run_killed_at_any_instant_of_publishing_leaves_one_whole_set_to_any_r
     assert all(each == new for each in found[switched:])
     # 5 earlier files, 6 names, the decision: one change each at the least, and as many that tidy up.
     assert 2 * 11 < switched < len(folders) - 10
-    assert fp.load_result(folders[switched]).attrs["scenario"] == load_text(new)
+    assert fp.load(folders[switched]).attrs["scenario"] == load_text(new)
     assert load_scenario(folders[switched] / "scenario.toml").simulation.duration == 0.003
 
 
@@ -174,5 +174,5 @@ def test_runs_that_publish_at_the_same_time_do_not_mix(tmp_path, result):
             folder.write(each)
         with ThreadPoolExecutor() as pool:
             list(pool.map(ResultFolder.publish, folders))
-        assert load_text(visible(tmp_path)) == fp.load_result(tmp_path).attrs["scenario"]
+        assert load_text(visible(tmp_path)) == fp.load(tmp_path).attrs["scenario"]
         assert set(contents(tmp_path)) == {"scenario.toml", "trajectory.nc"}

@@ -104,10 +104,10 @@ def test_signals_are_those_of_the_finger_at_the_present_state(finger: fp.Finger)
 @pytest.mark.parametrize(
     ("arguments", "entry"),
     [
-        (([1.0, 1.0, 1.0], 1e-3), "tension"),
-        ((["a", 1.0, 1.0, 1.0], 1e-3), "tension"),
-        (([1.0, np.nan, 1.0, 1.0], 1e-3), "tension"),
-        (([1.0, np.inf, 1.0, -np.inf], 1e-3), "tension"),
+        (([1.0, 1.0, 1.0], 1e-3), "inputs"),
+        ((["a", 1.0, 1.0, 1.0], 1e-3), "inputs"),
+        (([1.0, np.nan, 1.0, 1.0], 1e-3), "inputs"),
+        (([1.0, np.inf, 1.0, -np.inf], 1e-3), "inputs"),
         ((TENSION, 0.0), "dt"),
         ((TENSION, -1.0), "dt"),
         ((TENSION, np.inf), "dt"),

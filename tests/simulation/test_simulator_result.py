@@ -92,7 +92,7 @@ def test_a_result_is_marked_and_drawn_and_saved_like_any_other(finger: fp.Finger
         draw_all(result, folder.stage / "figures")
         write_animation(result, folder.stage / "animation.html")
         folder.publish()
-    assert fp.load_result(tmp_path / "run").identical(result)
+    assert fp.load(tmp_path / "run").identical(result)
     assert fp.load_scenario(tmp_path / "run" / "scenario.toml").finger == finger.description
 
 

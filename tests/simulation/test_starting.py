@@ -69,7 +69,7 @@ def test_a_saved_result_of_a_finger_without_passive_tendon_is_continued(tmp_path
     scenario = fp.load_scenario(path)
     first = fp.simulate(scenario)
     fp.save(first, tmp_path / "first.nc")
-    second = fp.simulate(scenario, initial=fp.load_result(tmp_path / "first.nc"))
+    second = fp.simulate(scenario, initial=fp.load(tmp_path / "first.nc"))
     np.testing.assert_array_equal(second.joint_velocity[0], first.joint_velocity[-1])
 
 

@@ -147,8 +147,8 @@ def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_pat
     page = (folder / "identification.html").read_text("utf-8")
     for word in ("0.091734", "data:image/png", "By BIC", "95 %"):
         assert word in page
-    assert fp.load_result(folder / "identification.nc").units.values.tolist() == ["1", "N"]
-    assert write_report(fp.load_result(folder / "identification.nc"), tmp_path / "again.html").exists()
+    assert fp.load(folder / "identification.nc").units.values.tolist() == ["1", "N"]
+    assert write_report(fp.load(folder / "identification.nc"), tmp_path / "again.html").exists()
     assert run("identify", ["no_such_bench"]) == 2
 
 

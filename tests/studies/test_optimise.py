@@ -133,7 +133,7 @@ def test_the_front_is_of_designs_that_keep_the_bounds_and_is_numbered_by_the_fir
     assert numbered == sorted(numbered)
     assert gain[0] == 1.0
     assert result.sizes["sample"] == 25
-    assert fp.load_result(tmp_path / "optimise.nc").equals(result)
+    assert fp.load(tmp_path / "optimise.nc").equals(result)
 
 
 def test_every_design_of_the_front_is_a_scenario_that_gives_its_numbers(tmp_path):

@@ -34,7 +34,7 @@ def test_a_search_goes_on_from_what_a_kill_leaves_and_ends_with_the_same_front(s
     assert "25 designs: 25 keep all bounds" in capsys.readouterr().out
     found = {each.relative_to(folder).as_posix() for each in folder.rglob("*") if each.is_file()}
     assert {"study.toml", "optimise.nc", "front.csv", "front/01.toml", "figures/pareto.png"} <= found
-    whole, table = fp.load_result(folder / "optimise.nc"), (folder / "front.csv").read_text()
+    whole, table = fp.load(folder / "optimise.nc"), (folder / "front.csv").read_text()
     lines = (folder / "runs.jsonl").read_bytes().splitlines(keepends=True)
     # The start is a design of the first generation as well, and run once.
     assert len(lines) == 24
@@ -47,14 +47,14 @@ def test_a_search_goes_on_from_what_a_kill_leaves_and_ends_with_the_same_front(s
     again = (folder / "runs.jsonl").read_bytes().splitlines(keepends=True)
     assert again[:11] == lines[:11]
     assert len(again) == len({json.loads(line)["key"] for line in again}) == 24
-    assert fp.load_result(folder / "optimise.nc").equals(whole)
+    assert fp.load(folder / "optimise.nc").equals(whole)
     assert (folder / "front.csv").read_text() == table
 
 
 def test_a_design_of_the_front_can_be_simulated_and_gives_its_numbers(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert script.main([*QUICK, "--population", "4", "--generations", "1", "--quiet"]) == 0
-    result = fp.load_result(Path("out", "optimise.nc"))
+    result = fp.load(Path("out", "optimise.nc"))
     best = result.isel(sample=int((result["front"].values == 1).argmax()))
     run = Run(fp.load_scenario(Path("out", "front", "01.toml")))
     for name in ("tracking_rms", "tension_peak"):

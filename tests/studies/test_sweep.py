@@ -77,7 +77,7 @@ def test_progress_begins_with_what_is_there_and_ends_with_all(grid):
 
 def test_the_file_holds_what_was_returned(grid):
     folder, result, _ = grid
-    assert fp.load_result(folder / "sweep.nc").identical(result)
+    assert fp.load(folder / "sweep.nc").identical(result)
 
 
 def test_the_same_again_repeats_no_run(grid):
@@ -133,7 +133,7 @@ def test_a_pool_that_breaks_keeps_what_is_finished_and_the_same_call_does_the_re
 def test_a_sweep_whose_runs_all_fail_is_an_error_that_holds_their_reasons(tmp_path):
     with pytest.raises(StudyError, match=r"every run failed; the first one: ArithmeticError: planted") as caught:
         fp.sweep("fig6", {"controller.gain": [2.0]}, metrics=[RAISES], overrides=SHORT, output=tmp_path, executor=TWO)
-    assert fp.load_result(tmp_path / "sweep.nc").identical(caught.value.result)
+    assert fp.load(tmp_path / "sweep.nc").identical(caught.value.result)
 
 
 def test_names_and_switches_are_swept_like_numbers(tmp_path):
@@ -145,7 +145,7 @@ def test_names_and_switches_are_swept_like_numbers(tmp_path):
             alone = METRICS["tracking_rms"].measure(Run(fp.load_scenario("fig6", SHORT | changed)))
             # A controller written in Python calls libraries that round by their number of threads.
             assert float(result["tracking_rms"].sel(changed)) == pytest.approx(alone, rel=1e-7)
-    assert fp.load_result(tmp_path / "sweep.nc").identical(result)
+    assert fp.load(tmp_path / "sweep.nc").identical(result)
 
 
 OWN_METRIC = """

@@ -65,7 +65,7 @@ def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, mon
     assert folder.name.startswith("sweep-fig6-duration-0.02-gain-0.5to2to2-tendons.T3.")
     found = {str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file()}
     assert found == {"study.toml", "runs.jsonl", "sweep.nc", "figures/sweep.png"}
-    assert dict(fp.load_result(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}
+    assert dict(fp.load(folder / "sweep.nc").sizes) == {"controller.gain": 2, radius: 2}
 
 
 def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(script, tmp_path, monkeypatch, capsys):
@@ -89,7 +89,7 @@ def test_a_sweep_killed_in_mid_run_goes_on_without_repeating_or_losing_a_run(scr
     whole = before[: before.rfind(b"\n") + 1]
     assert path.read_bytes().startswith(whole)
     assert len({line["key"] for line in lines(path)}) == len(lines(path)) == 14
-    assert np.isfinite(fp.load_result(tmp_path / "out" / "sweep.nc")["tracking_rms"]).all()
+    assert np.isfinite(fp.load(tmp_path / "out" / "sweep.nc")["tracking_rms"]).all()
 
 
 def test_an_interrupt_keeps_what_was_done_and_says_so(tmp_path):
@@ -102,7 +102,7 @@ def test_an_interrupt_keeps_what_was_done_and_says_so(tmp_path):
     code, out, err = finish(process)
     assert (code, out) == (130, "")
     assert re.fullmatch(r"sweep\.py: interrupted; .*\n", err)
-    result = fp.load_result(tmp_path / "out" / "sweep.nc")
+    result = fp.load(tmp_path / "out" / "sweep.nc")
     assert int((result["status"] == "done").sum()) == len(lines(path)) >= 2
     assert (result["status"] == "missing").any()
 
@@ -169,7 +169,7 @@ def test_another_study_in_the_folder_is_refused_and_left_as_it_is(script, tmp_pa
     assert "--restart" in capsys.readouterr().err
     assert {each: each.read_bytes() for each in Path("out").rglob("*") if each.is_file()} == before
     assert script.main(["--over", "controller.gain=1,3", *common, "--restart"]) == 0
-    assert fp.load_result("out/sweep.nc")["controller.gain"].values.tolist() == [1.0, 3.0]
+    assert fp.load("out/sweep.nc")["controller.gain"].values.tolist() == [1.0, 3.0]
 
 
 def test_metrics_are_listed(script, capsys):

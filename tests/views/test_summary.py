@@ -74,4 +74,4 @@ def test_the_summary_tells_the_cost(result):
 def test_the_summary_of_one_instant_and_of_a_saved_result(result, tmp_path):
     assert "abduction" in summarize(result.isel(time=[0]).assign_attrs(end_time=0.0))
     fp.save(result, tmp_path / "r.nc")
-    assert summarize(fp.load_result(tmp_path / "r.nc")) == summarize(result)
+    assert summarize(fp.load(tmp_path / "r.nc")) == summarize(result)

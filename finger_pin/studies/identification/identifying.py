@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.bench import IdentifySettings
-from finger_pin.description.loading import load_bench
+from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
@@ -34,7 +34,7 @@ Data = Mapping[str, Mapping[str, Any]]
 
 
 def identify(
-    bench: str | Path,
+    bench: ScenarioLike,
     *,
     parameters: Mapping[str, Sequence[float]] | None = None,
     recordings: Mapping[str, Mapping[str, Any]] | None = None,
@@ -57,6 +57,7 @@ def identify(
 
     Args:
         bench: Name of a bench or scenario that ships, or path of a TOML file; its table ``[identify]`` says the rest.
+            Or a scenario: then `parameters` and `recordings` say it all.
         parameters: By dotted key, the least and the greatest value; on top of the table's, as the next two.
         recordings: By name, entries as in a file.
         compare: By name, other laws: keys with a number that is held, or with bounds.
@@ -91,7 +92,7 @@ def identify(
     asked = digest(scenario, settings, taken, (starts, seed, loss))
     with Ledger(None if output is None else Path(output), asked, restart) as ledger:
         result = _work(problem, settings, _starts(problem, starts, seed), _Work(problem, ledger, loss, progress))
-        result.attrs["bench"] = str(bench)
+        result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
             write_outcome(result, Path(output), bench, problem)
     return result

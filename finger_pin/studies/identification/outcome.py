@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 
+from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.identification.comparing import Comparison
@@ -172,7 +174,7 @@ def _replicates(signal: Signal) -> float:
     return float(np.sqrt(spread / (len(groups) - len(means))))
 
 
-def write_outcome(result: xr.Dataset, folder: Path, bench: str | Path, problem: Problem) -> None:
+def write_outcome(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> None:
     """Write identification.nc and identified.toml.
 
     Raises:
@@ -183,9 +185,9 @@ def write_outcome(result: xr.Dataset, folder: Path, bench: str | Path, problem: 
         Path(temporary).write_text(identified_toml(result, folder, bench, problem), encoding="utf-8")
 
 
-def identified_toml(result: xr.Dataset, folder: Path, bench: str | Path, problem: Problem) -> str:
+def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> str:
     """Return the text of a scenario that extends the bench, with the numbers found and their intervals."""
-    name = str(bench)
+    name = "" if isinstance(bench, Scenario) else str(bench)
     path = Path(name).expanduser()
     if path.suffix == ".toml":
         try:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.prepared import prepare
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def propose(
-    scenario: str | Path,
+    scenario: ScenarioLike,
     candidates: Mapping[str, Mapping[str, Any]],
     parameters: Mapping[str, Sequence[float]],
     outputs: Mapping[str, float],
@@ -34,7 +33,7 @@ def propose(
                    {"tendon_tension.T1": 0.05})
 
     Args:
-        scenario: Name of a scenario, or path of a file.
+        scenario: What is identified: a scenario, its name, or the path of a file.
         candidates: By name, the entries in which the motion of each differs.
         parameters: By dotted key, the least and the greatest value; sure to that much without any motion.
         outputs: What would be measured, by variable.label, and its noise, SI, rms.
