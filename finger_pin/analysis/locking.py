@@ -18,6 +18,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerLike
+from finger_pin.mechanism.tendons import Tendons
 
 
 @dataclass(frozen=True, eq=False, repr=False)

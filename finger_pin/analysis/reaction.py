@@ -15,8 +15,8 @@ import numpy as np
 
 from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.analysis.printing import BriefRepr
+from finger_pin.description.embedded import described
 from finger_pin.description.hand import one_finger
-from finger_pin.description.loading import scenario_of
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
@@ -143,7 +143,7 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     Raises:
         InputError: If something is missing in the result, or a joint carries no link.
     """
-    description = scenario_of(result.attrs).finger
+    description = described(result.attrs).finger
     one_finger(description)
     finger = Finger(description)
     position, velocity, acceleration = (_values(result, name) for name in _MOTION)

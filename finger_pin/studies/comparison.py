@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.loading import scenario_of
+from finger_pin.description.embedded import described
 from finger_pin.description.routing import Array
 
 SETTLED = 1.0
@@ -88,7 +88,7 @@ def compare(name: str, result: xr.Dataset, coupling: Array) -> Comparison:
         coupling: H_c of its finger, shape (t, n), m.
     """
     part = result.sel(time=slice(SETTLED, None))
-    tendons = scenario_of(result.attrs).finger.tendons
+    tendons = described(result.attrs).finger.tendons
     passive = np.array([tendons[str(name)].kind == "passive" for name in result["tendon"].values])
     error = np.rad2deg(part["tracking_error"].transpose("time", "joint").values)
     rows = coupling[passive]
