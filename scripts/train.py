@@ -16,7 +16,7 @@ from finger_pin.commands.console import print_text
 from finger_pin.commands.options import Output, Restart, wrong
 
 # Proximal policy optimisation: what a task of a hundred short steps needs.
-SETTINGS = {"n_steps": 100, "batch_size": 800, "n_epochs": 8, "learning_rate": 5e-4, "gamma": 0.95, "gae_lambda": 0.9}
+SETTINGS = {"n_steps": 100, "batch_size": 800, "n_epochs": 8, "learning_rate": 1e-3, "gamma": 0.9, "gae_lambda": 0.9}
 NETWORK = {"net_arch": [128, 128], "log_std_init": -1.0}
 #: Columns of the curve: steps, seconds of training, and the mean reward per step of the last episodes.
 COLUMNS = ("steps", "seconds", "reward")

@@ -11,8 +11,34 @@ from finger_pin.control.reference import SignalReference
 from finger_pin.control.signal import Signal
 from finger_pin.core.control import Control, held_control, planned_control, scheduled_control
 from finger_pin.core.evaluation import time_functions as signal_core
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+
+
+def build_stepper(
+    finger: Finger,
+    control: Control,
+    x: Array,
+    force: Array | None = None,
+    *,
+    method: str,
+    rtol: float,
+    atol_scale: float,
+) -> Stepper:
+    """Return what steps a finger under inputs, from a packed state on.
+
+    Args:
+        finger: The finger.
+        control: Its inputs.
+        x: Packed state, shape (size,).
+        force: At the tips, shape (3,) or (t, 3), N, base frame.
+        method: One of `TABLEAUS`.
+        rtol: Relative tolerance.
+        atol_scale: Absolute tolerance over the scale of each kind of state.
+    """
+    atol = atol_scale * finger.layout.scales()
+    return Stepper(finger.mechanism, control, x, TABLEAUS[method](), rtol, atol, force)
 
 
 def compiled_control(loop: ClosedLoop) -> Control | None:

@@ -137,16 +137,24 @@ def _fill(
 
 
 class CompiledMechanism:
-    """Evaluates a mechanism without Python inside; not to be shared between threads."""
+    """Evaluates a mechanism without Python inside; not to be shared between threads.
+
+    Attributes:
+        mechanism: The mechanism.
+        charts: Where its packed states have quaternions.
+        tables: Its arrays.
+        models: Bound models of them.
+    """
 
     def __init__(self, mechanism: Mechanism) -> None:
         """Read a mechanism."""
         self.mechanism = mechanism
-        self._charts = Charts.of(mechanism)
-        self._tables = build_tables(mechanism)
+        self.charts = Charts.of(mechanism)
+        self.tables = build_tables(mechanism)
         laws, books = [table.law for table in mechanism.rows], mechanism.books
         count = len(books.stored) + len(books.powers)
-        self._models = Models(self._tables, laws, mechanism.channels, mechanism.moved, count)
+        self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved, count)
+        self._motions: dict[int, tuple[Motions, NDArray[np.uint8]]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds models of its own."""
@@ -171,17 +179,17 @@ class CompiledMechanism:
 
     def room(self, count: int, *, booked_only: bool = False, accelerated: bool = True) -> Room:
         """Return room for what is computed of so many states: all, or energies, powers and J^T F only."""
-        mechanism, work = self.mechanism, self._models.model().model.work
+        mechanism, work = self.mechanism, self.models.model().model.work
         width, kept = mechanism.coordinates, 0 if booked_only else count
         return Room(
             packed=np.zeros((count, mechanism.size)),
-            rates=np.zeros((kept if accelerated else 0, self._charts.size)),
+            rates=np.zeros((kept if accelerated else 0, self.charts.size)),
             rows=np.zeros((len(work.rows), kept, work.rows.shape[1])),
             first=0,
             torques=np.zeros((count, width)),
             externals=np.zeros((count, width)),
             booked=np.zeros((count, len(mechanism.books.stored) + len(mechanism.books.powers))),
-            touches=np.zeros((kept, self._tables.touching // CONTACT.arms, 9)),
+            touches=np.zeros((kept, self.tables.touching // CONTACT.arms, 9)),
         )
 
     def found(self, room: Room, at: slice | int = slice(None)) -> Evaluation:
@@ -189,11 +197,11 @@ class CompiledMechanism:
         mechanism, rates, rows = self.mechanism, room.rates, room.rows[:, room.first :][:, : len(room.packed)]
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         if not len(rates):
-            rates = np.full((len(room.packed), self._charts.size), np.nan)
+            rates = np.full((len(room.packed), mechanism.size), np.nan)
         acceleration, rate = rates[:, width : 2 * width], rates
-        if mechanism.positions != width:
+        if mechanism.positions != width and len(room.rates):
             acceleration, (q, v, _) = acceleration.copy(), mechanism.split(room.packed)
-            for i in self._charts.angles:
+            for i in self.charts.angles:
                 # From the second derivatives of the angles to the angular acceleration.
                 a, b, c = v[:, i], v[:, i + 1], v[:, i + 2]
                 acceleration[:, i : i + 3] += np.stack([b * c, -a * c, a * b], axis=1)
@@ -232,7 +240,7 @@ class CompiledMechanism:
 
     def fill(self, room: Room, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> None:
         """Fill a room with what is computed of packed states, shape (size,) or (m, size)."""
-        mechanism, tables = self.mechanism, self._tables
+        mechanism, tables = self.mechanism, self.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
         room.packed[:] = x
@@ -243,8 +251,8 @@ class CompiledMechanism:
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
-        states, attitudes = self._charts.to_core(room.packed)
-        _fill(self._models, room, states, attitudes, commands, forces, base)
+        states, attitudes = self.charts.to_core(room.packed)
+        _fill(self.models, room, states, attitudes, commands, forces, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n).
@@ -252,25 +260,25 @@ class CompiledMechanism:
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
         count, alone = len(np.atleast_2d(position)), np.ndim(position) == 1
-        # One posture after the other is asked for in loops: what is bound once serves them all.
-        motions, block = self._one if count == 1 and base is None else self._bound_motions(count, base)
+        # A few postures after the other are asked for in loops: what is bound once serves them all.
+        kept = count < _FEW and base is None
+        found = self._motions.get(count) if kept else None
+        motions, block = found or self._bound_motions(count, base)
+        if kept:
+            self._motions[count] = motions, block
         motions.positions[:], motions.velocities[:] = position, velocity
         motion_many(block.ctypes.data)
         at = 0 if alone else slice(None)
         tips = motions.tips[at] if motions.tips.shape[1] != 1 else motions.tips[at][..., 0, :]
         return Motion(tips.copy(), motions.kinetic[at].copy(), motions.potential[at].copy())
 
-    @cached_property
-    def _one(self) -> tuple[Motions, NDArray[np.uint8]]:
-        return self._bound_motions(1, None)
-
     def _bound_motions(self, count: int, base: Array | None) -> tuple[Motions, NDArray[np.uint8]]:
         """Return room for postures, and the block that compiled code finds it by."""
-        tables = self._tables
+        tables = self.tables
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
         motions = Motions(
-            self._models.model().address, np.zeros(shape), np.zeros(shape), *filled, _bases(base, count, 0)
+            self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, _bases(base, count, 0)
         )
         return motions, bound(motions, MOTIONS)
 
@@ -287,10 +295,6 @@ class CompiledFinger:
         """Read a finger."""
         self.finger = finger
         self.mechanism = CompiledMechanism(finger.mechanism)
-        # Fingertip and energies are those of the finger alone.
-        self._alone = self.mechanism
-        if finger.surroundings is not None:
-            self._alone = CompiledMechanism(Mechanism(finger.rigid_body, [], moved=finger.mechanism.moved))
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -315,6 +319,13 @@ class CompiledFinger:
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertip and energies of the rigid body at positions and velocities, shape (n,) or (m, n)."""
         return self._alone.motion(position, velocity, base)
+
+    @cached_property
+    def _alone(self) -> CompiledMechanism:
+        """What fingertip and energies are of: the finger without what surrounds it."""
+        if self.finger.surroundings is None:
+            return self.mechanism
+        return CompiledMechanism(Mechanism(self.finger.rigid_body, [], moved=self.finger.mechanism.moved))
 
 
 def _bases(base: Array | None, count: int, guided: int) -> Array:

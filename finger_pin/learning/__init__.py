@@ -12,10 +12,11 @@ except ModuleNotFoundError as error:
 from finger_pin.learning.distributions import Choice, LogUniform, Normal, Uniform
 from finger_pin.learning.environment import Environment
 from finger_pin.learning.sensors import Sensor
+from finger_pin.learning.task import per_world
 from finger_pin.learning.tasks import register
 from finger_pin.learning.vector_environment import VectorEnvironment
 
-__all__ = ["Choice", "Environment", "LogUniform", "Normal", "Sensor", "Uniform", "VectorEnvironment"]
+__all__ = ["Choice", "Environment", "LogUniform", "Normal", "Sensor", "Uniform", "VectorEnvironment", "per_world"]
 
 
 register()

@@ -29,6 +29,7 @@ class Action:
         low: Least action, shape (k,).
         high: Largest action, shape (k,).
         given: The last action, shape (k,).
+        held: What acts now, shape (u,), N; zero before the first action, and for motors in position drive.
         channels: Inputs that are voltages of motors in position drive.
     """
 
@@ -71,6 +72,7 @@ class Action:
     def begin(self, delay: float) -> None:
         """Begin an episode, whose actions arrive after a delay, s."""
         self._delay, self.given = delay, self.low.copy()
+        self.held = np.zeros(self._finger.mechanism.channels)
         self._begins: list[float] = []
         self._values: list[Array] = []
         self._waiting: deque[tuple[float, Array]] = deque()
@@ -100,6 +102,7 @@ class Action:
         self._begins.append(time)
         self._values.append(value)
         if self._drives is None:
+            self.held = value
             stepper.hold(value)
         else:
             self._drives.goals[math.ceil(time / self._drives.period * (1.0 - 1e-12)) :] = value

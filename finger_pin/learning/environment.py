@@ -6,15 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
+import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
-from finger_pin.learning.world import World, advance_all, build_spaces, read_action
+from finger_pin.learning.worlds import Worlds, read_actions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_ALONE = np.zeros(1, dtype=np.int64)
 
 
 class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
@@ -43,11 +46,12 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
                 reward: A function of the signals, which returns one number per world: a mapping of the variables that
                     are observed or privileged, of what ``draw`` returned, and of ``action``, each with the worlds in
-                    front, shape (worlds, ...).
+                    front, shape (worlds, ...). One of a single world's signals is given to `per_world` first.
                 action: ``"tension"``, N; ``"motor_position"``, the goal of motors in position drive, rad; or
                     ``"tendon_length"``, the length that their spools have drawn in, m.
                 limits: Least and largest action; by default 0 to 20 N, or what the joints' ranges need.
-                observation: Names of variables of the result, or a `Sensor` for each.
+                observation: Names of variables of the result; or for each a `Sensor`, and under names of their own
+                    functions, such as the reward is, of what sensors show and ``draw`` returned.
                 privileged: Variables that the policy does not see, for rewards, critics and logs.
                 done: A function of the signals: whether the task has ended (terminated).
                 period: Of control, s.
@@ -67,8 +71,8 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if render_mode not in (None, "rgb_array"):
             raise InputError("render_mode", 'must be "rgb_array" or None', render_mode)
         self.task, self.render_mode = Task(**task), render_mode
-        self._world = World.of(scenario, self.task)
-        self.observation_space, self._actions = build_spaces(self._world, self.task.limits)
+        self._worlds = Worlds(scenario, self.task, 1)
+        self.observation_space, self._actions = self._worlds.spaces()
         self.action_space = self._actions
 
     def reset(
@@ -76,9 +80,9 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Begin an episode with numbers, start and goal drawn anew; the same seed draws the same."""
         super().reset(seed=seed)
-        self._world.begin(self.np_random)
-        observation, _ = self._world.observe()
-        return observation, {"drawn": dict(self._world.drawn)}
+        self._worlds.begin((0,), [self.np_random])
+        observations, _ = self._worlds.observe(_ALONE)
+        return observations[0], {"drawn": dict(self._worlds.each[0].drawn)}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Act for one control period.
@@ -86,20 +90,21 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         Raises:
             InputError: If the action has another shape or is not finite, or the reward is wrong.
         """
-        world = self._world
-        world.act(read_action(action, self._actions))
-        advance_all([world])
-        observation, signals = world.observe()
-        reward, done = self.task.judge({name: value[None] for name, value in signals.items()}, 1)
-        info = world.info(signals)
-        return observation, float(reward[0]), bool(done[0]), world.over, info
+        worlds, world = self._worlds, self._worlds.each[0]
+        worlds.act(read_actions(action, self._actions)[None], (0,))
+        observations, signals = worlds.observe(_ALONE)
+        reward, done = self.task.judge(signals, 1)
+        info: dict[str, Any] = {"reason": world.reason} if world.reason else {}
+        if self.task.privileged:
+            info["privileged"] = {name: signals[name][0] for name in self.task.privileged}
+        return observations[0], float(reward[0]), bool(done[0]), world.over, info
 
     def render(self) -> NDArray[Any] | None:
         """Return a picture of the present posture, shape (height, width, 3), of bytes."""
         if self.render_mode is None:
             return None
-        return self._world.picture()
+        return self._worlds.each[0].picture()
 
     def result(self, *, sample_rate: float = 1000.0) -> xr.Dataset:
         """Return the episode so far as `simulate` returns a run: for figures, `fp.view` and `fp.save`."""
-        return self._world.result(sample_rate)
+        return self._worlds.each[0].result(sample_rate)

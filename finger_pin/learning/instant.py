@@ -1,18 +1,39 @@
-"""Variables of a result at one instant of a motion that goes on."""
+"""Variables of a result at one instant of worlds that go on: where a result has instants, there are the worlds."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import cast
+
 import numpy as np
 
-from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
+from finger_pin.control.proportional import ControlSignals
+from finger_pin.control.reference import ReferenceSignals
+from finger_pin.control.signal import Signal
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.compiled_fingers import CompiledFingers
 from finger_pin.core.stepping.textbook import Statistics, Trajectory
 from finger_pin.description.routing import Array
+from finger_pin.learning.action import Action
+from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.state import State
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.variables import RESIDUAL, Variable, variables
 
 _NOTHING = Statistics(0, 0, 0, 0, 0.0)
 # Of a reference and a controller, which do not act.
 _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
+
+
+def instant(loop: ClosedLoop, time: float, x: Array) -> Motions:
+    """Return what is known of a state, shape (size,), at a time, s."""
+    return _motions(loop, np.array([time]), x[None], None)
+
+
+def _motions(loop: ClosedLoop, times: Array, x: Array, names: Sequence[str] | None) -> Motions:
+    return Motions(loop, Trajectory(np.array([np.inf]), lambda _: x, _NOTHING), times, names)
 
 
 def known_variables(loop: ClosedLoop) -> dict[str, Variable]:
@@ -25,7 +46,96 @@ def known_variables(loop: ClosedLoop) -> dict[str, Variable]:
     }
 
 
-def instant(loop: ClosedLoop, time: float, x: Array) -> Motions:
-    """Return what is known of a state, shape (size,), at a time, s."""
-    times = np.array([time])
-    return Motions(loop, Trajectory(times, lambda _: x[None], _NOTHING), times)
+@dataclass(frozen=True, eq=False)
+class SideBySide(ClosedLoop):
+    """Loops of worlds as one, each world at a time of its own.
+
+    Attributes:
+        loops: Of the worlds.
+        actions: What is done to them.
+        accelerated: Whether accelerations are wanted.
+    """
+
+    loops: list[ClosedLoop] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)
+    accelerated: bool = False
+
+    @classmethod
+    def of(cls, loops: list[ClosedLoop], actions: list[Action], names: Sequence[str], *, apart: bool) -> SideBySide:
+        """Put worlds side by side.
+
+        Args:
+            loops: Of the worlds; of all the same where they have the same numbers.
+            actions: What is done to them.
+            names: Of the variables that will be asked for.
+            apart: Whether every world has numbers of its own.
+        """
+        first, accelerated = loops[0], "joint_acceleration" in names
+        own = {each.name: getattr(first, each.name) for each in fields(ClosedLoop)}
+        own["drives"] = None if actions[0].drives is None else actions[0]
+        if apart:
+            own["dynamics"] = CompiledFingers([_compiled(each) for each in loops], accelerated=accelerated)
+            own["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))
+        return cls(**own, loops=loops, actions=actions, accelerated=accelerated)
+
+    def renew(self, index: int, loop: ClosedLoop, action: Action) -> None:
+        """Put another world in the place of one; all have loops of their own then."""
+        self.loops[index], self.actions[index] = loop, action
+        assert isinstance(self.dynamics, CompiledFingers)
+        self.dynamics.replace(index, _compiled(loop))
+
+    @property
+    def shared(self) -> bool:
+        """Whether all worlds have the same numbers."""
+        return not isinstance(self.dynamics, CompiledFingers)
+
+    def at(self, times: Array, x: Array) -> Motions:
+        """Return what is known of packed states, shape (w, size), at times (w,), s."""
+        return _motions(self, times, x, ["joint_acceleration"] if self.accelerated else [])
+
+    def force(self, time: Array | float) -> Array:
+        """Return F in all worlds, shape (3,) or (w, 3), of several fingers (f, 3) or (w, f, 3), N."""
+        if self.shared:
+            return super().force(time)
+        return np.array([loop.force(each) for loop, each in zip(self.loops, np.asarray(time), strict=True)])
+
+    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
+        """Return all signals at times (w,) and states (w, size); how the base moves counts for accelerations alone."""
+        times, routing = np.asarray(time), self.finger.routing
+        command = np.array([action.held for action in self.actions])
+        tension = np.zeros((len(times), len(routing.tendons)))
+        tension[:, : routing.actuated] = command[:, : routing.actuated]
+        inputs = command[:, routing.actuated :]
+        control = ControlSignals(np.zeros((len(times), len(routing.joints))), tension, inputs=inputs)
+        if self.drives is not None:
+            voltages = [action.voltages(each) for action, each in zip(self.actions, times, strict=True)]
+            command[:, self.drives.channels] = voltages
+        base = None
+        if accelerated and (self.palm or self.guides):
+            base = np.array([loop.base(each) for loop, each in zip(self.loops, times, strict=True)])
+        evaluate = self.dynamics.evaluate if accelerated else self.dynamics.exerted
+        nothing = np.zeros((len(times), len(routing.joints)))
+        return LoopSignals(ReferenceSignals(nothing, nothing), control, evaluate(x, command, self.force(time), base))
+
+    def motion(self, time: Array, state: State) -> Motion:
+        """Return fingertips at times (w,) and states, in the world; energies are those of a palm at rest."""
+        found = self.dynamics.motion(state.position, state.velocity)
+        if self.palm is None:
+            return found
+        return self.palm.to_world(time, found, self.finger.rigid_body.mass)
+
+
+class _PalmSignals:
+    """Paths of palms, each at a time of its own."""
+
+    def __init__(self, loops: Sequence[ClosedLoop]) -> None:
+        self._loops = loops
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return values and rates at times (w,), shape (w, 6) each."""
+        found = [loop.palm.signal.at(each) for loop, each in zip(self._loops, time, strict=True) if loop.palm]
+        return np.array([value for value, _ in found]), np.array([rate for _, rate in found])
+
+
+def _compiled(loop: ClosedLoop) -> CompiledFinger:
+    return cast(CompiledFinger, loop.dynamics)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -47,22 +48,57 @@ class Sensor:
 
 
 class Measurement:
-    """A sensor in use during an episode."""
+    """The sensors of one variable in w worlds, each with numbers of its own."""
 
-    def __init__(self, sensor: Sensor, name: str, period: float) -> None:
-        """Begin with no samples."""
-        self._sensor, self._kept = sensor, deque[Array](maxlen=sensor.periods(period, name) + 1)
+    def __init__(self, worlds: int, periods: int) -> None:
+        """Begin with perfect sensors, whose samples are some control periods old."""
+        self._noise, self._quantisation, self._offset = np.zeros((3, worlds))
+        self._perfect = True
+        self._periods, self._kept = periods, np.zeros((periods + 1, worlds))
+        # How many samples a world has taken in its episode.
+        self._count = np.zeros(worlds, dtype=np.int64)
 
-    def sample(self, truth: Array, random: np.random.Generator) -> Array:
-        """Return what is observed when the truth is this; the first sample stands for those before it."""
-        sensor = self._sensor
-        seen = np.array(truth, dtype=float)
-        if sensor.offset:
-            seen += sensor.offset
-        if sensor.noise:
-            seen += random.normal(0.0, sensor.noise, seen.shape)
-        if sensor.quantisation:
-            seen = sensor.quantisation * np.round(seen / sensor.quantisation)
-        kept = self._kept
-        kept.append(seen)
-        return kept[0]
+    def begin(self, world: int, sensor: Sensor) -> None:
+        """Begin an episode of a world with a sensor, and no samples."""
+        numbers = sensor.noise, sensor.quantisation, sensor.offset
+        self._noise[world], self._quantisation[world], self._offset[world] = numbers
+        self._perfect = not (self._noise.any() or self._quantisation.any() or self._offset.any())
+        self._count[world] = 0
+
+    def sample(self, truth: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
+        """Return what is observed in some worlds; an episode's first sample stands for those before it.
+
+        Args:
+            truth: In these worlds, shape (k, ...).
+            worlds: Their numbers, shape (k,).
+            randoms: Of all worlds.
+        """
+        seen = truth if self._perfect else self._spoilt(truth, worlds, randoms)
+        if not self._periods:
+            return seen
+        if self._kept.shape[2:] != seen.shape[1:]:
+            self._kept = np.zeros((*self._kept.shape[:2], *seen.shape[1:]))
+        first, rows = self._count[worlds] == 0, len(self._kept)
+        self._kept[:, worlds[first]] = seen[first]
+        self._kept[self._count[worlds] % rows, worlds] = seen
+        self._count[worlds] += 1
+        # One row further is the oldest.
+        return self._kept[self._count[worlds] % rows, worlds]
+
+    def _spoilt(self, truth: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
+        wide = (-1, *(1 for _ in truth.shape[1:]))
+        seen = truth + self._offset[worlds].reshape(wide)
+        for row, world in enumerate(worlds.tolist()):
+            if self._noise[world]:
+                seen[row] += randoms[world].normal(0.0, self._noise[world], seen.shape[1:])
+        step = self._quantisation[worlds].reshape(wide)
+        return np.where(step > 0.0, step * np.round(seen / np.where(step > 0.0, step, 1.0)), seen)
+
+
+def measurements(sensors: Mapping[str, Sensor], worlds: int, period: float) -> dict[str, Measurement]:
+    """Return the sensors of all variables in some worlds.
+
+    Raises:
+        InputError: If a delay is no whole number of control periods.
+    """
+    return {name: Measurement(worlds, sensor.periods(period, name)) for name, sensor in sensors.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from finger_pin.learning.sensors import Sensor
 
 #: What a reward or an end is told: variables by name, what was drawn for the episode, and ``action``.
 Signals = Mapping[str, Array]
+#: A function of them, for all worlds at once.
+Function = Callable[[Signals], ArrayLike]
 #: Ways in which a policy acts.
 ACTIONS = ("tension", "motor_position", "tendon_length")
 
@@ -25,12 +28,12 @@ ACTIONS = ("tension", "motor_position", "tendon_length")
 class Task:
     """A task on a scenario; arguments of `Environment`, where they are explained."""
 
-    reward: Callable[[Signals], ArrayLike]
+    reward: Function
     action: str = "tension"
     limits: tuple[ArrayLike, ArrayLike] | None = None
-    observation: Sequence[str] | Mapping[str, Sensor] = ("joint_position", "joint_velocity")
+    observation: Sequence[str] | Mapping[str, Sensor | Function] = ("joint_position", "joint_velocity")
     privileged: Sequence[str] = ()
-    done: Callable[[Signals], ArrayLike] | None = None
+    done: Function | None = None
     period: float = 0.02
     delay: float = 0.0
     duration: float = 2.0
@@ -50,6 +53,9 @@ class Task:
             value = getattr(self, name)
             if not isinstance(value, int | float) or not 0.0 < value < np.inf:
                 raise InputError(name, "must be above 0 and finite, s", value)
+        for name, each in self._observed.items():
+            if not (isinstance(each, Sensor) or callable(each)):
+                raise InputError(f"observation.{name}", "must be a Sensor or a function of what is observed", each)
         if isinstance(self.start, str) and self.start not in ("reference", "random"):
             raise InputError("start", 'must be "reference", "random" or a function of a generator', self.start)
 
@@ -58,11 +64,39 @@ class Task:
         """Control periods of an episode."""
         return max(round(self.duration / self.period), 1)
 
-    @property
-    def sensors(self) -> Mapping[str, Sensor]:
-        """The sensor of every observed variable; perfect ones unless given."""
+    @cached_property
+    def _observed(self) -> Mapping[str, Sensor | Function]:
         given = self.observation
         return dict(given) if isinstance(given, Mapping) else {name: Sensor() for name in given}
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """Names of what is observed, in order, before what is drawn for an episode."""
+        return tuple(self._observed)
+
+    @cached_property
+    def sensors(self) -> Mapping[str, Sensor]:
+        """The sensor of every observed variable; perfect ones unless given."""
+        return {name: each for name, each in self._observed.items() if isinstance(each, Sensor)}
+
+    def derive(self, told: Signals, worlds: int) -> dict[str, Array]:
+        """Return what is computed of what sensors show and of what was drawn, by name, shapes (worlds, ...).
+
+        Raises:
+            InputError: If a function returns another shape, or what is not finite.
+        """
+        found = {}
+        for name, function in self._observed.items():
+            if isinstance(function, Sensor):
+                continue
+            value = np.asarray(function(told), dtype=float)
+            if value.shape[:1] != (worlds,):
+                allowed = f"must return arrays with the worlds in front, shape ({worlds}, ...); see per_world"
+                raise InputError(f"observation.{name}", allowed, list(value.shape))
+            if not np.isfinite(value).all():
+                raise InputError(f"observation.{name}", "must return finite numbers", value.tolist())
+            found[name] = value
+        return found
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -83,9 +117,23 @@ class Task:
         return reward, _shaped("done", self.done(signals), worlds, bool)
 
 
+def per_world(function: Callable[[Signals], Any]) -> Function:
+    """Return a function for all worlds at once that calls one for each, with that world's signals alone.
+
+    A function of arrays with the worlds in front takes no longer for a hundred worlds than for one; this is for those
+    that cannot be written so.
+    """
+
+    def together(signals: Signals) -> Array:
+        count = len(next(iter(signals.values())))
+        return np.array([function({name: value[i] for name, value in signals.items()}) for i in range(count)])
+
+    return together
+
+
 def _shaped(name: str, value: Any, worlds: int, kind: type) -> Array:
     found: NDArray[Any] = np.asarray(value, dtype=kind)
     if found.shape != (worlds,):
-        allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front"
+        allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front; see per_world"
         raise InputError(name, allowed, list(found.shape))
     return found

@@ -14,14 +14,19 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.learning.distributions import Uniform
 from finger_pin.learning.environment import Environment
-from finger_pin.learning.task import Signals
+from finger_pin.learning.sensors import Sensor
+from finger_pin.learning.task import Function, Signals
 from finger_pin.learning.vector_environment import VectorEnvironment
 from finger_pin.mechanism.finger import Finger
 
 # At these tolerances angles err by less than a thousandth of a radian rms, which no policy feels.
 _COARSE = {"simulation.method": "Rodas4", "simulation.rtol": 1e-2, "simulation.atol_scale": 1e-2}
-# Distances at which a reward has fallen to a quarter, m and N.
-_NEAR, _GENTLE = 0.02, 0.5
+# Most tensions, N, half of which hold the finger in the air, and half of which press on things with a newton or two.
+_LIGHT, _FIRM = (2.0, 2.0, 8.8, 6.2), (12.0, 12.0, 25.0, 8.0)
+# Errors over which the halves of a reward fall off, m and N: the first leads there, the second asks for more.
+_FAR, _NEAR, _HARD, _GENTLE = 0.06, 0.015, 2.0, 0.3
+# What a newton on the ball costs.
+_COST = 0.1
 # A ball that is further than this from between the fingertips is lost, m.
 _LOST = 0.025
 
@@ -50,38 +55,54 @@ def wanted_force(random: np.random.Generator) -> dict[str, Array]:
     return {"wanted_force": random.uniform(0.5, 3.0, 1)}
 
 
-def _nearness(distance: Array, scale: float) -> Array:
-    return 1.0 - np.tanh(distance / scale)
+def _nearness(error: Array, wide: float, narrow: float) -> Array:
+    """Return 1 for no error, and 0 for a large one."""
+    return 1.0 - 0.5 * (np.tanh(error / wide) + np.tanh(error / narrow))
+
+
+def to_goal(signals: Signals) -> Array:
+    """Return the way from the fingertip to the goal, shape (worlds, 3), m."""
+    return np.asarray(signals["goal"] - signals["fingertip_position"])
+
+
+def missing_force(signals: Signals) -> Array:
+    """Return what the wanted force is more than all contacts press, shape (worlds, 1), N."""
+    return np.asarray(signals["wanted_force"] - signals["contact_normal_force"].sum(axis=-1, keepdims=True))
+
+
+def from_grip(signals: Signals) -> Array:
+    """Return the way from the middle of the fingertips to the ball, as the palm sees it, shape (worlds, 3), m."""
+    middle = signals["fingertip_position"].mean(axis=-2) - signals["palm_position"]
+    return np.asarray(signals["object_position"][..., 0, :] - middle)
 
 
 def _reached(signals: Signals) -> Array:
-    return _nearness(np.linalg.norm(signals["fingertip_position"] - signals["goal"], axis=-1), _NEAR)
+    return _nearness(np.linalg.norm(to_goal(signals), axis=-1), _FAR, _NEAR)
 
 
 def _pressed(signals: Signals) -> Array:
-    pressed = signals["contact_normal_force"].sum(axis=-1)
-    return _nearness(np.abs(pressed - signals["wanted_force"][..., 0]), _GENTLE)
-
-
-def _from_grip(signals: Signals) -> Array:
-    """Return how far the ball is from the middle of the fingertips, shape (worlds,), m."""
-    middle = signals["fingertip_position"].mean(axis=-2)
-    return np.asarray(np.linalg.norm(signals["object_position"][..., 0, :] - middle, axis=-1))
+    return _nearness(np.abs(missing_force(signals)[..., 0]), _HARD, _GENTLE)
 
 
 def _held(signals: Signals) -> Array:
-    return _nearness(_from_grip(signals), _NEAR)
+    near = _nearness(np.linalg.norm(from_grip(signals), axis=-1), _FAR, _NEAR)
+    return np.asarray(near - _COST * signals["contact_normal_force"].sum(axis=-1))
 
 
 def _lost(signals: Signals) -> NDArray[np.bool_]:
-    return np.asarray(_from_grip(signals) > _LOST)
+    return np.asarray(np.linalg.norm(from_grip(signals), axis=-1) > _LOST)
+
+
+def _observed(*names: str, **functions: Function) -> dict[str, Sensor | Function]:
+    return {name: Sensor() for name in names} | functions
 
 
 def _reach() -> dict[str, Any]:
     return {
         "scenario": _scenario("fig6"),
+        "limits": (0.0, _LIGHT),
         "reward": _reached,
-        "observation": ("joint_position", "joint_velocity", "fingertip_position"),
+        "observation": _observed("joint_position", "joint_velocity", "fingertip_position", to_goal=to_goal),
         "draw": fingertip_goal,
         "start": "random",
     }
@@ -91,8 +112,11 @@ def _press() -> dict[str, Any]:
     plate = "environment.objects.plate.path.z"
     return {
         "scenario": _scenario("press", ((f"{plate}.amplitude", 0.002), (f"{plate}.frequency", 0.5))),
+        "limits": (0.0, _FIRM),
         "reward": _pressed,
-        "observation": ("joint_position", "joint_velocity", "contact_normal_force"),
+        "observation": _observed(
+            "joint_position", "joint_velocity", "contact_normal_force", missing_force=missing_force
+        ),
         "draw": wanted_force,
         "randomise": {f"{plate}.phase": Uniform(0.0, 2.0 * np.pi), f"{plate}.frequency": Uniform(0.2, 1.0)},
     }
@@ -101,9 +125,12 @@ def _press() -> dict[str, Any]:
 def _grasp() -> dict[str, Any]:
     return {
         "scenario": _scenario("pinch"),
+        "limits": (0.0, _FIRM * 2),
         "reward": _held,
         "done": _lost,
-        "observation": ("joint_position", "joint_velocity", "fingertip_position", "object_position"),
+        "observation": _observed(
+            "joint_position", "joint_velocity", "fingertip_position", "object_position", "palm_position"
+        ),
         "privileged": ("contact_normal_force",),
         "randomise": {
             "hand.palm.path.y.amplitude": Uniform(0.0, 0.015),

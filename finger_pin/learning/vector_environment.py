@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
-from finger_pin.learning.world import World, advance_all, build_spaces, observe_all, read_action
+from finger_pin.learning.worlds import Worlds, read_actions
 
 
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
@@ -40,9 +40,8 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             raise InputError("num_envs", "must be a whole number above 0", num_envs)
         task.pop("render_mode", None)
         self.task, self.num_envs = Task(**task), int(num_envs)
-        first = World.of(scenario, self.task)
-        self._worlds = [first, *(first.twin() for _ in range(self.num_envs - 1))]
-        self.single_observation_space, self._single = build_spaces(first, self.task.limits)
+        self._worlds = Worlds(scenario, self.task, self.num_envs)
+        self.single_observation_space, self._single = self._worlds.spaces()
         self.single_action_space = self._single
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         low, high = (np.tile(each, (self.num_envs, 1)) for each in (self._single.low, self._single.high))
@@ -50,7 +49,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_fps": round(1.0 / self.task.period)}
         self.render_mode = None
         self._randoms: list[np.random.Generator] = []
-        self._ended = np.zeros(self.num_envs, dtype=bool)
+        self._ended, self._all = np.zeros(self.num_envs, dtype=bool), np.arange(self.num_envs)
         self._seen: NDArray[Any] = np.zeros(self.observation_space.shape or (), dtype=np.float32)
 
     def reset(
@@ -73,14 +72,13 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             for i in np.flatnonzero(mask):
                 if seeds[i] is not None:
                     self._randoms[i] = np_random(seeds[i])[0]
-        for i in np.flatnonzero(mask):
-            self._worlds[i].begin(self._randoms[i])
-            # The others are not measured again: that would age what their sensors delay.
-            self._seen[i] = self._worlds[i].observe()[0]
+        # The others are not measured again: that would age what their sensors delay.
+        begun = np.flatnonzero(mask)
+        self._worlds.begin(begun.tolist(), self._randoms)
+        if len(begun):
+            self._seen[begun] = self._worlds.observe(begun)[0]
         self._ended[mask] = False
-        return self._seen.copy(), self._gathered(
-            [{"drawn": world.drawn} if at else {} for world, at in zip(self._worlds, mask, strict=True)]
-        )
+        return self._seen.copy(), self._drawn(begun)
 
     def step(
         self, actions: NDArray[Any]
@@ -90,28 +88,26 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Raises:
             InputError: If the actions have another shape or are not finite, or the reward is wrong.
         """
-        commands = read_action(actions, self._actions)
+        commands, worlds = read_actions(actions, self._actions), self._worlds
         begun = self._ended.copy()
-        for i, world in enumerate(self._worlds):
-            if begun[i]:
-                world.begin(self._randoms[i])
-            else:
-                world.act(commands[i])
-        advance_all([world for i, world in enumerate(self._worlds) if not begun[i]])
-        self._seen, signals = observe_all(self._worlds)
+        at_start = np.flatnonzero(begun)
+        worlds.begin(at_start.tolist(), self._randoms)
+        worlds.act(commands, np.flatnonzero(~begun).tolist())
+        self._seen, signals = worlds.observe(self._all)
         rewards, done = self.task.judge(signals, self.num_envs)
-        over = np.array([world.over for world in self._worlds])
-        rewards, done, over = np.where(begun, 0.0, rewards), done & ~begun, over & ~begun
+        rewards, done, over = np.where(begun, 0.0, rewards), done & ~begun, worlds.over & ~begun
         self._ended = done | over
-        own = [
-            {"drawn": world.drawn} if begun[i] else world.info({name: value[i] for name, value in signals.items()})
-            for i, world in enumerate(self._worlds)
-        ]
-        return self._seen.copy(), rewards, done, over, self._gathered(own)
+        info = self._drawn(at_start)
+        if self.task.privileged:
+            told = {name: signals[name] for name in self.task.privileged}
+            info |= {"privileged": told | {f"_{name}": ~begun for name in told}, "_privileged": ~begun}
+        for i in np.flatnonzero(over).tolist():
+            if worlds.each[i].reason:
+                info = self._add_info(info, {"reason": worlds.each[i].reason}, i)
+        return self._seen.copy(), rewards, done, over, info
 
-    def _gathered(self, own: list[dict[str, Any]]) -> dict[str, Any]:
+    def _drawn(self, begun: NDArray[np.int64]) -> dict[str, Any]:
         found: dict[str, Any] = {}
-        for i, each in enumerate(own):
-            if each:
-                found = self._add_info(found, each, i)
+        for i in begun.tolist():
+            found = self._add_info(found, {"drawn": self._worlds.each[i].drawn}, i)
         return found

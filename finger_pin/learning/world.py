@@ -1,20 +1,18 @@
-"""One world of an environment: a scenario in steps, what a policy sees of it, and what is drawn for an episode."""
+"""One world of an environment: a scenario in steps, and what is drawn for an episode."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import sampled_control
-from finger_pin.core.stepping.batch import advance_together
+from finger_pin.control.compiled import build_stepper, sampled_control
+from finger_pin.core.stepping.batch import RESTING
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.family import Family
@@ -26,11 +24,10 @@ from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
 from finger_pin.learning.instant import instant, known_variables
 from finger_pin.learning.randomisation import Randomisation
-from finger_pin.learning.sensors import Measurement
+from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import record
-from finger_pin.simulation.variables import variables
 from finger_pin.views.viewer.video import draw_picture
 
 if TYPE_CHECKING:
@@ -45,18 +42,25 @@ class World:
 
     Attributes:
         task: What is asked of the policy.
+        origin: The scenario's own loop, whose controller does not act.
+        action: What acts in its place.
         stepper: What moves.
         drawn: What was drawn for the episode: numbers by key, and what the task draws.
+        context: What the task has drawn of it.
+        sensors: The sensors of the episode.
         reason: Why the motion cannot go on; empty if it can.
     """
 
-    def __init__(self, family: Family, task: Task, randomisation: Randomisation) -> None:
-        """Build the scenario; use `of` or `twin`."""
+    def __init__(
+        self, family: Family, task: Task, randomisation: Randomisation, origin: ClosedLoop | None = None
+    ) -> None:
+        """Build the scenario, unless another world's loop serves; use `of` or `twin`."""
         self.task, self._family, self._randomisation = task, family, randomisation
         self.drawn: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
-        self.reason, self._step = "", 0
-        self._build(family.scenario)
+        self.sensors: dict[str, Sensor] = {}
+        self.reason, self._step, self._now = "", 0, 0.0
+        self._build(family.scenario, origin)
 
     @classmethod
     def of(cls, scenario: Scenario | str | Path, task: Task) -> World:
@@ -70,44 +74,49 @@ class World:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)
         world = cls(Family(scenario, randomisation.keys), task, randomisation)
-        known = known_variables(world._loop)
+        known = known_variables(world.origin)
         for name in task.variables:
             if name not in known:
                 near = nearest(name, known)
                 hint = f"; did you mean {near}?" if near else ""
                 raise InputError("observation", f"no such variable; there are {', '.join(known)}{hint}", name)
-        # What cannot be drawn is said now, not at the hundredth reset.
-        world.begin(np.random.default_rng(0))
         return world
 
     def twin(self) -> World:
-        """Return another world of the same scenario and task."""
-        return World(self._family, self.task, self._randomisation)
+        """Return another world of the same scenario and task; all share what no reset draws anew."""
+        origin = None if self._randomisation.keys else self.origin
+        return World(self._family, self.task, self._randomisation, origin)
 
-    def _build(self, scenario: Scenario) -> None:
+    @property
+    def rebuilt(self) -> bool:
+        """Whether every episode has a loop and a stepper of its own."""
+        return bool(self._randomisation.keys)
+
+    def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
         """Build what moves, under inputs that are held."""
-        loop = ClosedLoop.from_scenario(scenario).compiled()
-        self._scenario, self._origin = scenario, loop
-        self.action = Action(self.task.action, loop.finger, self.task.duration)
-        driven = self.action if self.action.drives is not None else None
-        self._loop = replace(loop, controller=self.action, drives=driven)
-        self.stepper = self._stepper_at(loop.initial_state())
+        self._scenario, self.origin = scenario, origin or ClosedLoop.from_scenario(scenario).compiled()
+        self.action = Action(self.task.action, self.origin.finger, self.task.duration)
+        self.stepper = self._stepper_at(self.origin.initial_state())
         if self.action.drives is not None:
             self.stepper.drive(self.action.drives)
-        table = variables(self._loop)
-        self._variables = {name: table[name] for name in self.task.variables if name in table}
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """What moves, with the actions in the place of its controller."""
+        driven = self.action if self.action.drives is not None else None
+        return replace(self.origin, controller=self.action, drives=driven)
 
     def _stepper_at(self, x: Array) -> Stepper:
         """Return a stepper that starts from a state."""
-        loop, settings = self._origin, self._scenario.simulation
-        return Stepper(
-            loop.finger.mechanism,
+        loop, settings = self.origin, self._scenario.simulation
+        return build_stepper(
+            loop.finger,
             sampled_control(loop),
             x,
-            TABLEAUS[settings.method](),
-            settings.rtol,
-            settings.atol_scale * loop.finger.layout.scales(),
             loop.fingertip_force,
+            method=settings.method,
+            rtol=settings.rtol,
+            atol_scale=settings.atol_scale,
         )
 
     @property
@@ -126,7 +135,7 @@ class World:
         Raises:
             InputError: If what is drawn is not allowed.
         """
-        self._random, self.reason, self._step = random, "", 0
+        self._random, self.reason, self._step, self._now = random, "", 0, 0.0
         self.drawn = self._randomisation.draw(random)
         if self._randomisation.keys:
             self._build(self._family.at([self.drawn[key] for key in self._randomisation.keys]))
@@ -136,15 +145,14 @@ class World:
         context = {} if task.draw is None else task.draw(random)
         self.context = {name: np.asarray(value, dtype=float) for name, value in context.items()}
         self.drawn |= self.context
-        self._measurements = {
-            name: Measurement(self._randomisation.sensor(name, sensor, self.drawn), name, task.period)
-            for name, sensor in task.sensors.items()
+        self.sensors = {
+            name: self._randomisation.sensor(name, sensor, self.drawn) for name, sensor in task.sensors.items()
         }
         self.action.begin(self._randomisation.delay(self.drawn, task.delay))
 
     def _start(self) -> Array:
         """Return the packed state at the start."""
-        loop, task = self._origin, self.task
+        loop, task = self.origin, self.task
         if task.start == "reference":
             return loop.initial_state()
         around, joints = loop.finger.surroundings, len(loop.finger.routing.joints)
@@ -175,41 +183,22 @@ class World:
         self.action.take(action, self.time)
 
     def next_end(self) -> float:
-        """Hold what acts now, and return until when, s; the time that it has reached where the period is over."""
+        """Hold what acts now, and return until when, s; `RESTING` where the period is over."""
         end = (self._step + 1) * self.task.period
-        now = self.stepper.time
-        return now if self.reason or now >= end else self.action.next_piece(self.stepper, now, end)
+        if self.reason or self._now >= end:
+            return RESTING
+        return self.action.next_piece(self.stepper, self._now, end)
+
+    def reach(self, end: float, status: int) -> None:
+        """Take note of how a stepper ended a piece."""
+        self._now = end
+        if status:
+            self._now = self.stepper.time
+            self.reason = self.stepper.failure(status, self.origin.finger.layout.names)
 
     def end_period(self) -> None:
         """Count a control period."""
         self._step += 1
-
-    def note(self, status: int) -> None:
-        """Take note of how a stepper ended a piece."""
-        if status:
-            self.reason = self.stepper.failure(status, self._loop.finger.layout.names)
-
-    def observe(self) -> tuple[Array, dict[str, Array]]:
-        """Return what the policy sees, shape (o,), and the truth by name."""
-        motions = self._motions()
-        signals = {name: each.value(motions)[0] for name, each in self._variables.items()}
-        seen = [self._measurements[name].sample(signals[name], self._random).ravel() for name in self._measurements]
-        seen += [value.ravel() for value in self.context.values()]
-        signals |= self.context
-        signals["action"] = self.action.given
-        return np.concatenate(seen, dtype=np.float32), signals
-
-    def _motions(self) -> Motions:
-        return instant(self._loop, self.stepper.time, self.stepper.x)
-
-    def info(self, signals: Mapping[str, Array]) -> dict[str, Any]:
-        """Return what goes beside an observation: privileged variables, and why the motion cannot go on if so."""
-        found: dict[str, Any] = {}
-        if self.task.privileged:
-            found["privileged"] = {name: signals[name] for name in self.task.privileged}
-        if self.reason:
-            found["reason"] = self.reason
-        return found
 
     def result(self, sample_rate: float) -> xr.Dataset:
         """Return the episode so far, integrated again step by step, as a Dataset with its energy account."""
@@ -219,70 +208,23 @@ class World:
         if self.action.drives is not None:
             stepper.drive(self.action.again())
         held = self.action.replayed() if self.action.drives is None else None
-        trajectory = integrate_compiled(stepper, end, self._loop.finger.layout.names, held=held)
+        trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=held)
         times = np.arange(round(end * sample_rate) + 1) / sample_rate
-        motions = Motions(self._loop, trajectory, times)
+        motions = Motions(self.loop, trajectory, times)
         found = record(self._scenario, motions, self._scenario.simulation.method)
         found.attrs["own"] = "policy"
         return found
 
     def picture(self) -> NDArray[np.uint8]:
         """Return a picture of the present posture, seen from where all postures are in view, of bytes."""
-        motions = self._motions()
         method = self._scenario.simulation.method
-        found = record(self._scenario, motions, method, list(known_variables(self._loop)))
+        motions = instant(self.loop, self.stepper.time, self.stepper.x)
+        found = record(self._scenario, motions, method, list(known_variables(self.origin)))
         return draw_picture(found, self._stage)
 
     @cached_property
     def _stage(self) -> Array:
         """Fingertips at the corners of the joints' ranges, shape (k, 3), m."""
-        limiter, body = self._loop.finger.stroke_limiter, self._loop.finger.rigid_body
+        limiter, body = self.origin.finger.stroke_limiter, self.origin.finger.rigid_body
         corners = np.array([limiter.lower, limiter.upper, 0.5 * (limiter.lower + limiter.upper)])
         return np.array([body.tip_position(corner) for corner in corners]).reshape(-1, 3)
-
-
-def build_spaces(world: World, limits: Any) -> tuple[Box, Box]:
-    """Return the spaces of observations and actions, both of 32-bit floats."""
-    low, high = world.action.limited(limits)
-    observation, _ = world.observe()
-    return Box(-np.inf, np.inf, observation.shape, np.float32), Box(low.astype(np.float32), high.astype(np.float32))
-
-
-def read_action(action: Any, space: Box) -> Array:
-    """Return an action as an array within its bounds.
-
-    Raises:
-        InputError: If it has another shape, or is not finite.
-    """
-    found = np.asarray(action, dtype=float)
-    if found.shape != space.shape:
-        raise InputError("action", f"must have shape {space.shape}", list(found.shape))
-    if not np.isfinite(found).all():
-        raise InputError("action", "must be finite", found.tolist())
-    return np.asarray(np.clip(found, space.low, space.high), dtype=float)
-
-
-def advance_all(worlds: Sequence[World]) -> None:
-    """Advance worlds by a control period, side by side in threads without Python in between.
-
-    Where actions arrive within the period, it has several pieces.
-    """
-    while True:
-        ends = [world.next_end() for world in worlds]
-        due = [(world, end) for world, end in zip(worlds, ends, strict=True) if end > world.stepper.time]
-        if not due:
-            break
-        if len(due) == 1:
-            statuses = [due[0][0].stepper.advance(due[0][1])]
-        else:
-            statuses = advance_together([world.stepper for world, _ in due], [end for _, end in due])
-        for (world, _), status in zip(due, statuses, strict=True):
-            world.note(status)
-    for world in worlds:
-        world.end_period()
-
-
-def observe_all(worlds: Sequence[World]) -> tuple[Array, dict[str, Array]]:
-    """Return what policies see, shape (w, o), and the truth by name, with the worlds in front."""
-    seen, signals = zip(*(world.observe() for world in worlds), strict=True)
-    return np.stack(seen), {name: np.stack([each[name] for each in signals]) for name in signals[0]}

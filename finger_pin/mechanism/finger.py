@@ -27,12 +27,15 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
-from finger_pin.mechanism.rows import Rows, RowSignals, further_states
+from finger_pin.mechanism.rows import Rows, RowSignals, combined, further_states
 from finger_pin.mechanism.state import Layout
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
+
+#: Tables of rows that are tendons.
+PULLING = ("passive_halves", "driven_tendons", "elastic_tendons", "tendon_hysteresis")
 
 
 class Finger:
@@ -240,14 +243,18 @@ class Finger:
 
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
-        halves = found.rows["passive_halves"]
-        torque = (halves.force @ halves.rows.arm)[..., : len(self.routing.joints)]
-        for pulling in ("driven_tendons", "elastic_tendons", "tendon_hysteresis"):
-            if pulling in found.rows:
-                torque = torque + self._pulled_torque(x, found.rows[pulling])
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
         bodies, pulled = int(self.mechanism.body.model.nv), self.actuators.wired(self.actuators.pulled)
+        torque = self.tendon_torque(x, found.rows)
         return FingerSignals.of(found, self.layout.unpack(x), inputs, force, torque, bodies, pulled)
+
+    def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
+        """Return H_c2^T f at packed states, shape (..., n), N m, (11), of what the tendons' rows do."""
+        pulling = [rows[group] for group in PULLING if group in rows]
+        torque = self._pulled_torque(x, pulling[0])
+        for each in pulling[1:]:
+            torque = torque + self._pulled_torque(x, each)
+        return torque
 
     def coupling_at(self, position: Array) -> Array:
         """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
@@ -261,7 +268,7 @@ class Finger:
         """Return what driven or elastic tendons exert, shape (..., n), N m."""
         joints = len(self.routing.joints)
         if not pulling.rows.routed:
-            return (pulling.force @ pulling.rows.arm)[..., :joints]
+            return combined(pulling.force, pulling.rows.arm)[..., :joints]
         places = [self.routing.tendons.index(name) for name in pulling.rows.names]
         coupling = self.coupling_at(x[..., :joints])[..., places, :]
         return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.rows import RowSignals
+from finger_pin.mechanism.rows import RowSignals, combined
 from finger_pin.mechanism.state import State
 
 _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
@@ -144,7 +144,7 @@ class FingerSignals:
         if "motors" in found.rows:
             motor, gears = (found.rows[name] for name in ("motors", "gearboxes"))
             for table, weights in pulled.items():
-                delivered = delivered + found.rows[table].force @ weights.T
+                delivered = delivered + combined(found.rows[table].force, weights.T)
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:
@@ -174,7 +174,7 @@ class FingerSignals:
             ),
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,
-            spring_torque=-(springs.force @ springs.rows.arm)[..., :joints],
+            spring_torque=-combined(springs.force, springs.rows.arm)[..., :joints],
             tendon_torque=torque,
             external_torque=found.external[..., :joints],
             acceleration=found.acceleration[..., :joints],

@@ -163,6 +163,14 @@ class RowSignals:
         }
 
 
+def combined(force: Array, weights: Array) -> Array:
+    """Return sums of forces, shape (..., k), by weights of shape (k, n): shape (..., n).
+
+    Of one state they have the same bits as of many, which a product of matrices does not promise.
+    """
+    return np.asarray(np.einsum("...k,kn->...n", force, weights))
+
+
 def further_states(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:
     """Return name and scale of every state of tables of rows."""
     found: list[tuple[str, float]] = []

@@ -13,7 +13,7 @@ import numpy as np
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.control.compiled import compiled_control, sampled_control
+from finger_pin.control.compiled import build_stepper, compiled_control, sampled_control
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.proportional import Controller
@@ -23,7 +23,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.cvode import integrate_cvode
 from finger_pin.core.stepping.encounters import meetings
 from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
@@ -272,8 +272,15 @@ def _integrate(
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
-        control, tableau = compiled_control(loop) or sampled_control(loop), TABLEAUS[method]()
-        stepper = Stepper(loop.finger.mechanism, control, start, tableau, settings.rtol, atol, loop.fingertip_force)
+        stepper = build_stepper(
+            loop.finger,
+            compiled_control(loop) or sampled_control(loop),
+            start,
+            loop.fingertip_force,
+            method=method,
+            rtol=settings.rtol,
+            atol_scale=settings.atol_scale,
+        )
         if isinstance(loop.drives, PositionDrives):
             stepper.drive(loop.drives.compiled)
         knots = loop.knots(settings.rtol)

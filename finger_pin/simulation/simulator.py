@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.control.compiled import core_signal
+from finger_pin.control.compiled import build_stepper, core_signal
 from finger_pin.control.moved_objects import Guides
 from finger_pin.control.reference import Reference
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.control import held_control
-from finger_pin.core.stepping.batch import advance_together
-from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.batch import Together
+from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.family import Family
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import nearest
@@ -89,13 +89,12 @@ class Simulator:
 
     def _build(self, finger: Finger) -> None:
         """Build what steps a finger; `_begin` says from where."""
-        self.finger, mechanism, settings = finger, finger.mechanism, self._settings
+        self.finger, mechanism = finger, finger.mechanism
         control, self._guides = held_control(mechanism.channels, mechanism.coordinates), Guides.of(finger, 0.0)
         if self._guides is not None:
             control = control._replace(guide=core_signal(self._guides.signal))
-        rest, tableau = finger.rest_state(np.zeros(len(finger.routing.joints))), TABLEAUS[settings["method"]]()
-        atol = settings["atol_scale"] * finger.layout.scales()
-        self._stepper = Stepper(mechanism, control, rest, tableau, settings["rtol"], atol)
+        rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
+        self._stepper = build_stepper(finger, control, rest, **self._settings)
         self._fresh = self._stepper.moments
         self._compiled = CompiledFinger(finger)
         # Which of the inputs are tensions.
@@ -291,7 +290,7 @@ def step_many(
     for simulator, (command, force) in zip(simulators, acting, strict=True):
         simulator._hold(command, force)
     steppers = [simulator._stepper for simulator in simulators]
-    statuses = advance_together(steppers, [stepper.time + dt for stepper in steppers])
+    statuses = Together(steppers).advance([stepper.time + dt for stepper in steppers])
     for simulator in simulators:
         simulator._keep()
-    return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]
+    return [simulator._reached(status) for simulator, status in zip(simulators, statuses.tolist(), strict=True)]

@@ -9,7 +9,9 @@ import xarray as xr
 from gymnasium.utils.env_checker import check_env
 
 import finger_pin as fp
-from finger_pin.learning import Environment, LogUniform, Normal, Sensor, Uniform, VectorEnvironment
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.learning import Choice, Environment, LogUniform, Normal, Sensor, Uniform, VectorEnvironment, per_world
+from finger_pin.learning.instant import known_variables
 
 COARSE = {"simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
 FIG6 = fp.load_scenario("fig6", COARSE)
@@ -85,6 +87,43 @@ def test_seeds_alone_decide_what_happens(monkeypatch):
     np.testing.assert_array_equal(np.array(seen), found[0][:5, 1])
 
 
+SHAKEN = {
+    "hand.palm.path.y.amplitude": Uniform(0.002, 0.012),
+    "environment.objects.ball.mass": Uniform(0.02, 0.04),
+    "hand.fingers.left.finger.tendons.T3.crossings.medial.radius": Uniform(0.006, 0.007),
+}
+SERVOS = {
+    "finger.actuators.*.spool_radius": Uniform(0.004, 0.006),
+    "finger.actuators.*.pretension": Uniform(0.0, 2.0),
+    "finger.joints.medial.link.length": Uniform(0.028, 0.032),
+    "environment.fingertip_force": Choice([[0.0, 0.0, 0.1], [0.05, 0.0, 0.0]]),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "action", "drawn"),
+    [("pinch", "tension", SHAKEN), ("servo_position", "motor_position", SERVOS), ("servo_position", "tension", {})],
+)
+def test_all_that_worlds_tell_is_what_one_tells_and_its_result(name, action, drawn):
+    scenario = fp.load_scenario(name if action != "tension" or drawn else "fig6", COARSE)
+    known = [each for each in known_variables(ClosedLoop.from_scenario(scenario)) if each != "contact_gap"]
+    task = dict(reward=nothing, privileged=known, action=action, randomise=drawn)
+    worlds = VectorEnvironment(3, scenario, **task)
+    worlds.reset(seed=5)
+    pull = worlds.single_action_space.low + 0.3 * (worlds.single_action_space.high - worlds.single_action_space.low)
+    for _ in range(2):
+        told = worlds.step(np.tile(pull, (3, 1)))[4]["privileged"]
+    alone = Environment(scenario, **task)
+    alone.reset(seed=6)
+    for _ in range(2):
+        own = alone.step(pull)[4]["privileged"]
+    last = alone.result().isel(time=-1)
+    for each in known:
+        np.testing.assert_array_equal(told[each][1], own[each], err_msg=each)
+        scale = np.max(np.abs(last[each].values), initial=1e-6)
+        np.testing.assert_allclose(own[each], last[each].values, atol=1e-9 * scale, err_msg=each)
+
+
 def test_what_is_drawn_acts_like_an_override():
     key = "finger.tendon_friction.coulomb"
     drawn = Environment(FIG6, reward=nothing, randomise={key: Uniform(0.3, 0.3)})
@@ -108,12 +147,33 @@ def test_sensors_round_shift_and_delay():
     np.testing.assert_allclose(np.array(seen), expected, atol=1e-7)
 
 
+def test_functions_of_one_world_and_of_what_sensors_show():
+    def slack(signals):
+        return signals["joint_position"][1] - signals["wanted"][0]
+
+    task = dict(
+        observation={
+            "joint_position": Sensor(offset=0.5),
+            "error": lambda seen: seen["joint_position"][:, :2] - seen["wanted"],
+        },
+        draw=lambda random: {"wanted": random.uniform(0.0, 1.0, 1)},
+    )
+    worlds = VectorEnvironment(3, FIG6, reward=per_world(slack), **task)
+    seen, info = worlds.reset(seed=4)
+    wanted = info["drawn"]["wanted"]
+    # The truth, as noiseless sensors show it without their offset.
+    np.testing.assert_allclose(seen[:, 4:6], seen[:, :2] - wanted, atol=1e-6)
+    seen, reward, *_ = worlds.step(np.tile(PULLS[0], (3, 1)))
+    np.testing.assert_allclose(reward, seen[:, 1] - 0.5 - wanted[:, 0], atol=1e-6)
+    np.testing.assert_allclose(seen[:, 6:], wanted, atol=1e-6)
+
+
 def test_noise_has_the_deviation_that_was_asked_for():
     environment = Environment(FIG6, reward=nothing, observation={"joint_position": Sensor(noise=0.2)}, duration=1e9)
     environment.reset(seed=3)
     truth = fp.prepare(FIG6).start[:4]
-    world = environment._world
-    noise = np.array([world.observe()[0] for _ in range(2000)]) - truth
+    worlds = environment._worlds
+    noise = np.array([worlds.observe(np.zeros(1, dtype=int))[0][0] for _ in range(2000)]) - truth
     # Of 8,000 samples: four standard errors.
     assert abs(noise.std() / 0.2 - 1.0) < 4.0 / np.sqrt(2.0 * noise.size)
 
@@ -180,6 +240,7 @@ def test_intervals_of_an_identification_are_distributions(tmp_path):
         ({"start": lambda random: [0.0]}, "4 finite angles"),
         ({"observation": {"joint_position": Sensor(delay=0.03)}}, "multiple of the control period"),
         ({"period": 0.0}, "period"),
+        ({"observation": {"way": lambda seen: 0.0, "joint_position": Sensor()}}, "worlds in front"),
     ],
 )
 def test_a_wrong_task_is_refused_in_one_line(task, words):

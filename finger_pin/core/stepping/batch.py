@@ -9,10 +9,16 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound_at, call, call_at
-from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound, bound_at, call_at
 from finger_pin.core.stepping.stepper import Stepper, usable_cores
+from finger_pin.description.routing import Array
+
+#: In the place of an end: this one is left alone.
+RESTING = -1.0
+# Pieces for each thread: some steppers take longer than others.
+_PIECES = 4
 
 
 class Batch(NamedTuple):
@@ -21,7 +27,7 @@ class Batch(NamedTuple):
     Attributes:
         units: Addresses of what advances each, shape (m,).
         blocks: Addresses of what they are given, shape (m,).
-        ends: Until when, shape (m,), s.
+        ends: Until when, shape (m,), s; `RESTING` for those that are left alone.
         statuses: Filled with what they return, shape (m,).
     """
 
@@ -39,37 +45,74 @@ def advance_batch(address: int, _time: float) -> int:
     """Advance everything in the `Batch` at an address."""
     batch = bound_at(address, BATCH)
     for i in range(batch.ends.size):
-        batch.statuses[i] = call_at(batch.units[i], batch.blocks[i], batch.ends[i])
+        batch.statuses[i] = 0
+        if batch.ends[i] >= 0.0:
+            batch.statuses[i] = call_at(batch.units[i], batch.blocks[i], batch.ends[i])
     return 1
 
 
-def advance_together(steppers: Sequence[Stepper], ends: Sequence[float]) -> list[int]:
-    """Advance many steppers, each to a time, side by side in threads; return the status of each, as `advance` does."""
-    owners = [index for index, stepper in enumerate(steppers) for _ in stepper.parts]
-    ready = [part.ready() for stepper in steppers for part in stepper.parts]
-    units = np.array([unit.address for _, unit in ready], dtype=np.int64)
-    blocks = np.array([block for block, _ in ready], dtype=np.int64)
-    until, statuses = np.array([ends[index] for index in owners], dtype=float), np.zeros(len(owners), dtype=np.int64)
+class Together:
+    """Steppers that are advanced side by side, again and again; bound once."""
 
-    def advance(part: slice) -> None:
-        own = np.zeros(len(statuses[part]), dtype=np.int64)
-        call(advance_batch, Batch(units[part], blocks[part], until[part], own), BATCH)
-        statuses[part] = own
+    def __init__(self, steppers: Sequence[Stepper]) -> None:
+        """Bind steppers, whose islands, loops and knots stay what they are."""
+        parts = [part for stepper in steppers for part in stepper.parts]
+        self._owners = np.repeat(np.arange(len(steppers)), [len(stepper.parts) for stepper in steppers])
+        self._first = np.searchsorted(self._owners, np.arange(len(steppers)))
+        ready = [part.ready() for part in parts]
+        # What the addresses lead to lives as long as this.
+        self._steppers, self._parts, self._pieces = steppers, parts, dict[int, list[NDArray[np.uint8]]]()
+        self._batch = Batch(
+            np.array([unit.address for _, unit in ready], dtype=np.int64),
+            np.array([block for block, _ in ready], dtype=np.int64),
+            np.zeros(len(parts)),
+            np.zeros(len(parts), dtype=np.int64),
+        )
 
-    threads = min(usable_cores(), len(owners))
-    if threads < 2:
-        advance(slice(None))
-    else:
-        # A few pieces for each thread: some take longer than others.
-        edges = np.linspace(0, len(owners), min(4 * threads, len(owners)) + 1).astype(int).tolist()
-        list(_workers(threads).map(advance, [slice(*each) for each in pairwise(edges)]))
-    found = [core.DONE] * len(steppers)
-    for owner, status in zip(owners, statuses.tolist(), strict=True):
-        found[owner] = max(found[owner], status)
-    return found
+    def advance(self, ends: ArrayLike) -> Indices:
+        """Advance each to a time, or not at all if that is `RESTING`; return the status of each, as `advance` does.
+
+        Args:
+            ends: Shape (m,), s.
+        """
+        self._batch.ends[:] = np.asarray(ends)[self._owners]
+        threads = min(usable_cores(), len(self._parts)) if len(self._parts) > 1 else 1
+        # Whoever is free takes the next piece.
+        pieces = iter(self._bound(threads))
+
+        def work() -> None:
+            for piece in pieces:
+                advance_batch(piece)
+
+        others = [_workers().submit(work) for _ in range(threads - 1)]
+        work()
+        for other in others:
+            other.result()
+        return np.maximum.reduceat(self._batch.statuses, self._first)
+
+    def states(self) -> Array:
+        """Return the packed states of all, shape (m, size)."""
+        if len(self._parts) != len(self._steppers):
+            return np.array([stepper.x for stepper in self._steppers])
+        states, attitudes = np.array([part.x for part in self._parts]), [part.attitude for part in self._parts]
+        return states if not len(attitudes[0]) else self._steppers[0].joined([states], [np.array(attitudes)])
+
+    def _bound(self, threads: int) -> list[int]:
+        """Return the addresses of pieces of the batch, for some threads."""
+        if threads not in self._pieces:
+            count = len(self._parts)
+            pieces = 1 if threads < 2 else min(_PIECES * threads, count)
+            edges = np.linspace(0, count, pieces + 1).astype(int).tolist()
+            parts = [self._part(slice(*each)) for each in pairwise(edges)]
+            self._pieces[threads] = [bound(part, BATCH) for part in parts]
+        return [int(piece.ctypes.data) for piece in self._pieces[threads]]
+
+    def _part(self, at: slice) -> Batch:
+        batch = self._batch
+        return Batch(batch.units[at], batch.blocks[at], batch.ends[at], batch.statuses[at])
 
 
 @cache
-def _workers(count: int) -> ThreadPoolExecutor:
+def _workers() -> ThreadPoolExecutor:
     """Return threads that stay: to start them takes longer than many a step."""
-    return ThreadPoolExecutor(count, "finger_pin")
+    return ThreadPoolExecutor(usable_cores(), "finger_pin")

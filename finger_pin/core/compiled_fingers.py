@@ -1,0 +1,134 @@
+"""Fingers that differ in their numbers alone, each evaluated at one state of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.compiled_finger import CompiledFinger
+from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
+from finger_pin.core.jit import bound
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.finger import PULLING
+from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.mechanism import GUIDES
+
+_MOTION = ("tip", "kinetic_energy", "potential_energy")
+
+
+class CompiledFingers:
+    """Evaluates m fingers as `CompiledFinger` evaluates m states of one; not to be shared between threads.
+
+    What it returns is overwritten by the next evaluation.
+    """
+
+    def __init__(self, fingers: Sequence[CompiledFinger], *, accelerated: bool) -> None:
+        """Bind fingers.
+
+        Args:
+            fingers: Of the same rows and states.
+            accelerated: Whether accelerations are wanted, which take most of the time; they are NaN else.
+        """
+        self._fingers, self._first = list(fingers), fingers[0]
+        mechanism, count = self._first.mechanism, len(fingers)
+        tables = mechanism.tables
+        self._room = mechanism.room(count, accelerated=accelerated)
+        self._states = np.zeros((count, mechanism.charts.size))
+        self._attitudes = np.zeros((count, len(mechanism.charts.quaternions), 4))
+        self._commands = np.zeros((count, mechanism.mechanism.channels))
+        self._forces = np.zeros((count, len(tables.tip_body), 3))
+        self._guided = int(tables.guided.max(initial=-1)) + 1
+        self._bases = np.zeros((count, 15 + self._guided))
+        # By whether there are forces at the tips, and whether the base moves.
+        self._blocks: dict[tuple[bool, bool], list[NDArray[np.uint8]]] = {}
+        # Whether tendons have other arms than the first one's, and whether tips are elsewhere at the same angles.
+        self._differs = np.array([self._differences(each) for each in fingers])
+
+    def replace(self, index: int, finger: CompiledFinger) -> None:
+        """Put another finger in the place of one."""
+        self._fingers[index], self._first = finger, self._fingers[0]
+        for kind, blocks in self._blocks.items():
+            blocks[index] = self._bound(index, *kind)
+        if index:
+            self._differs[index] = self._differences(finger)
+        else:
+            self._differs = np.array([self._differences(each) for each in self._fingers])
+
+    def _differences(self, finger: CompiledFinger) -> tuple[bool, bool]:
+        pair, joints = (finger, self._first), len(finger.finger.routing.joints)
+        rows = [[table for table in each.finger.mechanism.rows if table.group in PULLING] for each in pair]
+        alike = all(np.array_equal(own.arm, other.arm) for own, other in zip(*rows, strict=True))
+        tables = [each.mechanism.tables for each in pair]
+        bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]
+        return not alike or any(table.routed for table in rows[0]), not all(map(np.array_equal, *bodies))
+
+    def _bound(self, index: int, loaded: bool, moved: bool) -> NDArray[np.uint8]:
+        """Return the block by which compiled code finds a finger, its state, and what is filled for it."""
+        at = slice(index, index + 1)
+        room, bases = self._room.part(at), self._bases[at] if moved else self._bases[:0]
+        states = States(
+            model=self._fingers[index].mechanism.models.model(loaded).address,
+            states=self._states[at],
+            commands=self._commands[at],
+            forces=self._forces[at],
+            rates=room.rates,
+            rows=room.rows,
+            first=room.first,
+            torques=room.torques,
+            externals=room.externals,
+            booked=room.booked,
+            bases=bases,
+            attitudes=self._attitudes[at],
+            touches=room.touches,
+        )
+        return bound(states, STATES)
+
+    def evaluate(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return all signals of (18) at packed states, shape (m, size); see `Finger.evaluate`."""
+        force = np.zeros(3) if fingertip_force is None else fingertip_force
+        mechanism, loaded = self._first.mechanism, bool(np.any(force))
+        self._room.packed[:], self._commands[:] = x, command
+        # Of what touches, forces are added up.
+        self._room.touches[:] = 0.0
+        self._states[:], self._attitudes[:] = mechanism.charts.to_core(self._room.packed)
+        # Of one tip, forces have no axis of their own for it.
+        self._forces[:] = force if force.ndim == 1 or self._forces.shape[1] > 1 else force[:, None]
+        if base is not None:
+            self._bases[:, :15], self._bases[:, 15:] = base[:, :15], base[:, GUIDES : GUIDES + self._guided]
+        kind = loaded, base is not None
+        if kind not in self._blocks:
+            self._blocks[kind] = [self._bound(index, *kind) for index in range(len(self._fingers))]
+        for block in self._blocks[kind]:
+            evaluate_many(block.ctypes.data)
+        found = mechanism.found(self._room)
+        signals = self._first.finger.signals(x, command, fingertip_force, found)
+        if not self._differs[:, 0].any():
+            return signals
+        own = [each.mechanism.found(self._room, index).rows for index, each in enumerate(self._fingers)]
+        torques = [each.finger.tendon_torque(*given) for each, *given in zip(self._fingers, x, own, strict=True)]
+        return replace(signals, tendon_torque=np.array(torques))
+
+    exerted = evaluate
+
+    def powers(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
+        self.evaluate(x, command, fingertip_force, base)
+        stored = len(self._first.finger.mechanism.books.stored)
+        return self._room.booked[:, stored:], self._room.externals
+
+    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
+        """Return fingertips and energies of the rigid bodies at positions and velocities, shape (m, n)."""
+        if not self._differs[:, 1].any() and base is None:
+            return self._first.motion(position, velocity)
+        bases = [None] * len(position) if base is None else base
+        found = [each.motion(*given) for each, *given in zip(self._fingers, position, velocity, bases, strict=True)]
+        tips, kinetic, potential = (np.array([getattr(each, name) for each in found]) for name in _MOTION)
+        return Motion(tips, kinetic, potential)

@@ -1,0 +1,145 @@
+"""Worlds of one scenario side by side: what is done to all of them, and what is seen of all of them, at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+
+from finger_pin.core.stepping.batch import RESTING, Together
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
+from finger_pin.learning.instant import SideBySide, known_variables
+from finger_pin.learning.sensors import measurements
+from finger_pin.learning.task import Task
+from finger_pin.learning.world import World
+
+_Places = NDArray[np.int64]
+
+
+class Worlds:
+    """Some worlds; arrays have them in front.
+
+    Attributes:
+        task: What is asked of the policy.
+        each: The worlds.
+    """
+
+    def __init__(self, scenario: Scenario | str | Path, task: Task, count: int) -> None:
+        """Build them.
+
+        Raises:
+            InputError: Naming the key or variable that is wrong.
+        """
+        first = World.of(scenario, task)
+        self.task, self.each = task, [first, *(first.twin() for _ in range(count - 1))]
+        loops, actions = [world.origin for world in self.each], [world.action for world in self.each]
+        self._now = SideBySide.of(loops, actions, task.variables, apart=first.rebuilt)
+        known = known_variables(self._now)
+        self._variables = {name: known[name] for name in task.variables}
+        self._measurements = measurements(task.sensors, count, task.period)
+        self._context: dict[str, Array] = {}
+        self._randoms = [np.random.default_rng(0)] * count
+        self._steppers = Together([world.stepper for world in self.each])
+        # What cannot be drawn is said now, not at the hundredth reset.
+        self.begin(range(count), self._randoms)
+
+    def spaces(self) -> tuple[Box, Box]:
+        """Return the spaces of one world's observations and actions, both of 32-bit floats.
+
+        Raises:
+            InputError: If limits do not fit.
+        """
+        low, high = self.each[0].action.limited(self.task.limits)
+        seen = self.observe(np.arange(1))[0]
+        return Box(-np.inf, np.inf, seen.shape[1:], np.float32), Box(low.astype(np.float32), high.astype(np.float32))
+
+    def begin(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
+        """Begin episodes in some worlds.
+
+        Args:
+            places: Their numbers.
+            randoms: Of all worlds, from which everything is drawn.
+
+        Raises:
+            InputError: If what is drawn is not allowed.
+        """
+        self._randoms = list(randoms)
+        for i in places:
+            world = self.each[i]
+            world.begin(randoms[i])
+            for name, measurement in self._measurements.items():
+                measurement.begin(i, world.sensors[name])
+            for name, value in world.context.items():
+                if name not in self._context:
+                    self._context[name] = np.zeros((len(self.each), *value.shape))
+                self._context[name][i] = value
+            if world.rebuilt:
+                self._now.renew(i, world.origin, world.action)
+        if self.each[0].rebuilt and len(places):
+            self._steppers = Together([world.stepper for world in self.each])
+
+    def act(self, actions: Array, places: Sequence[int]) -> None:
+        """Act in some worlds for a control period, shape (w, k).
+
+        Where actions arrive within the period, it has several pieces.
+        """
+        going = [(i, self.each[i]) for i in places]
+        for i, world in going:
+            world.act(actions[i])
+        ends = np.full(len(self.each), RESTING)
+        while True:
+            for i, world in going:
+                ends[i] = world.next_end()
+            if ends.max() == RESTING:
+                break
+            statuses = self._steppers.advance(ends).tolist()
+            for i, world in going:
+                if ends[i] != RESTING:
+                    world.reach(float(ends[i]), statuses[i])
+        for _, world in going:
+            world.end_period()
+
+    def observe(self, places: _Places) -> tuple[NDArray[np.float32], dict[str, Array]]:
+        """Return what policies see in some worlds, shape (k, o), and the truth in all by name, shapes (w, ...).
+
+        Raises:
+            InputError: If a function that is observed returns another shape, or what is not finite.
+        """
+        times = np.array([world.stepper.time for world in self.each])
+        motions = self._now.at(times, self._steppers.states())
+        signals = {name: np.array(each.value(motions)) for name, each in self._variables.items()}
+        count = len(places)
+        whole = count == len(self.each)
+        told = {name: value if whole else value[places] for name, value in self._context.items()}
+        for name, measurement in self._measurements.items():
+            told[name] = measurement.sample(signals[name] if whole else signals[name][places], places, self._randoms)
+        told |= self.task.derive(told, count)
+        flat = [told[name].reshape(count, -1) for name in (*self.task.observed, *self._context)]
+        signals |= {name: value.copy() for name, value in self._context.items()}
+        signals["action"] = np.array([world.action.given for world in self.each])
+        return np.concatenate(flat, axis=1, dtype=np.float32), signals
+
+    @property
+    def over(self) -> NDArray[np.bool_]:
+        """Where the episode is truncated, shape (w,)."""
+        return np.array([world.over for world in self.each])
+
+
+def read_actions(actions: Any, space: Box) -> Array:
+    """Return actions as an array within their bounds.
+
+    Raises:
+        InputError: If they have another shape, or are not finite.
+    """
+    found = np.asarray(actions, dtype=float)
+    if found.shape != space.shape:
+        raise InputError("action", f"must have shape {space.shape}", list(found.shape))
+    if not np.isfinite(found).all():
+        raise InputError("action", "must be finite", found.tolist())
+    return np.asarray(np.minimum(np.maximum(found, space.low), space.high), dtype=float)
