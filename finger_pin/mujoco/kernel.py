@@ -15,7 +15,6 @@ import math
 from typing import Any
 
 from finger_pin.mechanism.exchange.mujoco_friction import (
-    FLOOR,
     FORCE,
     KIND,
     LENGTH,
@@ -53,6 +52,8 @@ from finger_pin.mujoco.memory import (
 
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
 _NOTHING = 1e-12
+# The floor that keeps (9a) finite where nothing is pressed, N: higher ones are friction that users have asked for.
+_NUMERICAL = 1e-4
 _LOW = 0xFFFFFFFF
 
 
@@ -243,8 +244,8 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
         kind, row = int(values[e + KIND]), objects[e + 1]
         row = integer_in(m, at.jnt_dofadr, row) if types[e + 1] == kinds.of_joint else width + row
         states[place + FORCE] = forces[row] / values[e + RATIO]
-        if states[place + LOAD] == 0.0 and abs(act[z]) <= values[e + FLOOR]:
-            # Bristles that nothing presses stand up.
+        if kind != PIN and states[place + LOAD] == 0.0 and max(states[place + LEVEL], abs(act[z])) <= _NUMERICAL:
+            # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
             act[z] = 0.0
         else:
             speed = _speed(m, d, at, of, objects[e + 1], types[e + 1] == kinds.of_joint) * values[e + RATIO]

@@ -97,3 +97,27 @@ def test_friction_gives_back_no_more_than_its_bristles_hold(mass, integrator):
         most, elastic = max(most, taken), max(elastic, signals.level[0] ** 2 / 1e5)
         assert taken > most - elastic
     assert most > 1.0 and elastic < 1e-3
+
+
+@pytest.mark.parametrize("timestep", [2e-3, 2e-4])
+def test_with_runge_kutta_steps_no_more_is_given_back_than_the_force_does_in_the_step_that_reverses(timestep):
+    """By the balance of energy, where the work of what pulls is exact.
+
+    Within a step the method does not know when a light mass stops: it errs by what the whole force F does to a mass m
+    in a step h, (F h)^2 / (2 m), and by bristles.
+    """
+    mass, most_force = 1e-4, 40.0
+    model = slider(mass, integrator="RK4", **ROPE)
+    model.opt.timestep = timestep
+    data, random = mujoco.MjData(model), np.random.default_rng(3)
+    lost, most, regained = 0.0, 0.0, 0.0
+    for step in range(4_000):
+        if step % 40 == 0:
+            data.ctrl[:] = random.uniform(0.0, 20.0), -random.uniform(0.0, 20.0)
+        before, speed = data.qpos[0], data.qvel[0]
+        mujoco.mj_step(model, data)
+        lost += data.ctrl.sum() * (data.qpos[0] - before) - 0.5 * mass * (data.qvel[0] ** 2 - speed**2)
+        most = max(most, lost)
+        regained = max(regained, most - lost)
+    assert most > 1e3 * regained
+    assert regained < 1e-3 + 0.5 * (most_force * timestep) ** 2 / mass

@@ -3,12 +3,13 @@
 import mujoco
 import numpy as np
 import pytest
-from mujoco_models import ROUTED
+from mujoco_models import ROUTED, asset
 from validation import mujoco_motion
 
 import finger_pin as fp
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario
+from finger_pin.mujoco import add_friction, friction
 
 DURATION = 0.06
 
@@ -28,33 +29,57 @@ def test_the_paper_s_finger_in_mujoco_nears_our_motion_at_the_first_order_of_its
     assert np.all(errors[:-1] / errors[1:] > 1.8)
 
 
-def test_a_routed_hand_with_our_friction_moves_in_mujoco_as_here():
-    """What `from_mujoco` reads and simulates, and the model itself with the same friction, at the first order."""
-    description = fp.from_mujoco(mujoco.MjModel.from_xml_string(ROUTED))
-    still = {"simulation.duration": 0.1, "simulation.rtol": 1e-9, "simulation.atol_scale": 1e-9}
+def ours(spec, duration):
+    """Return the scenario in which every actuator of a model goes to and fro, and our motion, without ranges."""
+    still = {"simulation.duration": duration, "simulation.rtol": 1e-9, "simulation.atol_scale": 1e-9}
     still |= {"finger.stroke_limiter.stiffness": 1e-9, "simulation.sample_rate": 100.0}
-    scenario = read_scenario(exercise(description), still)
-    result = fp.simulate(scenario)
-    pulled = next(iter(scenario.controller.tensions.values()))
+    scenario = read_scenario(exercise(fp.from_mujoco(spec)), still)
+    return scenario, fp.simulate(scenario)
+
+
+def differences(model, scenario, result, steps):
+    """Return MuJoCo's largest differences from our motion by time step, rad or m."""
     given = {**scenario.controller.inputs, **scenario.controller.tensions}
-    spec = mujoco.MjSpec.from_string(ROUTED)
-    fp.mujoco.add_friction(spec, tendons={"branched": {}}, joints={"*": {"viscous": 0.0}})
-    model = spec.compile()
-    model.jnt_limited[:] = 0
-    signals = [given[model.actuator(i).name] for i in range(model.nu)]
-    errors = []
-    for step in (5e-5, 2.5e-5):
+    signals = [given[model.actuator(i).name.replace(":", "_")] for i in range(model.nu)]
+    positions, errors = result.joint_position.values, []
+    for step in steps:
         data, model.opt.timestep, error, every = mujoco.MjData(model), step, 0.0, round(0.01 / step)
-        for count in range(1, 10 * every + 1):
+        data.qpos = positions[0]
+        for count in range(1, (len(positions) - 1) * every + 1):
             swing = [2.0 * np.pi * each.frequency * data.time + each.phase for each in signals]
             data.ctrl = [s.offset + s.amplitude * np.sin(angle) for s, angle in zip(signals, swing, strict=True)]
             mujoco.mj_step(model, data)
             if count % every == 0:
-                error = max(error, abs(data.qpos - result.joint_position.values[count // every]).max())
+                error = max(error, abs(data.qpos - positions[count // every]).max())
         errors.append(error)
-    assert pulled is not None and abs(result.tendon_stiction.values).max() > 0.01
+    return errors
+
+
+def test_a_routed_hand_with_our_friction_moves_in_mujoco_as_here():
+    """What `from_mujoco` reads and simulates, and the model itself with the same friction, at the first order."""
+    spec = mujoco.MjSpec.from_string(ROUTED)
+    spec.joint("slider").limited = 0
+    scenario, result = ours(spec, 0.1)
+    add_friction(spec, tendons={"branched": {}}, joints={"*": {"viscous": 0.0}})
+    errors = differences(spec.compile(), scenario, result, (5e-5, 2.5e-5))
+    assert abs(result.tendon_stiction.values).max() > 0.01
     assert np.ptp(result.joint_position.values, axis=0).max() > 0.05
     assert errors[-1] < 1e-3 and errors[0] / errors[1] > 1.8
+
+
+def test_the_shadow_hand_with_friction_in_all_joints_moves_in_mujoco_as_here():
+    spec = mujoco.MjSpec.from_file(str(asset("hand/reach.xml")))
+    for each in (*spec.joints, *spec.tendons):
+        each.limited = 0
+    for each in spec.geoms:
+        each.contype = each.conaffinity = 0
+    scenario, result = ours(spec, 0.05)
+    add_friction(spec, joints={"*": {"viscous": 0.0}})
+    errors = differences(spec.compile(), scenario, result, (1e-4, 5e-5))
+    # All 24 rub at what the model's friction loss is.
+    np.testing.assert_allclose(abs(result.joint_stiction.values).max(axis=0), 1e-3, rtol=0.3)
+    assert np.ptp(result.joint_position.values, axis=0).max() > 0.3
+    assert errors[-1] < 2e-4 and errors[0] / errors[1] == pytest.approx(2.0, rel=0.05)
 
 
 def test_levels_and_turns_are_those_that_our_evaluation_finds_for_a_hand():
@@ -66,7 +91,7 @@ def test_levels_and_turns_are_those_that_our_evaluation_finds_for_a_hand():
     q, tension = random.uniform(0.1, 0.8, joints), random.uniform(2.0, 9.0, model.nu)
     data.qpos[:joints], data.ctrl[:] = q, tension
     mujoco.mj_forward(model, data)
-    signals = fp.mujoco.friction(model, data)
+    signals = friction(model, data)
     turn = dict(zip(signals.names, signals.turn, strict=True))
     load = dict(zip(signals.names, signals.tension, strict=True))
     expected = hand.routing.curvature(q)
@@ -79,3 +104,34 @@ def test_levels_and_turns_are_those_that_our_evaluation_finds_for_a_hand():
     strands[model.nu :] = np.maximum(passive, 0.0).ravel()
     for name, reaction in zip(hand.routing.joints, hand.routing.loads @ strands, strict=True):
         assert load[name] == pytest.approx(reaction, rel=1e-12)
+
+
+JAW = """<body pos="{x} 0 0"><joint name="{name}" type="slide" axis="{way} 0 0" stiffness="150" springref="-0.02"
+damping="0.5"/><geom type="box" size="0.005 0.02 0.02" mass="0.05" solref="0.005 1"/></body>"""
+GRIPPER = f"""<mujoco><option cone="elliptic" impratio="50"/><worldbody>
+{JAW.format(name="left", x=-0.025, way=1)}{JAW.format(name="right", x=0.025, way=-1)}
+<body name="box"><freejoint/><geom type="box" size="0.018 0.01 0.01" mass="0.05" solref="0.005 1"/></body></worldbody>
+<tendon><fixed name="left"><joint joint="left" coef="-1"/></fixed>
+<fixed name="right"><joint joint="right" coef="-1"/></fixed></tendon>
+<actuator><motor tendon="left" gear="-1"/><motor tendon="right" gear="-1"/></actuator></mujoco>"""
+
+
+def test_a_grasp_that_is_let_go_by_half_is_held_by_friction_and_lost_by_mujoco_s_own():
+    """Springs open the jaws with 3.3 N; 12 N close them, of 2.5 N friction keeps up to 2.5 exp(0.6) = 4.6 N."""
+    fallen = {}
+    for name in ("our", "constant"):
+        spec = mujoco.MjSpec.from_string(GRIPPER)
+        if name == "our":
+            law = {"coulomb": 0.2, "curvature_offset": 3.0, "viscous": 0.0, "stiction_ratio": 1.0}
+            add_friction(spec, tendons={"*": law})
+        else:
+            for tendon in spec.tendons:
+                tendon.frictionloss = 2.5 * (np.exp(0.6) - 1.0)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        for tension, steps in ((12.0, 50), (2.5, 5000)):
+            data.ctrl[:] = tension
+            mujoco.mj_step(model, data, steps)
+        fallen[name] = -data.body("box").xpos[2]
+    # What is left of 0.5 mm in ten seconds is the creep of MuJoCo's contacts.
+    assert fallen["our"] < 1e-3 and fallen["constant"] > 1.0
