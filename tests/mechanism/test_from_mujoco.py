@@ -133,13 +133,33 @@ def test_actuators_that_are_disabled_delayed_or_of_other_kinds_are_listed_and_th
     listed = fp.from_mujoco(mujoco.MjModel.from_xml_string(text)).tree.left_out
     assert "actuator servo: its group 3 is disabled in the model" in listed
     assert "actuator pull: its control is delayed" in listed
-    spec = mujoco.MjSpec.from_string(ROUTED)
-    motor = spec.add_actuator(name="dc", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="j2")
-    motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_DCMOTOR, mujoco.mjtBias.mjBIAS_DCMOTOR
-    motor.gainprm[:2], motor.dynprm[:] = (1.0, 0.1), 0.0
-    described = fp.from_mujoco(spec.compile())
-    assert "actuator dc: its gain is not constant, but of kind dcmotor" in described.tree.left_out
-    assert described.tree.actuators["servo"].input_range == (-1.0, 1.0)
+
+
+OTHER_ACTUATORS = """<actuator><dcmotor name="dc" joint="j" gear="3" resistance="2" motorconst="0.1"/>
+<pid name="pd" joint="k" kp="0.3" kv="0.01" ctrlrange="-0.5 0.5"/>
+<dcmotor name="wound" joint="j" resistance="2" motorconst="0.1" inductance="0.1"/>
+<pid name="pid" joint="k" kp="3" ki="1"/><plugin name="foreign" joint="j" plugin="mujoco.pid" actdim="0"/></actuator>"""
+
+
+def test_direct_current_motors_and_pid_without_states_push_as_in_mujoco_and_those_with_states_are_named():
+    chain = LINK.replace("</body>", LINK.replace('"j"', '"k"').replace('"s"', '"z"') + "</body>")
+    plugin = '<extension><plugin plugin="mujoco.pid"/></extension>'
+    description = fp.from_mujoco(model_of(chain, FIXED + plugin + OTHER_ACTUATORS))
+    assert list(description.tree.actuators) == ["dc", "pd"]
+    assert [line for line in description.tree.left_out if line.startswith("actuator")] == [
+        "actuator wound: it has dynamics of its own, of kind dcmotor",
+        "actuator pid: it has dynamics of its own, of kind pid",
+        "actuator foreign: a plugin computes it",
+    ]
+    kept = FIXED + "".join(OTHER_ACTUATORS.splitlines(keepends=True)[:2]) + "</actuator>"
+    model = model_of(chain, kept)
+    hand = fp.Hand(read_scenario(exercise(description), SMOOTH).finger)
+    data = mujoco.MjData(model)
+    # The last control is the speed that the servo should have.
+    data.qpos, data.qvel, data.ctrl = [0.2, 0.3], [1.0, -2.0], [4.0, 0.9, 0.0]
+    mujoco.mj_forward(model, data)
+    found = hand.evaluate(hand.rest_state(data.qpos, data.qvel), data.ctrl[:2])
+    np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-9)
 
 
 def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
@@ -238,8 +258,24 @@ def test_a_coupled_joint_follows_as_mujoco_s_equality_says():
     np.testing.assert_allclose(follower, 0.1 + 0.5 * lead, atol=5e-3)
 
 
+def test_coupled_fixed_tendons_follow_as_mujoco_s_equality_says():
+    """0.01 k = 0.001 + 0.5 * 0.02 j."""
+    chain = LINK.replace("</body>", LINK.replace('"j"', '"k"').replace('"s"', '"z"') + "</body>")
+    rest = """<tendon><fixed name="a"><joint joint="j" coef="0.02"/></fixed>
+    <fixed name="b"><joint joint="k" coef="0.01"/></fixed></tendon>
+    <equality><tendon name="a" tendon1="b" tendon2="a" polycoef="0.001 0.5 0 0 0"/></equality>
+    <actuator><position joint="j" kp="50" ctrlrange="-1 1"/></actuator>"""
+    description = fp.from_mujoco(model_of(chain, rest))
+    assert list(description.tree.tendons) == ["a", "b", "a_equality"]
+    start = {"simulation.initial.position.k": 0.1, "simulation.duration": 1.0}
+    lead, follower = fp.simulate(read_scenario(exercise(description), start)).joint_position.values.T
+    assert np.ptp(lead) > 0.2
+    np.testing.assert_allclose(follower, 0.1 + lead, atol=1e-2)
+
+
 def test_what_is_not_carried_over_is_listed():
-    rest = f"""{FIXED}<equality><weld body1="w"/><joint joint1="j" polycoef="0 0 1 0 0"/></equality>
+    rest = f"""{FIXED}<equality><weld body1="w"/><joint joint1="j" polycoef="0 0 1 0 0"/>
+    <connect name="loop" body1="w" anchor="0 0 0"/></equality>
     <actuator><velocity joint="j" kv="1"/><intvelocity joint="j" kp="1" actrange="-1 1"/>
     <adhesion body="w" ctrlrange="0 1"/></actuator>"""
     body = LINK.replace("<body>", '<body name="w" gravcomp="1">')
@@ -253,6 +289,7 @@ def test_what_is_not_carried_over_is_listed():
         "actuator actuator_2: it drives a body",
         "equality equality_0: of kind weld",
         "equality equality_1: its polynomial is not linear",
+        "equality loop: of kind connect",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w"]

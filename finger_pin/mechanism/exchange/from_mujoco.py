@@ -16,8 +16,10 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.exchange.mujoco_actuators import ActuatorReader
+from finger_pin.mechanism.exchange.mujoco_equalities import read_equalities
 from finger_pin.mechanism.exchange.mujoco_flags import obeyed
-from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
+from finger_pin.mechanism.exchange.mujoco_names import Names, Table, entry_name, quaternion
 from finger_pin.mechanism.exchange.mujoco_overlay import lay_tendons
 from finger_pin.mechanism.exchange.mujoco_rest import Rest
 from finger_pin.mechanism.exchange.mujoco_shapes import Shapes
@@ -27,8 +29,6 @@ from finger_pin.mechanism.routes import rotation
 # Stiffness with which the range of a joint stops it where it slides, N/m.
 _STOP_SLIDING = 1e4
 _LEAST_FRICTION = 1e-7
-# Time constant with which a coupled joint follows, critically damped, s.
-_COUPLED = 0.005
 # Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
 _HIDDEN = 3
 
@@ -88,8 +88,7 @@ class _Reader:
             raise InputError(
                 f"joint {self.names.joints[i]}", "is a ball joint; joints have to turn or slide about one axis"
             )
-        self.affine = self.rest.affine_actuators()
-        self.pulling = [i for i in self.affine if self._pulls(i)]
+        self.actuators = ActuatorReader(mujoco, model, self.names, self.rest)
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
 
     def table(self, name: str) -> Table:
@@ -102,11 +101,13 @@ class _Reader:
         reader = TendonReader(self.mujoco, model, self.names, self.rest)
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
+        actuators, pulled = self.actuators.table(), self.actuators.pulled()
+        couplings, differences = read_equalities(self.mujoco, model, self.names, self.rest)
         return {
             "name": entry_name(name),
             "gravity": model.opt.gravity.tolist(),
             "joints": {self.names.joints[i]: self._joint(i) for i in self.kept_joints},
-            "tendons": self._pulled(),
+            "tendons": pulled,
             "joint_friction": {
                 "viscous": 0.0,
                 "floor": np.maximum(model.dof_frictionloss[dofs], _LEAST_FRICTION).tolist(),
@@ -115,9 +116,9 @@ class _Reader:
             "tree": {
                 "bodies": {self.names.bodies[i]: self._body(i) for i in bodies},
                 "joints": {self.names.joints[i]: self._moving(i) for i in self.kept_joints},
-                "tendons": tendons,
-                "couplings": self._couplings(),
-                "actuators": self._actuators(),
+                "tendons": tendons | {_free(name, tendons): each for name, each in differences.items()},
+                "couplings": couplings,
+                "actuators": actuators,
                 "tip": self._tip(),
                 "touching": self.shapes.pairs(bodies),
                 "meshes": self._meshes(bodies),
@@ -217,72 +218,6 @@ class _Reader:
             "armature": float(model.dof_armature[model.jnt_dofadr[i]]),
         }
 
-    def _couplings(self) -> Table:
-        model, found = self.model, {}
-        for i in self.rest.joint_equalities():
-            first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
-            constant, ratio = (float(each) for each in model.eq_data[i, :2])
-            q0 = model.qpos0[model.jnt_qposadr]
-            other = {"other": self.names.joints[second], "ratio": ratio} if second >= 0 else {}
-            offset = q0[first] + constant - (ratio * q0[second] if second >= 0 else 0.0)
-            inertia = float(model.dof_M0[model.jnt_dofadr[first]])
-            found[model.equality(i).name or f"equality_{i}"] = {
-                "joint": self.names.joints[first],
-                "offset": float(offset),
-                "stiffness": inertia / _COUPLED**2,
-                "damping": 2.0 * inertia / _COUPLED,
-                **other,
-            }
-        return dict(zip(distinct("equality", list(found)), found.values(), strict=True))
-
-    def _actuators(self) -> Table:
-        model, found = self.model, {}
-        for i in self.affine:
-            if i in self.pulling:
-                continue
-            kind, at = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
-            of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
-            affine = model.actuator_biastype[i] == self.mujoco.mjtBias.mjBIAS_AFFINE
-            offset, by_length, by_speed = model.actuator_biasprm[i, :3].tolist() if affine else (0.0, 0.0, 0.0)
-            found[i] = {
-                **({"tendon": self.names.tendons[at]} if of_tendon else {"joint": self.names.joints[at]}),
-                "gear": float(model.actuator_gear[i, 0]),
-                "gain": float(model.actuator_gainprm[i, 0]),
-                "offset": offset,
-                "by_length": by_length,
-                "by_speed": by_speed,
-            }
-            if model.actuator_ctrllimited[self.rest.control(i)]:
-                found[i]["input_range"] = model.actuator_ctrlrange[self.rest.control(i)].tolist()
-            if model.actuator_forcelimited[i]:
-                found[i]["force_range"] = model.actuator_forcerange[i].tolist()
-        names = distinct("actuator", [model.actuator(i).name for i in found])
-        return dict(zip(names, found.values(), strict=True))
-
-    def _pulls(self, i: int) -> bool:
-        """Return whether an actuator is a motor that can only pull a tendon through space."""
-        model, types = self.model, self.mujoco
-        at = int(model.actuator_trnid[i, 0])
-        if (
-            model.actuator_trntype[i] != types.mjtTrn.mjTRN_TENDON
-            or model.actuator_biastype[i] != types.mjtBias.mjBIAS_NONE
-            or not model.actuator_ctrllimited[self.rest.control(i)]
-            or model.actuator_forcelimited[i]
-            or model.wrap_type[model.tendon_adr[at]] == types.mjtWrap.mjWRAP_JOINT
-        ):
-            return False
-        exerted = (
-            model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0] * model.actuator_ctrlrange[self.rest.control(i)]
-        )
-        return bool(np.all(exerted <= 0.0) and np.any(exerted))
-
-    def _pulled(self) -> Table:
-        """Return the tendons that motors pull, by the names of these."""
-        model = self.model
-        names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
-        along = [self.names.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
-        return {name: {"along": path} for name, path in zip(names, along, strict=True)}
-
     def _tip_body(self) -> tuple[int, Array]:
         """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""
         model = self.model
@@ -294,3 +229,8 @@ class _Reader:
     def _tip(self) -> Table:
         body, position = self._tip_body()
         return {**self.names.carrier(body, "body"), "position": position.tolist()}
+
+
+def _free(name: str, taken: Table) -> str:
+    """Return a name that is not taken."""
+    return _free(f"{name}_equality", taken) if name in taken else name

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.mujoco_flags import disabled, undriven, without_counterpart
+from finger_pin.mechanism.exchange.mujoco_flags import disabled, without_counterpart
 
 
 class Rest:
@@ -62,49 +62,6 @@ class Rest:
     def add(self, line: str) -> None:
         """List something."""
         self._listed.append(line)
-
-    def joint_equalities(self) -> list[int]:
-        """Return the equalities that are linear in two joints; the others are listed."""
-        model, found = self.model, []
-        for i in np.flatnonzero(model.eq_active0):
-            name = model.equality(i).name or f"equality_{i}"
-            kind = self.mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
-            if kind != "joint":
-                self.add(f"equality {name}: of kind {kind}")
-            elif np.any(model.eq_data[i, 2:5]):
-                self.add(f"equality {name}: its polynomial is not linear")
-            else:
-                found.append(int(i))
-        return found
-
-    def control(self, i: int) -> int:
-        """Return the control of an actuator; those before it may have several, or none."""
-        first = getattr(self.model, "actuator_ctrladr", None)
-        return i if first is None else int(first[i])
-
-    def affine_actuators(self) -> list[int]:
-        """Return the actuators on joints and tendons without dynamics; the others are listed."""
-        model, mujoco, found = self.model, self.mujoco, []
-        for i in range(getattr(model, "nactuator", model.nu)):
-            name = model.actuator(i).name or f"actuator_{i}"
-            idle = undriven(mujoco, model, i)
-            driven = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
-            if idle:
-                self.add(f"actuator {name}: {idle}")
-            elif driven not in ("joint", "jointinparent", "tendon"):
-                self.add(f"actuator {name}: it drives a {driven}")
-            elif driven != "tendon" and model.jnt_type[model.actuator_trnid[i, 0]] == mujoco.mjtJoint.mjJNT_FREE:
-                self.add(f"actuator {name}: it drives a free joint")
-            elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-                self.add(f"actuator {name}: it has dynamics of its own")
-            elif model.actuator_gaintype[i] != mujoco.mjtGain.mjGAIN_FIXED:
-                kind = mujoco.mjtGain(int(model.actuator_gaintype[i])).name.removeprefix("mjGAIN_").lower()
-                self.add(f"actuator {name}: its gain is not constant, but of kind {kind}")
-            elif model.actuator_biastype[i] not in (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)):
-                self.add(f"actuator {name}: its bias is not affine")
-            else:
-                found.append(i)
-        return found
 
     def _refuse_muscles(self) -> None:
         model, mujoco = self.model, self.mujoco
