@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from finger_pin.control.signal import Signal
 from finger_pin.description.hand import PATH, HandDescription
@@ -14,7 +12,6 @@ from finger_pin.description.routing import Array
 from finger_pin.laws.palm import base_motion
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.kinematics import Motion
-from finger_pin.mechanism.surroundings import POSE, VELOCITY
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +21,12 @@ class PalmPath:
     Attributes:
         signal: x, y, z, m, and roll, pitch, yaw, rad, over time.
         gravity: In the world, shape (3,), m/s2.
-        standing: Which of the objects that move on the palm stand in the world, and where there, by their numbers.
+        carries: Whether objects stand in the world that the palm sees.
     """
 
     signal: Signal
     gravity: Array
-    standing: Mapping[int, pin.SE3]
+    carries: bool
 
     @classmethod
     def of(cls, hand: HandDescription | None, start: float, finger: Finger | None = None) -> PalmPath | None:
@@ -37,13 +34,8 @@ class PalmPath:
         if hand is None or hand.palm.path is None:
             return None
         settings = [hand.palm.on_path(name) for name in PATH]
-        objects = finger.surroundings.free if finger is not None and finger.surroundings is not None else {}
-        standing = {number: name for number, (name, each) in enumerate(objects.items()) if each.frame == "world"}
-        places = {
-            number: pin.SE3(pin.Quaternion(objects[name].quaternion).matrix(), np.array(objects[name].position))
-            for number, name in standing.items()
-        }
-        return cls(Signal.from_settings(settings).later(start), np.array(hand.gravity), places)
+        carries = finger is not None and bool(finger.layout.world)
+        return cls(Signal.from_settings(settings).later(start), np.array(hand.gravity), carries)
 
     def place(self, time: Array | float) -> tuple[Array, Array]:
         """Return the palm's place, shape (..., 3), m, and rotation to the world, (..., 3, 3), at times (...)."""
@@ -57,26 +49,24 @@ class PalmPath:
         return at[..., :3], np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
     def put(self, finger: Finger, x: Array) -> Array:
-        """Return a packed state with the objects that stand in the world where the palm sees them at the start."""
-        if not self.standing:
-            return x
-        state, palm, seen = finger.layout.unpack(x), pin.SE3(*self.place(0.0)[::-1]), self.base(0.0)
-        assert state.object_pose is not None and state.object_velocity is not None
-        for number, there in self.standing.items():
-            place = palm.actInv(there)
-            state.object_pose.reshape(-1, POSE)[number] = pin.SE3ToXYZQUAT(place)
-            state.object_velocity.reshape(-1, VELOCITY)[number, :3] = -seen[3:6]
+        """Return a packed state with the world where the palm sees it at the start."""
+        if self.carries:
+            state = finger.layout.unpack(x)
+            assert state.world_position is not None and state.world_velocity is not None
+            state.world_position[:], state.world_velocity[:] = (self._world(order, 0.0) for order in range(2))
         return x
 
+    def _world(self, order: int, time: Array | float) -> Array:
+        """Return a derivative of the coordinates of the world that the palm sees, shape (..., 6)."""
+        return -np.roll(self.signal.derivative(time, order), 3, axis=-1)
+
     def base(self, time: Array | float) -> Array:
-        """Return the 27 numbers of `base_motion`, and accelerations of what stands, shape (..., 27 + 6 k)."""
+        """Return the 27 numbers of `base_motion`, and accelerations of a world that it sees, shape (..., 27 or 33)."""
         place, first, second, third = (np.moveaxis(self.signal.derivative(time, order), -1, 0) for order in range(4))
         turns = [each(angle) for angle in place[3:] for each in (np.sin, np.cos)]
         found = base_motion(first, second, third, turns, self.gravity)
         numbers = np.stack(np.broadcast_arrays(*found), axis=-1)
-        standing = np.zeros((*numbers.shape[:-1], VELOCITY))
-        standing[..., :3] = -numbers[..., 18:21]
-        return np.concatenate([numbers, *(standing for _ in self.standing)], axis=-1)
+        return np.concatenate([numbers, self._world(2, time)], axis=-1) if self.carries else numbers
 
     def to_world(self, time: Array, motion: Motion, mass: float) -> Motion:
         """Return what is seen from the palm, at times (m,), as the world sees it.

@@ -21,9 +21,12 @@ from finger_pin.core.evaluation.rigid_body import (
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.rigid_body import FREE_JOINTS
+from finger_pin.mechanism.solids import WORLD
 
 # Less of a unit axis is rounding.
 _STILL = 1e-8
+# Farther than anything slides, m, but for what is led.
+_ANYWHERE = 1e3
 
 
 class Chains(NamedTuple):
@@ -31,6 +34,7 @@ class Chains(NamedTuple):
 
     Attributes:
         parents, roots, kinds, bodies, charts, chart_frames: As in `Tables`.
+        slides: How far each body slides at most, shape (n,), m.
         last: Of every joint of the model, the base first, its last body; -1 for the base.
         turns: Rotation of the joint's frame to that body's, shape (3, 3) each.
     """
@@ -39,6 +43,7 @@ class Chains(NamedTuple):
     roots: NDArray[np.int64]
     kinds: NDArray[np.int64]
     bodies: Array
+    slides: Array
     charts: NDArray[np.int64]
     chart_frames: Array
     last: list[int]
@@ -60,7 +65,7 @@ def read_chains(model: pin.Model) -> Chains:
     """
     size = int(model.nv)
     parents, kinds = np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64)
-    bodies, charts, frames = np.zeros((size, BODY_COLUMNS)), [], []
+    bodies, slides, charts, frames = np.zeros((size, BODY_COLUMNS)), np.full(size, _ANYWHERE), [], []
     # Of every joint of the model, the base first: its last body, and how that one's frame is turned.
     last, turns = [-1], [np.eye(3)]
     for joint in range(1, model.njoints):
@@ -69,6 +74,8 @@ def read_chains(model: pin.Model) -> Chains:
         translation, turn = turns[parent].T @ translation, np.eye(3)
         chain = _coordinates(model, joint)
         first = int(model.joints[joint].idx_v)
+        if model.names[joint] in WORLD:
+            slides[first] = model.upperPositionLimit[model.joints[joint].idx_q]
         if len(chain) == 3 and chain[0].kind != PRISMATIC:
             charts.append(first)
             frames.append(rotation)
@@ -90,7 +97,7 @@ def read_chains(model: pin.Model) -> Chains:
     for body in np.flatnonzero(parents >= 0):
         roots[body] = roots[parents[body]]
     attitudes = np.array(charts, dtype=np.int64), np.array(frames).reshape(-1, 3, 3)
-    return Chains(parents, roots, kinds, bodies, *attitudes, last, turns)
+    return Chains(parents, roots, kinds, bodies, slides, *attitudes, last, turns)
 
 
 def _coordinates(model: pin.Model, index: int) -> list[_Body]:

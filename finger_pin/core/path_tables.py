@@ -17,8 +17,6 @@ from finger_pin.mechanism.pieces import Leg, Piece
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
 COLUMNS, WRENCH = 3, 12
-# Farther than anything slides, m.
-_ANYWHERE = 1e3
 # A step is halved so often at most, less two, to look for touches.
 LOOKS = 60
 
@@ -226,9 +224,8 @@ def _levers(
         while at >= 0:
             slides = chains.kinds[at] == PRISMATIC
             found[at] = 1.0 if slides else reach
-            # What slides may be anywhere.
             distance = float(np.linalg.norm(chains.bodies[at, TRANSLATION : TRANSLATION + 3]))
-            reach += _ANYWHERE if slides else distance
+            reach += float(chains.slides[at]) if slides else distance
             at = int(chains.parents[at])
     for at, (one, _, two) in zip(coordinates, moves, strict=True):
         if one and two:

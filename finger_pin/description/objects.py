@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.hand import Palm, PathSignal
+from finger_pin.description.hand import PathSignal
 from finger_pin.description.routing import Array
 from finger_pin.description.surface import MILLIMETRES, SIZES, Surface, check_sizes, sizes_of
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
@@ -127,12 +126,3 @@ class Object(Description):
         across = middle * (3.0 * radius**2 + length**2) / 12.0
         across += ball * (0.4 * radius**2 + length**2 / 4.0 + 3.0 * length * radius / 8.0)
         return across, across, middle * radius**2 / 2.0 + ball * 0.4 * radius**2
-
-
-def check_standing(objects: Mapping[str, Object], palm: Palm) -> None:
-    """Refuse objects that stand in the world around a palm that turns."""
-    turns = any(palm.on_path(name).kind != "sine" or palm.on_path(name).amplitude for name in ("roll", "pitch", "yaw"))
-    for name, each in objects.items():
-        if each.frame == "world" and palm.path is not None and turns:
-            allowed = "is for a palm that does not turn: roll, pitch and yaw of hand.palm.path may have offsets alone"
-            raise problem(f"environment.objects.{name}.frame", allowed, "world")

@@ -23,7 +23,7 @@ from finger_pin.description.by_finger import flat, flat_numbers, given, nested, 
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import HandDescription
-from finger_pin.description.objects import Object, check_standing
+from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array, Routing
@@ -166,7 +166,6 @@ class Scenario(Description):
             if self.finger is not None:
                 raise problem("finger", "leave it out: the hand has fingers of its own")
             object.__setattr__(self, "finger", self.hand.joined())
-            check_standing(self.environment.objects or {}, self.hand.palm)
         if self.finger is None:
             raise problem("finger", "is missing: a finger, or a hand")
         self._check_names()

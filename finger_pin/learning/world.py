@@ -169,9 +169,7 @@ class World:
             if around is None:
                 return x
             try:
-                state = loop.finger.layout.unpack(x)
-                assert state.object_pose is not None
-                around.check(position, state.object_pose)
+                around.check(loop.finger.layout.unpack(x))
             except InputError as error:
                 problem = error
             else:

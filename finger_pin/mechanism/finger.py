@@ -140,7 +140,7 @@ class Finger:
         layout = Layout(self.routing.joints, tendons, passive, states, ringing, motors.names, held=held)
         if around is None:
             return layout
-        return replace(layout, objects=tuple(around.free), contacts=around.contacts.names)
+        return replace(layout, objects=tuple(around.free), world=around.world, contacts=around.contacts.names)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""

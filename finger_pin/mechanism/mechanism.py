@@ -67,7 +67,7 @@ class Mechanism:
         self.rows = tuple(rows)
         self.moved = moved
         self.guided = np.full(self.coordinates, -1) if guided is None else guided
-        self.books = Books.of(self.rows, moved, bool(np.any(self.guided >= 0)))
+        self.books = Books.of(self.rows, moved, not moved and bool(np.any(self.guided >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
@@ -204,6 +204,9 @@ class Mechanism:
             guided_power = -np.sum(torque[..., led] * v[..., led], axis=-1)
         if base is not None and self.moved:
             power = self._base_power(turning, v[..., :joints], acceleration[..., :joints], base)
+            if guided_power is not None:
+                # What pushes against a world that stands still does no work; the palm feels it.
+                power, guided_power = power + guided_power[..., None], None
         moving = self.body.position_rate(turning, v[..., :joints])
         rates = [found[t.group].rate for t in self.rows if t.states]
         return Evaluation(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.hand import Palm
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
@@ -18,6 +19,16 @@ from finger_pin.mechanism.routes import Placed, rotation
 
 # A link's own z axis runs along it, which is the x axis of its joint.
 _SLIGHT = 1e-9
+#: Joints of the world that a palm sees: less than its roll, pitch, yaw, x, y and z, one carrying the next.
+WORLD = tuple(f"world {name}" for name in ("roll", "pitch", "yaw", "x", "y", "z"))
+_WORLD_JOINTS = (
+    pin.JointModelRX,
+    pin.JointModelRY,
+    pin.JointModelRZ,
+    pin.JointModelPX,
+    pin.JointModelPY,
+    pin.JointModelPZ,
+)
 _ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
@@ -136,19 +147,19 @@ def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
 
 def object_solids(objects: Mapping[str, Object], body: RigidBody) -> list[Solid]:
     """Return objects; those that move are carried by the joints that `add_free_objects` has made."""
-    joint_of = {name: f"{name}_attitude" for name in objects}
-    return [
-        object_solid(
-            name, each, int(body.model.getJointId(joint_of[name])) if body.model.existJointName(joint_of[name]) else 0
+    found = []
+    for name, each in objects.items():
+        joint = WORLD[-1] if each.frame == "world" else f"{name}_attitude"
+        found.append(
+            object_solid(name, each, int(body.model.getJointId(joint)) if body.model.existJointName(joint) else 0)
         )
-        for name, each in objects.items()
-    ]
+    return found
 
 
 def object_solid(name: str, described: Object, joint: int) -> Solid:
-    """Return an object; one that a joint carries has its frame, one that is fixed its own place."""
+    """Return an object; one that moves has the frame of the joint that carries it, one that is fixed its own place."""
     place = pin.SE3.Identity()
-    if not joint:
+    if not joint or described.frame == "world":
         place = pin.SE3(pin.Quaternion(described.quaternion).matrix(), np.array(described.position))
     solid = Solid(
         name,
@@ -164,23 +175,31 @@ def object_solid(name: str, described: Object, joint: int) -> Solid:
     return solid if joint else replace(solid, range=solid.reach)
 
 
-def add_free_objects(body: RigidBody, objects: Mapping[str, Object], standing: bool = False) -> RigidBody:
+def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm | None = None) -> RigidBody:
     """Return a rigid body with those of some objects that are free or moved as further bodies, after its joints.
-
-    So are those that stand in the world, if the palm moves.
 
     Each is a translation joint with the name of the object, at the origin of the base, and a spherical one, whose name
     ends in ``_attitude``, that carries it.
+
+    What stands in the world while a ``palm`` moves is carried by the joints of `WORLD`, which come last: the world as
+    the palm sees it, R^T (w - p) with R^T = Rx(-roll) Ry(-pitch) Rz(-yaw), of a palm at p and R.
     """
     model = pin.Model(body.model)
     for name, each in objects.items():
-        if each.moves or (standing and each.frame == "world"):
+        if each.moves:
             place = pin.SE3.Identity()
             moved = model.addJoint(0, pin.JointModelTranslation(), place, name)
             turned = model.addJoint(moved, pin.JointModelSpherical(), place, f"{name}_attitude")
             # Of one that is led any will do, if it is too little to count.
             moments = np.full(3, _SLIGHT) if each.mass is None else each.inertia
             model.inertias[turned] = pin.Inertia(each.mass or _SLIGHT, np.zeros(3), np.diag(moments))
+    if palm is not None and any(each.frame == "world" for each in objects.values()):
+        carried = 0
+        for name, kind in zip(WORLD, _WORLD_JOINTS, strict=True):
+            most = np.full(1, palm.on_path(name.split()[1]).greatest)
+            limits = (np.full(1, np.inf), np.full(1, np.inf), -most, most)
+            carried = model.addJoint(carried, kind(), pin.SE3.Identity(), name, *limits)
+        model.inertias[carried] = pin.Inertia(_SLIGHT, np.zeros(3), np.diag(np.full(3, _SLIGHT)))
     extended = RigidBody(model, [model.frames[tip].name for tip in body.tips])
     count = body.model.njoints
     extended.proximal_axes[:count], extended.carriers[:count] = body.proximal_axes, body.carriers

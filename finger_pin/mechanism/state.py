@@ -5,7 +5,8 @@
 
 n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
 m motors, h tendons on spools with hysteresis, c contacts with bristles bent by z: 19 numbers for the paper's finger,
-which has neither motors nor contacts.
+which has neither motors nor contacts. Where objects stand in the world around a palm that moves, the six joints of the
+world that it sees follow o and o'.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ class State:
         gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
         object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
         object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
+        world_position: Less than roll, pitch, yaw, rad, and x, y, z, m, of a palm around which objects stand in the world,
+            shape (..., 6), or (..., 0) without any.
+        world_velocity: Its rate, rad/s and m/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
         elastic_stiction: F^s that tendons on spools hold, shape (..., h), N.
     """
@@ -52,6 +56,8 @@ class State:
     gearbox_stiction: Array | None = None
     object_pose: Array | None = None
     object_velocity: Array | None = None
+    world_position: Array | None = None
+    world_velocity: Array | None = None
     contact_bend: Array | None = None
     elastic_stiction: Array | None = None
 
@@ -78,6 +84,7 @@ class Layout:
         ringing: Angular frequencies of the lumped masses on their two halves, one for each passive tendon, rad/s.
         motors: Names of the motors.
         objects: Names of the free objects.
+        world: Names of the joints of the world that a palm sees.
         contacts: Names of the contacts.
         held: Names of the tendons on spools with hysteresis.
     """
@@ -89,6 +96,7 @@ class Layout:
     ringing: tuple[float, ...] = ()
     motors: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
+    world: tuple[str, ...] = ()
     contacts: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
 
@@ -107,10 +115,12 @@ class Layout:
         return {
             "position": (self.joints, 1.0),
             "object_pose": (poses, 1.0),
+            "world_position": (self.world, 1.0),
             "passive_position": (passive, 1e-3),
             "motor_position": (self.motors, 1.0),
             "velocity": (self.joints, 10.0),
             "object_velocity": (rates, 10.0),
+            "world_velocity": (self.world, 10.0),
             "passive_velocity": (passive, 0.1),
             "motor_velocity": (self.motors, 10.0),
             "contact_bend": (bends, 1e-5),

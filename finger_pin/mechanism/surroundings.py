@@ -20,7 +20,8 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Placed
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids, pairs_within, tree_solids
+from finger_pin.mechanism.solids import WORLD, add_free_objects, finger_solids, object_solids, pairs_within, tree_solids
+from finger_pin.mechanism.state import State
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
@@ -68,7 +69,8 @@ class Surroundings:
         Raises:
             InputError: If an object has the name of a joint or a shape, or a link has no size.
         """
-        extended, tree = add_free_objects(mechanism.body, objects, mechanism.moved), description.tree
+        hand, tree = description.hand, description.tree
+        extended = add_free_objects(mechanism.body, objects, hand.palm if hand and mechanism.moved else None)
         if tree is not None and placed is not None:
             own = tree_solids(tree, placed, extended)
         else:
@@ -95,10 +97,16 @@ class Surroundings:
         rows = [table.spread(places, bodies + lumps) for table in mechanism.rows]
         lumps_of = mechanism.lumps, mechanism.inertia
         guided = np.full(bodies + lumps, -1)
+        guided[bodies - len(self.world) : bodies] = np.arange(len(self.world))
         led = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
         for number, first in enumerate(led):
             guided[first : first + VELOCITY] = VELOCITY * number + np.arange(VELOCITY)
         return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, guided)
+
+    @property
+    def world(self) -> tuple[str, ...]:
+        """Names of the joints of the world that a moving palm sees; none where nothing stands there."""
+        return WORLD if self.body.model.existJointName(WORLD[0]) else ()
 
     def start(self) -> tuple[Array, Array]:
         """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""
@@ -106,13 +114,13 @@ class Surroundings:
         rates = [np.append(each.velocity, each.angular_velocity) for each in self.free.values()]
         return np.array(poses).reshape(-1), np.array(rates).reshape(-1)
 
-    def check(self, position: Array, pose: Array) -> None:
-        """Refuse joints at a position, shape (n,), and objects at poses that are deep in each other.
+    def check(self, state: State) -> None:
+        """Refuse a state in which bodies are deep in each other.
 
         Raises:
             InputError: Naming the pair.
         """
-        check_start(self.contacts, self.body, np.concatenate([position, pose]))
+        check_start(self.contacts, self.body, _placed(state))
 
     @property
     def mass(self) -> Array:
@@ -142,20 +150,19 @@ class Surroundings:
         kinetic = 0.5 * (np.sum(speeds**2, axis=-1) @ self.mass + np.sum(inertia * turns**2, (-2, -1)))
         return kinetic, -np.sum(places * gravity, axis=-1) @ self.mass
 
-    def touching(self, position: Array, pose: Array, force: Array) -> Touching:
+    def touching(self, state: State, force: Array) -> Touching:
         """Return what contacts do in space.
 
         Args:
-            position: theta, shape (m, n), rad.
-            pose: Of the free objects, shape (m, 7 f).
+            state: m states.
             force: Along the contacts' three arms, shape (m, 3 c), N.
         """
-        body, data = self.body, self.body.model.createData()
+        body, data, placed = self.body, self.body.model.createData(), _placed(state)
         pieces = [legs[0].piece for legs in self.contacts.paths[:: CONTACT.arms]]
         along = force.reshape(len(force), len(pieces), CONTACT.arms)
         found, out = Touching(*(np.zeros((len(force), len(pieces), 3)) for _ in range(3))), np.zeros(16)
         for m in np.flatnonzero(np.any(along[..., 0], axis=1)):
-            pin.forwardKinematics(body.model, data, np.concatenate([position[m], pose[m]]))
+            pin.forwardKinematics(body.model, data, placed[m])
             for c in np.flatnonzero(along[m, :, 0]):
                 piece = pieces[c]
                 frame = data.oMi[piece.joint] * piece.frame
@@ -166,3 +173,9 @@ class Surroundings:
                 found.normal[m, c] = axes[:, 0]
                 found.point[m, c] = frame.act(out[4:7])
         return found
+
+
+def _placed(state: State) -> Array:
+    """Return the positions of the bodies of the surroundings, shape (..., nq)."""
+    parts = (state.position, state.object_pose, state.world_position)
+    return np.concatenate([each for each in parts if each is not None], axis=-1)

@@ -65,7 +65,7 @@ def contact_values(finger: Finger, signals: FingerSignals) -> dict[str, Array]:
     found = signals.mechanism.rows[around.contacts.group]
     touch, arms = found.row, CONTACT.arms
     assert isinstance(touch, Touch)
-    space = signals.mechanism.touching or around.touching(state.position, state.object_pose, found.force)
+    space = signals.mechanism.touching or around.touching(state, found.force)
     friction = np.hypot(found.force[:, 1::arms], found.force[:, 2::arms])
     pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
     return {

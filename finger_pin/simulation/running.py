@@ -106,9 +106,7 @@ class Setup:
             loop = replace(loop, start=loop.initial_state())
             check_motors(loop.finger, loop.initial_state())
         if loop.finger.surroundings is not None:
-            start = loop.finger.layout.unpack(loop.initial_state())
-            assert start.object_pose is not None
-            loop.finger.surroundings.check(start.position, start.object_pose)
+            loop.finger.surroundings.check(loop.finger.layout.unpack(loop.initial_state()))
         sampling = sampling_settings(scenario, control_period)
         if sampling is None and isinstance(loop.controller, MeasuringController):
             raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")

@@ -88,6 +88,8 @@ def simulate(
     loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
+        if loop.palm is not None and loop.start is not None:
+            loop.palm.put(loop.finger, loop.start)
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop)

@@ -106,9 +106,7 @@ class Simulator:
         if self._guides is not None:
             x = self._guides.place(finger, x)
         if finger.surroundings is not None:
-            state = finger.layout.unpack(x)
-            assert state.object_pose is not None
-            finger.surroundings.check(state.position, state.object_pose)
+            finger.surroundings.check(finger.layout.unpack(x))
         return x
 
     def _begin(self, x: Array, time: float) -> None:

@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 import finger_pin as fp
 
 WEIGHT = 0.15 * 9.81
+# The sample at which the cylinder is lifted, and the palm begins to turn.
+LIFTED = 240
 
 
 def run(**overrides):
@@ -37,17 +39,22 @@ def in_the_world(result, name):
 
 
 def test_the_table_stays_behind_and_the_cylinder_is_lifted_off_it_by_ten_centimetres(grasp):
-    place, turned = in_the_world(grasp, "table")
-    assert np.abs(place - [0.0, 0.0, -0.075]).max() < 2e-6
-    assert turned.magnitude().max() < 1e-7
     height = in_the_world(grasp, "cylinder")[0][:, 2]
-    assert height[-1] - height[0] == pytest.approx(0.1, abs=1e-3)
+    assert height[LIFTED] - height[0] == pytest.approx(0.1, abs=1e-3)
     on_table = [name for name in grasp.contact.values if "table" in str(name) and str(name).startswith("cylinder")]
     pressed = grasp.contact_normal_force.sel(contact=on_table).sum("contact")
     assert float(pressed[4]) == pytest.approx(WEIGHT, rel=0.2) and float(pressed[-1]) == 0.0
     seen = grasp.object_position.sel(object="cylinder").values
     closed = seen[grasp.time >= 0.45]
     assert np.linalg.norm(closed - closed[0], axis=1).max() < 1e-3
+
+
+def test_the_palm_turns_up_and_the_cylinder_with_it(grasp):
+    _, turned = in_the_world(grasp, "cylinder")
+    axis = turned.apply([0.0, 0.0, 1.0])
+    assert abs(axis[0, 2]) == pytest.approx(1.0) and abs(axis[-1, 1]) == pytest.approx(1.0, abs=1e-3)
+    facing = Rotation.from_quat(grasp.palm_orientation.values[-1]).apply([0.0, 0.0, 1.0])
+    assert facing == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
 
 
 def test_variables_name_their_frames(grasp):
@@ -63,16 +70,10 @@ def test_variables_name_their_frames(grasp):
     }
 
 
-def test_what_stands_in_the_world_needs_a_palm_that_does_not_turn():
-    turning = {"hand.palm.path.roll": {"amplitude": 0.1, "frequency": 1.0}}
-    with pytest.raises(fp.InputError, match=r"environment\.objects\.table\.frame"):
-        run(**turning)
-
-
 def test_friction_alone_carries_the_cylinder_once_it_is_lifted(grasp):
     """What the hand exerts balances its weight; along its axis, which is upright, no normal force has a part."""
     names = [name for name in grasp.contact.values if str(name).endswith("cylinder") or "-cylinder." in str(name)]
-    end = grasp.isel(time=-1).sel(contact=names)
+    end = grasp.isel(time=LIFTED).sel(contact=names)
     force, normal = end.contact_force.values, end.contact_normal.values
     assert force.sum(axis=0) == pytest.approx([0.0, -WEIGHT, 0.0], abs=2e-3 * WEIGHT)
     axis = Rotation.from_quat(end.object_orientation.sel(object="cylinder").values).apply([0.0, 0.0, 1.0])

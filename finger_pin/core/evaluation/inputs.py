@@ -140,7 +140,7 @@ def move_base(control: Any, time: float, tables: Any, work: Any) -> None:
         work.base_acceleration[k] = found[6 + k]
         work.base_rate[0, k] = found[15 + k]
         work.base_rate[1, k] = found[21 + k]
-    # What stands in the world, seen from a base that does not turn.
+    # The world that the base sees goes back as the base goes on: first its angles, then its place.
     for i in range(work.guide.size):
-        r = i % 6
-        work.guide[i], work.guide_rate[i] = (-found[18 + r], -found[24 + r]) if r < 3 else (0.0, 0.0)
+        work.guide[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 2)
+        work.guide_rate[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 3)

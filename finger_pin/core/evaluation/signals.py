@@ -207,11 +207,9 @@ def evaluate_many(address: int, _time: float) -> int:
             for c in range(states.shape[1]):
                 before[c] = model.state[c]
         last = booked.shape[1] - 1
-        if model.power != 0:
-            last -= 1
-            if bases.shape[0] > 0:
-                call_at(model.power, many.model, 0.0)
-                booked[m, last + 1] = work.base_power[0]
+        if model.power != 0 and bases.shape[0] > 0:
+            call_at(model.power, many.model, 0.0)
+            booked[m, last] = work.base_power[0]
         if work.guide.size > 0:
             for j in range(torques.shape[1]):
                 if tables.guided[j] >= 0:

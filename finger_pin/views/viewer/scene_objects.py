@@ -87,6 +87,9 @@ class SceneObjects:
                 ]
             ).reshape(*poses.shape[:2], 4)
             poses = np.concatenate([turned[3] + palm.translation[:, None], seen], axis=-1)
+            for index, name in enumerate(found):
+                if objects[name].frame == "world":
+                    poses[:, index] = objects[name].pose
         contacts = np.concatenate(parts, axis=-1)
         return cls(objects, tuple(found), poses, contacts, steepness[steepness > 0.0], size, middle)
 

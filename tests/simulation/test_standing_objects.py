@@ -1,0 +1,127 @@
+"""Objects that stand in the world while a palm moves and turns among them."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.core.compiled_finger import CompiledFinger
+
+HAND = """
+[hand]
+name = "one"
+gravity = [0.0, 0.0, -9.81]
+[hand.fingers.only]
+finger = "ub"
+"""
+#: At rest at first, so that the palm's frame is the world's when the ball is thrown.
+TUMBLE = """
+[hand.palm.path]
+x = { kind = "points", times = [0.0, 0.3], values = [0.0, 0.05] }
+z = { kind = "points", times = [0.1, 0.4], values = [0.0, -0.04] }
+roll = { kind = "points", times = [0.0, 0.35], values = [0.0, 0.9] }
+pitch = { kind = "points", times = [0.0, 0.4], values = [0.0, -0.6] }
+yaw = { kind = "points", times = [0.05, 0.4], values = [0.0, 1.2] }
+"""
+#: Thrown onto a tilted slab, where the ball bounces, slides and rolls; far from the finger.
+THROWN = """
+[environment.objects.slab]
+shape = "box"
+frame = "world"
+sides = [0.5, 0.5, 0.02]
+position = [0.7, 0.1, -0.05]
+orientation = [0.1, 0.05, 0.0, 1.0]
+[environment.objects.ball]
+shape = "sphere"
+radius = 0.015
+mass = 0.03
+position = [0.7, 0.1, 0.02]
+velocity = [0.2, -0.1, -0.5]
+angular_velocity = [3.0, 20.0, -5.0]
+[simulation]
+duration = 0.4
+rtol = 1e-8
+atol_scale = 1e-8
+"""
+#: A finger bends onto a post beside it.
+POST = """
+[reference.joints.only.proximal]
+kind = "points"
+times = [0.0, 0.3]
+values = [0.2, 0.8]
+[environment.objects.post]
+shape = "capsule"
+radius = 0.01
+length = 0.2
+position = [0.085, 0.0, 0.055]
+orientation = [1.0, 0.0, 0.0, 1.0]
+"""
+DRIVE = '{ kind = "samples", times = [0.0, 0.5], values = [0.0, %g] }'
+
+
+@pytest.fixture(scope="module")
+def load(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("standing")
+
+    def from_text(*parts):
+        path = folder / "scene.toml"
+        path.write_text("".join(parts))
+        return fp.load_scenario(path)
+
+    return from_text
+
+
+@pytest.fixture(scope="module")
+def swept(load):
+    """The palm turns and carries the finger along the post."""
+    return load(HAND, TUMBLE, POST, 'frame = "world"\n', "[simulation]\nduration = 0.4\n")
+
+
+def test_what_a_ball_does_on_a_slab_does_not_depend_on_a_palm_that_tumbles_beside_them(load):
+    still, moved = fp.simulate(load(HAND, THROWN)), fp.simulate(load(HAND, TUMBLE, THROWN))
+    turns = np.array([pin.Quaternion(each).toRotationMatrix() for each in moved.palm_orientation.values])
+    own, place = (each.object_position.sel(object="ball").values for each in (moved, still))
+    seen = moved.palm_position.values + np.einsum("mij,mj->mi", turns, own)
+    assert np.ptp(place, axis=0).max() > 0.05
+    # It bounces, and rolls at last.
+    assert int(np.count_nonzero(still.contact_normal_force.sum("contact"))) > 20
+    assert seen == pytest.approx(place, abs=2e-7)
+    forces = np.einsum("mij,mj->mi", turns, moved.contact_force.sum("contact").values)
+    assert forces == pytest.approx(still.contact_force.sum("contact").values, abs=2e-3)
+
+
+def test_a_palm_that_goes_on_evenly_feels_what_one_at_rest_feels_of_a_post_that_comes(load):
+    tight = "[simulation]\nduration = 0.5\nrtol = 1e-8\natol_scale = 1e-8\n"
+    moving = load(HAND, "[hand.palm.path]\nz = " + DRIVE % -0.03, POST, 'frame = "world"\n', tight)
+    coming = load(HAND, POST, "[environment.objects.post.path]\nz = " + DRIVE % 0.03, "\n" + tight)
+    one, other = fp.simulate(moving), fp.simulate(coming)
+    assert float(one.contact_normal_force.max()) > 0.2
+    assert one.joint_position.values == pytest.approx(other.joint_position.values, abs=1e-7)
+
+
+def test_the_palm_pays_for_what_a_post_stops_and_the_account_closes(swept):
+    result = fp.simulate(swept)
+    pressed = result.contact_normal_force.sum("contact").values
+    assert pressed.max() > 0.2
+    assert "energy_exchanged_objects" not in result
+    exchanged = sum(float(abs(result[name]).max()) for name in result if name.startswith("energy_exchanged_"))
+    assert float(abs(result.energy_residual).max()) < 1e-6 * exchanged
+
+
+def test_both_evaluations_agree_on_a_world_that_turns(swept):
+    loop, times = ClosedLoop.from_scenario(swept), np.array([0.07, 0.31])
+    x = np.stack([loop.initial_state()] * 2)
+    state, rng = loop.finger.layout.unpack(x), np.random.default_rng(3)
+    moved = (state.velocity, 1.0), (state.world_velocity, 1.0), (state.world_position, 0.01), (state.contact_bend, 1e-5)
+    for each, size in moved:
+        each[:] += size * rng.normal(size=each.shape)
+    state.position[:, 1] = 0.7
+    command, base, force = np.ones((2, loop.finger.mechanism.channels)), loop.base(times), np.zeros((2, 3))
+    readable = loop.finger.evaluate(x, command, force, base)
+    compiled = CompiledFinger(loop.finger).evaluate(x, command, force, base)
+    assert np.any(readable.mechanism.rows["contacts"].force)
+    assert compiled.rate == pytest.approx(readable.rate, rel=1e-8, abs=1e-8)
+    for one, other in zip(compiled.mechanism.account(), readable.mechanism.account(), strict=True):
+        for name in other:
+            assert one[name] == pytest.approx(other[name], rel=1e-8, abs=1e-12)
