@@ -37,8 +37,8 @@ class State:
         gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
         object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
         object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
-        world_position: Less than roll, pitch, yaw, rad, and x, y, z, m, of a palm around which objects stand in the world,
-            shape (..., 6), or (..., 0) without any.
+        world_position: Of the world that a palm sees, minus its roll, pitch, yaw, rad, and its x, y, z, m, shape (..., 6);
+            (..., 0) where nothing stands there.
         world_velocity: Its rate, rad/s and m/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
         elastic_stiction: F^s that tendons on spools hold, shape (..., h), N.
@@ -196,4 +196,6 @@ class Layout:
             poses, rates = (self._parts[kind] for kind in ("object_pose", "object_velocity"))
             scales[poses].reshape(-1, 7)[:, :3] = 1e-2
             scales[rates].reshape(-1, 6)[:, :3] = 0.1
+        scales[self._parts["world_position"]][3:] = 1e-2
+        scales[self._parts["world_velocity"]][3:] = 0.1
         return scales

@@ -12,6 +12,7 @@ LAYOUTS = {
     "three passive tendons": Layout(("a",), ("T1", "T2", "P1", "P2", "P3"), 3),
     "two motors": Layout(("a", "b"), ("T1", "T2", "P1"), 1, motors=("M1", "M2")),
     "objects": Layout(("a", "b"), ("T1", "P1"), 1, objects=("ball", "box"), contacts=("a-ball", "b-ball", "ball-box")),
+    "a world": Layout(("a",), ("T1", "T2"), 0, world=("roll", "pitch", "yaw", "x", "y", "z"), contacts=("a-table",)),
 }
 
 
@@ -33,15 +34,15 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     state = layout.unpack(x)
     np.testing.assert_array_equal(layout.pack(state), x)
     n, t, p, m = len(layout.joints), len(layout.tendons), layout.passive, len(layout.motors)
-    f, c = len(layout.objects), len(layout.contacts)
-    sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, 2 * c, len(layout.held))
+    f, w, c = len(layout.objects), len(layout.world), len(layout.contacts)
+    sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, w, w, 2 * c, len(layout.held))
     for name, size in zip(State.__annotations__, sizes, strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 
 
 def test_sizes_add_up_to_three_per_joint_and_motor_one_per_tendon_two_per_passive_tendon_and_contact(layout):
     alone = 3 * (len(layout.joints) + len(layout.motors)) + len(layout.tendons) + 2 * layout.passive
-    assert layout.size == alone + 13 * len(layout.objects) + 2 * len(layout.contacts)
+    assert layout.size == alone + 13 * len(layout.objects) + 2 * len(layout.world) + 2 * len(layout.contacts)
     assert sum(layout.sizes) == layout.size
 
 
@@ -67,8 +68,8 @@ def test_absolute_tolerances_have_one_positive_scale_per_number_by_kind(layout):
     scales = layout.unpack(layout.scales())
     assert np.all(layout.scales() > 0.0)
     for kind, values in vars(scales).items():
-        # A pose has metres and a quaternion.
-        assert len(set(values)) <= (2 if kind.startswith("object") else 1)
+        # A pose has metres and a quaternion, or angles.
+        assert len(set(values)) <= (2 if kind.startswith(("object", "world")) else 1)
     assert scales.velocity[0] > scales.position[0]
     if layout.passive:
         assert scales.passive_position[0] < scales.position[0]
