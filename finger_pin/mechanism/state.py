@@ -37,7 +37,7 @@ class State:
         gearbox_stiction: F^s of the gearboxes, shape (..., m), N m.
         object_pose: Position, m, base frame, and unit quaternion x, y, z, w of every free object, shape (..., 7 f).
         object_velocity: Velocity, m/s, base frame, and angular velocity, rad/s, in its own, shape (..., 6 f).
-        world_position: Of the world that a palm sees, minus its roll, pitch, yaw, rad, and its x, y, z, m, shape (..., 6);
+        world_position: Of the world that a palm sees: less its roll, pitch, yaw, rad, x, y and z, m, shape (..., 6);
             (..., 0) where nothing stands there.
         world_velocity: Its rate, rad/s and m/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.

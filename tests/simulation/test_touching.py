@@ -133,7 +133,7 @@ def test_the_compiled_evaluation_is_the_readable_one(name, request):
     scale = 1.0 + np.abs(readable.rate)
     assert np.abs((compiled.rate - readable.rate) / scale).max() < 1e-8
     found, pushing = compiled.mechanism.touching, readable.mechanism.rows["contacts"].force
-    expected = loop.finger.surroundings.touching(state.position, state.object_pose, pushing)
+    expected = loop.finger.surroundings.touching(state, pushing)
     for part in ("force", "point", "normal"):
         np.testing.assert_allclose(getattr(found, part), getattr(expected, part), rtol=1e-7, atol=1e-9, err_msg=part)
 
