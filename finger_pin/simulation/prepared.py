@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.stepping.stepper import TABLEAUS, in_threads
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
@@ -24,8 +24,8 @@ from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import attributes_of, record, recorded
 from finger_pin.simulation.run_arrays import RunArrays
-from finger_pin.simulation.running import Setup, Steps, run
-from finger_pin.simulation.sensitivity import TIGHT, TIGHTER, add_slopes
+from finger_pin.simulation.running import Setup, run
+from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
 from finger_pin.simulation.variables import coordinates, variables
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 #: What a run records unless it is told otherwise.
 RECORDED = ("joint_position", "tendon_tension")
+_TIGHT = 1e-8
 
 
 def prepare(
@@ -103,7 +104,6 @@ class Prepared:
         initial: ArrayLike | xr.Dataset | None = None,
         stop: Stop | None = None,
         sensitivities: bool = False,
-        accuracy: float | None = None,
     ) -> RunArrays:
         """Simulate, and return what is recorded, and no more: bit for bit as in the result of `simulate`.
 
@@ -114,9 +114,8 @@ class Prepared:
             initial: The packed state to start from, shape (size,), or a result to continue from, as for `fp.simulate`.
             stop: Asked now and then; when it returns true the run ends there.
             sensitivities: Whether to add the derivatives of what is recorded by the values, ``run.slopes[variable]`` of
-                shape (p, ...): by repeating the run once for each on the same steps. From the time of the attribute
-                ``sensitivities_lost`` on they are beyond all measure: the motion says nothing of the values there.
-            accuracy: Loosest tolerances of a run with sensitivities, by default 1e-8, or 1e-9 where bodies touch.
+                shape (p, ...), at the tolerances of the run. From the time of the attribute ``sensitivities_lost`` on
+                they are beyond all measure: the motion says nothing of the values there.
 
         Raises:
             InputError: Naming the entry that is wrong.
@@ -124,7 +123,7 @@ class Prepared:
             Interrupted: After Ctrl-C, or if ``stop`` returned true; its ``result`` holds what was computed. It is a
                 KeyboardInterrupt.
         """
-        return interruptible(lambda asked: self._run(values, initial, asked, sensitivities, accuracy), stop)
+        return interruptible(lambda asked: self._run(values, initial, asked, sensitivities), stop)
 
     def _run(
         self,
@@ -132,48 +131,51 @@ class Prepared:
         initial: ArrayLike | xr.Dataset | None,
         stop: Stop,
         sensitivities: bool,
-        accuracy: float | None,
     ) -> RunArrays:
         scenario = self.scenario(values)
+        setup, trajectory, found = self._made(scenario, initial, stop)
         if not sensitivities:
-            return self._made(scenario, initial, stop)[0]
+            return found
+        if not trajectory.islands:
+            # It will be repeated on its steps: the derivative of what was computed, errors and all.
+            setup, trajectory, found = self._made(_tight(scenario), initial, stop)
         given = self.values if values is None else values
         for key, value in zip(self.parameters, given, strict=True):
             if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
                 raise InputError(key, "sensitivities are those to single numbers", value)
-        if scenario.simulation.method not in TABLEAUS:
-            allowed = f"sensitivities are for {', '.join(TABLEAUS)}"
-            raise InputError("simulation.method", allowed, scenario.simulation.method)
-        apart = bool(scenario.environment.objects)
-        tight = accuracy or (TIGHTER if apart else TIGHT)
-        found, trajectory = self._made(_tight(scenario, tight), initial, stop)
-        steps = None if apart else [each.times for each in trajectory.islands] or [trajectory.breakpoints]
+        if setup.method not in TABLEAUS:
+            raise InputError("simulation.method", f"sensitivities are for {', '.join(TABLEAUS)}", setup.method)
+        numbers = [float(value) for value in given]
+        sizes = [abs(value) or 1.0 for value in numbers]
+        others, changes = changed(numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial))
+        near = nearby(setup, trajectory, others, changes)
+        runs = in_threads(lambda pair: self._recorded(*pair), list(zip(others, near, strict=True)))
+        return add_slopes(found, numbers, runs, changes)
 
-        def again(moved: Sequence[float]) -> RunArrays:
-            return self._made(_tight(self.scenario(moved), tight), initial, stop, steps)[0]
-
-        return add_slopes(found, [float(value) for value in given], again, apart=apart)
-
-    def _made(
-        self,
-        scenario: Scenario,
-        initial: ArrayLike | xr.Dataset | None,
-        stop: Stop | None,
-        steps: Steps | None = None,
-    ) -> tuple[RunArrays, Trajectory]:
-        """Make a run, on given steps if there are any."""
+    def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
         setup = Setup.of(scenario, self._loop(scenario, initial))
         self._check(setup.loop)
-        trajectory = setup.integrate(stop=stop, steps=steps)
-        motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
+        return setup
+
+    def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
+        motions = Motions(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
+        names = coordinates(setup.scenario, setup.loop, motions.times)
+        attributes = attributes_of(setup.scenario, trajectory, setup.method)
+        return RunArrays(recorded(motions, self.record), names, attributes)
+
+    def _made(
+        self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
+    ) -> tuple[Setup, Trajectory, RunArrays]:
+        """Make a run."""
+        setup = self._setup(scenario, initial)
+        trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
+            motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
             reached, partial = float(trajectory.breakpoints[-1]), record(scenario, motions, setup.method, self.record)
             if trajectory.failure:
                 raise IntegrationError(reached, *setup.failure(trajectory), partial)
             raise Interrupted(reached, partial)
-        names = coordinates(scenario, setup.loop, motions.times)
-        attributes = attributes_of(scenario, trajectory, setup.method)
-        return RunArrays(recorded(motions, self.record), names, attributes), trajectory
+        return setup, trajectory, self._recorded(setup, trajectory)
 
     def simulate(
         self,
@@ -213,8 +215,8 @@ class Prepared:
                 raise InputError("record", f"the result has no such variable; it has {', '.join(known)}{hint}", name)
 
 
-def _tight(scenario: Scenario, tolerance: float) -> Scenario:
-    """Return a scenario with tolerances that are at most as loose as asked for."""
+def _tight(scenario: Scenario) -> Scenario:
+    """Return a scenario whose tolerances are tight."""
     own = scenario.simulation
-    update = {"rtol": min(own.rtol, tolerance), "atol_scale": min(own.atol_scale, tolerance)}
+    update = {"rtol": min(own.rtol, _TIGHT), "atol_scale": min(own.atol_scale, _TIGHT)}
     return scenario.model_copy(update={"simulation": own.model_copy(update=update)})

@@ -23,7 +23,7 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.cvode import integrate_cvode
 from finger_pin.core.stepping.encounters import meetings
 from finger_pin.core.stepping.integrator import integrate_compiled
-from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
@@ -155,6 +155,10 @@ class Setup:
         """
         return _integrate(scenario or self.scenario, self.loop, self.method, watch, chunk, stop, steps)
 
+    def stepper(self) -> Stepper:
+        """Return what the compiled core steps, at the start."""
+        return _stepper(self.scenario, self.loop, self.method)
+
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
         """Return why a trajectory ended early, and what to try.
 
@@ -258,6 +262,19 @@ def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
     return quick_margin(scenario) if loop.finger.routing.force_closure().holds else None
 
 
+def _stepper(scenario: Scenario, loop: ClosedLoop, method: str) -> Stepper:
+    """Return what the compiled core steps, at the start."""
+    return build_stepper(
+        loop.finger,
+        compiled_control(loop) or sampled_control(loop),
+        loop.initial_state(),
+        loop.fingertip_force,
+        method=method,
+        rtol=scenario.simulation.rtol,
+        atol_scale=scenario.simulation.atol_scale,
+    )
+
+
 def _integrate(
     scenario: Scenario,
     loop: ClosedLoop,
@@ -270,15 +287,7 @@ def _integrate(
     settings, controller = scenario.simulation, loop.controller
     start, atol = loop.initial_state(), settings.atol_scale * loop.finger.layout.scales()
     if method in TABLEAUS and isinstance(loop.dynamics, CompiledFinger):
-        stepper = build_stepper(
-            loop.finger,
-            compiled_control(loop) or sampled_control(loop),
-            start,
-            loop.fingertip_force,
-            method=method,
-            rtol=settings.rtol,
-            atol_scale=settings.atol_scale,
-        )
+        stepper = _stepper(scenario, loop, method)
         if isinstance(loop.drives, PositionDrives):
             stepper.drive(loop.drives.compiled)
         knots = loop.knots(settings.rtol)

@@ -1,67 +1,122 @@
 """Sensitivities of a run: derivatives of what is recorded by the numbers that the run is given.
 
-A run whose steps are free is no smooth function of its numbers: a step more or less changes it by its tolerance. So the
-run is made once, then again for every number, changed a little, on the same steps (internal numerical differentiation:
-Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981). What comes out is the derivative
-of what the integrator has computed, through start, tables, controllers and outputs alike; rejected steps are not
-repeated, and the runs go on side by side. Where bodies touch and part, steps end at the touch, which moves with the
-numbers: there the runs are made on steps of their own, tight, with a larger change to either side.
+They obey a linear equation along the motion, which is solved on its own steps: S' = A S + E, where A is exact and E a
+difference of rates (`core.stepping.collocation`). Sampled controllers and loops of motors act in between, in Python or
+with a memory of their own, and some numbers give a mechanism more rows than it has: there the run is made again for
+every number, changed a little, on the same steps, which is the derivative of what the integrator has computed (internal
+numerical differentiation: Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from finger_pin.core.stepping.stepper import in_threads
+from finger_pin.core.stepping.integrator import joined
+from finger_pin.core.stepping.island_motion import IslandMotion
+from finger_pin.core.stepping.neighbours import NearbyMotion, differentiate, fits
+from finger_pin.core.stepping.stepper import Stepper, in_threads
+from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.run_arrays import RunArrays
+from finger_pin.simulation.running import Setup
 
-#: Loosest tolerances of a run that is differentiated, on common steps and on steps of its own.
-TIGHT, TIGHTER = 1e-8, 1e-9
-# Changes of a number, of its size: on common steps far above rounding; on others also far above the tolerances.
-_CHANGE, _LARGE = 1e-8, 1e-4
+#: Change of a number, of its size: far above rounding, far below where anything bends.
+CHANGE = 1e-7
 # A signal that changes so much more than its number does, both of their size, says nothing of the number any more.
 _LOST = 1e4
 
-Again = Callable[[Sequence[float]], RunArrays]
+_Made = TypeVar("_Made")
 
 
-def add_slopes(run: RunArrays, values: Sequence[float], again: Again, *, apart: bool) -> RunArrays:
+def changed(
+    values: Sequence[float], sizes: Sequence[float], make: Callable[[list[float]], _Made]
+) -> tuple[list[_Made], Array]:
+    """Return what is made of values with one of them changed each, and the changes.
+
+    At the edge of what is allowed a number is changed the other way.
+
+    Args:
+        values: p numbers.
+        sizes: Of what size they are.
+        make: What to make of values.
+
+    Raises:
+        InputError: If neither way is allowed.
+    """
+    found, changes = [], []
+    for k, (value, size) in enumerate(zip(values, sizes, strict=True)):
+        other = list(values)
+        try:
+            other[k] = value + CHANGE * size
+            made = make(other)
+        except InputError:
+            other[k] = value - CHANGE * size
+            made = make(other)
+        found.append(made)
+        changes.append(other[k] - value)
+    return found, np.array(changes)
+
+
+def nearby(setup: Setup, trajectory: Trajectory, others: Sequence[Setup], changes: Array) -> list[Trajectory]:
+    """Return the motions that changed numbers make of one, to first order.
+
+    Args:
+        setup: What has moved.
+        trajectory: How.
+        others: The same with one number changed each.
+        changes: By how much, shape (p,).
+    """
+    motions = [each for each in trajectory.islands if isinstance(each, IslandMotion)]
+    steppers = [each.stepper() for each in (setup, *others)] if motions else []
+    near = [k for k, each in enumerate(steppers[1:]) if fits(motions, each.parts)]
+    found: dict[int, Trajectory] = {}
+    if near:
+        chosen = [steppers[0], *(steppers[k + 1] for k in near)]
+        knots = [each.loop.knots(each.scenario.simulation.rtol) for each in (setup, *(others[k] for k in near))]
+        linear = _linear(motions, chosen, knots, changes[near])
+        for k, stepper, moved in zip(near, chosen[1:], linear, strict=False):
+            found[k] = replace(trajectory, interpolate=joined(stepper, moved), islands=())
+    steps = [each.times for each in motions] or [trajectory.breakpoints]
+
+    def again(k: int) -> Trajectory:
+        return found[k] if k in found else others[k].integrate(steps=steps)
+
+    return in_threads(again, range(len(others)))
+
+
+def _linear(
+    motions: Sequence[IslandMotion], steppers: Sequence[Stepper], knots: Sequence[Array], changes: Array
+) -> list[list[NearbyMotion]]:
+    """Return the motions of all islands with each number changed; none if a linear system is singular."""
+
+    def of(island: int) -> list[NearbyMotion]:
+        motion = motions[island]
+        derivative = differentiate(motion, [each.parts[island] for each in steppers], knots, changes)
+        if derivative is None:
+            return []
+        return [NearbyMotion(motion, derivative, k, float(change)) for k, change in enumerate(changes)]
+
+    by_island = in_threads(of, range(len(motions)))
+    return [list(each) for each in zip(*by_island, strict=True)] if all(by_island) else []
+
+
+def add_slopes(run: RunArrays, values: Sequence[float], moved: Sequence[RunArrays], changes: Array) -> RunArrays:
     """Put the derivatives of all variables into a run, as `RunArrays.slopes`, and return it.
 
     Args:
         run: What is to have them.
         values: Numbers that it was given.
-        again: Makes the run with other values.
-        apart: Whether on steps of their own.
+        moved: The run with each number changed.
+        changes: By how much.
     """
-
-    def moved(k: int, change: float) -> tuple[float, RunArrays]:
-        other = list(values)
-        other[k] += change * (abs(values[k]) or 1.0)
-        return other[k], again(other)
-
-    def slope(k: int) -> dict[str, Array]:
-        size, ends = _LARGE if apart else _CHANGE, []
-        for change in (size, -size):
-            try:
-                ends.append(moved(k, change))
-            except InputError:
-                # At the edge of what is allowed there is one side only.
-                continue
-            if len(ends) == 1 and not apart:
-                break
-        if len(ends) < 2:
-            ends.append((values[k], run))
-        (right, up), (left, down) = ends
-        return {name: (up[name] - down[name]) / (right - left) for name in run.variables}
-
-    found = in_threads(slope, range(len(values)))
     for name in run.variables:
-        run.slopes[name] = np.stack([each[name] for each in found]) if found else np.zeros((0, *run[name].shape))
+        parts = [(each[name] - run[name]) / change for each, change in zip(moved, changes, strict=True)]
+        run.slopes[name] = np.stack(parts) if parts else np.zeros((0, *run[name].shape))
     run.attrs["sensitivities_lost"] = _lost(run, np.abs(np.asarray(values, dtype=float)))
     return run
 

@@ -1,30 +1,95 @@
-"""Sensitivities of a run against differences of whole runs at tight tolerances."""
+"""Sensitivities of a run against differences of whole runs at tight tolerances, and against closed forms."""
 
 import numpy as np
 import pytest
 
 import finger_pin as fp
 
-KEYS = ["finger.tendon_friction.coulomb", "finger.joint_friction.viscous", "simulation.initial.position.medial"]
+VARIABLES = ("joint_position", "tendon_tension")
+FRICTION = ["finger.tendon_friction.coulomb", "finger.joint_friction.viscous", "simulation.initial.position.medial"]
+POSED = {"simulation.duration": 0.3, "simulation.initial.position.medial": 0.2}
+TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
 
 
-@pytest.mark.parametrize("name", ["fig6", "servo"])
-def test_sensitivities_are_the_differences_of_tight_runs(name):
-    given = {"simulation.duration": 0.3, "simulation.initial.position.medial": 0.2}
-    tight = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
-    prepared = fp.prepare(fp.load_scenario(name, given), KEYS)
-    exact = fp.prepare(fp.load_scenario(name, given | tight), KEYS)
+@pytest.mark.parametrize(
+    ("name", "entries", "keys", "variables", "bound"),
+    [
+        # Until 0.7 s another tension takes the lead in (22), twice.
+        ("fig6", POSED | {"simulation.duration": 0.7}, FRICTION, VARIABLES, 1e-3),
+        ("servo", POSED, FRICTION, VARIABLES, 3e-3),
+        # A pad that touches a plate, sticks and slips.
+        ("press", {"simulation.duration": 2.0}, ["environment.objects.plate.surface.friction"], VARIABLES, 1.5e-2),
+        # A free ball between two pads.
+        ("pinch", {"simulation.duration": 0.1}, ["environment.objects.ball.mass"], ("object_position",), 1e-2),
+    ],
+)
+def test_sensitivities_are_the_differences_of_tight_runs(name, entries, keys, variables, bound):
+    prepared = fp.prepare(fp.load_scenario(name, entries), keys, variables)
+    exact = fp.prepare(fp.load_scenario(name, entries | TIGHT), keys, variables)
     values = np.array(prepared.values, dtype=float)
     run = prepared.run(values, sensitivities=True)
     assert run.attrs["sensitivities_lost"] == np.inf
     for k, value in enumerate(values):
-        change = np.zeros(3)
-        change[k] = 1e-4 * value
+        change = np.where(np.arange(len(values)) == k, 1e-5 * value, 0.0)
         ends = [exact.run(values + way * change) for way in (1.0, -1.0)]
-        for variable in ("joint_position", "tendon_tension"):
-            expected = (ends[0][variable] - ends[1][variable]) / (2e-4 * value)
+        for variable in variables:
+            expected = (ends[0][variable] - ends[1][variable]) / (2e-5 * value)
             error = np.sqrt(np.mean((run.slopes[variable][k] - expected) ** 2))
-            assert error < 5e-3 * np.sqrt(np.mean(expected**2)), (variable, KEYS[k])
+            assert error < bound * np.sqrt(np.mean(expected**2)), (variable, keys[k])
+
+
+def test_a_later_jump_of_a_tension_is_the_same_motion_later():
+    # At rest until then nothing else knows the time: d theta / d t0 = -theta'.
+    jump = {"kind": "step", "time": 0.3, "height": 5.0}
+    scenario = fp.load_scenario("canal", {"controller.tensions.T1": jump, "simulation.duration": 0.8})
+    prepared = fp.prepare(scenario, ["controller.tensions.T1.time"], ["joint_position", "joint_velocity"])
+    run = prepared.run(sensitivities=True)
+    after = run.time > 0.31
+    np.testing.assert_allclose(
+        run.slopes["joint_position"][0][after], -run["joint_velocity"][after], atol=2e-4 * np.ptp(run["joint_velocity"])
+    )
+
+
+def test_a_drum_on_a_spring_has_the_derivatives_of_the_damped_oscillator():
+    # Its tendon is slack: I theta'' + c theta' + k theta = 0.
+    stiffness, damping = "finger.joints.drum.spring.stiffness", "finger.joint_friction.viscous"
+    entries = {
+        "controller.tensions.T1.height": 0.0,
+        "finger.tendon_friction.coulomb": 0.0,
+        "simulation.duration": 0.4,
+        "simulation.initial.position.drum": 0.5,
+    }
+    scenario = fp.load_scenario("canal", entries)
+    keys = [stiffness, damping, "simulation.initial.position.drum"]
+    run = fp.prepare(scenario, keys, ["joint_position"]).run(sensitivities=True)
+    link = scenario.finger.joints["drum"].link
+    body = fp.Finger(scenario.finger).rigid_body.model.inertias[1]
+    inertia = body.inertia[2, 2] + body.mass * body.lever @ body.lever
+    assert link.mass == body.mass
+
+    def swing(k, c, start):
+        rate = np.sqrt(k / inertia - (c / (2.0 * inertia)) ** 2)
+        fading = c / (2.0 * inertia)
+        return start * np.exp(-fading * run.time) * (np.cos(rate * run.time) + fading / rate * np.sin(rate * run.time))
+
+    own = np.array([scenario.finger.joints["drum"].spring.stiffness, scenario.finger.joint_friction.viscous, 0.5])
+    np.testing.assert_allclose(run["joint_position"][:, 0], swing(*own), atol=1e-4)
+    for k in range(3):
+        change = 1e-20j * (np.arange(3) == k)
+        expected = swing(*(own + change)).imag / 1e-20
+        error = run.slopes["joint_position"][k][:, 0] - expected
+        assert np.max(np.abs(error)) < 1e-3 * np.max(np.abs(expected)), keys[k]
+
+
+def test_of_a_sampled_controller_they_are_the_differences_of_tight_runs_too():
+    entries = {"simulation.duration": 0.1, "controller.sampling.period": 0.005}
+    keys = ["controller.gain"]
+    run = fp.prepare(fp.load_scenario("fig6", entries), keys).run(sensitivities=True)
+    exact = fp.prepare(fp.load_scenario("fig6", entries | TIGHT), keys)
+    up, down = exact.run([1.0 + 1e-5]), exact.run([1.0 - 1e-5])
+    expected = (up["joint_position"] - down["joint_position"]) / 2e-5
+    error = run.slopes["joint_position"][0] - expected
+    assert np.max(np.abs(error)) < 1e-2 * np.max(np.abs(expected))
 
 
 def test_what_has_no_slope_is_refused():

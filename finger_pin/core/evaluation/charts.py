@@ -64,7 +64,7 @@ def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
         i = tables.charts[f]
         a, b, c = x[i], x[i + 1], x[i + 2]
         da, db, dc = x[width + i], x[width + i + 1], x[width + i + 2]
-        _turn_drift(a, b, c, da, db, dc, drift[i : i + 3], drift[width + i : width + i + 3])
+        turn_small(a, b, c, da, db, dc, drift[i : i + 3], drift[width + i : width + i + 3])
         x[width + i] = da * np.cos(b) * np.cos(c) + db * np.sin(c)
         x[width + i + 1] = db * np.cos(c) - da * np.cos(b) * np.sin(c)
         x[width + i + 2] = da * np.sin(b) + dc
@@ -80,7 +80,7 @@ def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
 
 
 @compiled
-def _turn_drift(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Any, rates: Any) -> None:
+def turn_small(a: float, b: float, c: float, da: float, db: float, dc: float, angles: Any, rates: Any) -> None:
     """Replace small changes of angles and rates by those of the angles that begin anew, and of their rates."""
     sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
     # The angular velocity (x, y), as in `rechart`, and how it changes.

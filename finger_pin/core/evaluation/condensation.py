@@ -128,7 +128,7 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
 
 
 @compiled
-def _factorise(matrix: Any, size: int, pivots: Any) -> bool:
+def factorise(matrix: Any, size: int, pivots: Any) -> bool:
     """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
     for c in range(size):
         best = c
@@ -150,7 +150,7 @@ def _factorise(matrix: Any, size: int, pivots: Any) -> bool:
 
 
 @compiled
-def _substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
+def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
     """Replace right-hand sides, one a column, by solutions."""
     for r in range(size):
         best = pivots[r]
@@ -214,9 +214,9 @@ def _condense_block(model: Any, address: int, g: float, b: int) -> bool:
                 velocity[i, c] = 0.0
             reduced[i, i], velocity[i, width + i] = g, 1.0
             velocity[i, wide - 1] = model.work.guide_rate[model.tables.guided[at_row]]
-    if not _factorise(reduced, width, linear.pivots):
+    if not factorise(reduced, width, linear.pivots):
         return False
-    _substitute(reduced, width, linear.pivots, velocity, wide)
+    substitute(reduced, width, linear.pivots, velocity, wide)
     solution = linear.solution
     for i in range(width):
         position, moving = solution[places[i]], solution[whole + places[i]]

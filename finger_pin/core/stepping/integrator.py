@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -32,6 +32,13 @@ class Held(Protocol):
 
     def act(self, x: Array) -> Array:
         """Return the tensions from this instant on, shape (a,), at the packed state."""
+
+
+class Moving(Protocol):
+    """The motion of an island."""
+
+    def interpolate(self, at: Array) -> tuple[Array, Array]:
+        """Return states at times, shape (m, size), and the quaternions from which angles count, shape (m, f, 4)."""
 
 
 class _Recorder:
@@ -131,7 +138,7 @@ def integrate_compiled(
     ends = np.unique(np.concatenate([each.times for each in steps]))
     return Trajectory(
         breakpoints=ends[ends <= stepper.time],
-        interpolate=_states(stepper, steps),
+        interpolate=joined(stepper, steps),
         statistics=Statistics(
             steps=sum(recorder.taken for recorder in recorders),
             evaluations=int(sum(memory[core.EVALUATIONS] for memory in memories)),
@@ -148,12 +155,12 @@ def integrate_compiled(
     )
 
 
-def _states(stepper: Stepper, steps: list[IslandMotion]) -> Callable[[Array], Array]:
+def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:
     """Return what maps times to packed states, from the steps of all islands."""
 
     def interpolate(at: Array) -> Array:
         found = [each.interpolate(at) for each in steps]
-        if len(steps) == 1 and not len(steps[0].attitude):
+        if len(steps) == 1 and not found[0][1].size:
             return found[0][0]
         return stepper.joined([state for state, _ in found], [attitude for _, attitude in found])
 

@@ -69,7 +69,7 @@ def interpolate_many(address: int, _time: float) -> int:
     """Fill the states of a `Between` at an address; there must be a step."""
     b = bound_at(address, BETWEEN)
     ends, states, found, before, last = b.ends, b.states, b.found, b.before, b.ends.size - 1
-    step, known, rows = 0, -1, b.dense.shape[1]
+    step, known = 0, -1
     for k in range(b.times.size):
         at = b.times[k]
         while step > 0 and at < ends[step - 1]:
@@ -82,13 +82,8 @@ def interpolate_many(address: int, _time: float) -> int:
             for c in range(before.size):
                 before[c] = b.start[c] if step == 0 else states[step - 1, c]
             if step > 0:
-                _begin_anew(b.charts, b.width, before)
-        s = (at - begin) / (ends[step] - begin)
-        for c in range(before.size):
-            bend = b.dense[step, rows - 1, c]
-            for row in range(rows - 2, -1, -1):
-                bend = b.dense[step, row, c] + s * bend
-            found[k, c] = (1.0 - s) * before[c] + s * (states[step, c] + (1.0 - s) * bend)
+                begin_anew(b.charts, b.width, before)
+        between(before, states[step], b.dense[step], (at - begin) / (ends[step] - begin), found[k])
         for f in range(b.charts.size):
             for c in range(4):
                 b.turned[k, f, c] = b.attitude[f, c] if step == 0 else b.attitudes[step - 1, f, c]
@@ -96,7 +91,18 @@ def interpolate_many(address: int, _time: float) -> int:
 
 
 @compiled
-def _begin_anew(charts: Any, width: int, x: Any) -> None:
+def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None:
+    """Fill the state after a share of a step, from the states at its ends and its row of ``dense``."""
+    last = dense.shape[0] - 1
+    for c in range(before.size):
+        bend = dense[last, c]
+        for row in range(last - 1, -1, -1):
+            bend = dense[row, c] + share * bend
+        out[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
+
+
+@compiled
+def begin_anew(charts: Any, width: int, x: Any) -> None:
     """Let the angles of free bodies begin anew, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):
         i = charts[f]

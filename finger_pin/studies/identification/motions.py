@@ -18,7 +18,8 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
-from finger_pin.simulation.running import Setup, Steps
+from finger_pin.simulation.running import Setup
+from finger_pin.simulation.sensitivity import changed, nearby
 from finger_pin.simulation.variables import coordinates
 from finger_pin.studies.identification.problem import At, Own, own_number
 from finger_pin.studies.identification.recordings import Recording
@@ -33,9 +34,7 @@ _INPUTS = {
 _NEAR = 0.3
 # Samples at a window's start that its position and velocity are read from.
 _FIRST = 9
-# Change of a number that slopes are taken by, of its size or its range; the same steps are taken again.
-_CHANGE = 1e-7
-# Where slopes so taken are wilder than so many ranges of the signal, a larger change and steps of their own serve.
+# Where slopes are wilder than so many ranges of the signal, a larger change and steps of their own serve.
 _WILD, _COARSE = 30.0, 1e-3
 
 
@@ -67,12 +66,12 @@ class RecordedMotion:
         table["simulation"]["start_time"] = scenario.simulation.start_time + first
         self._put_start(table, scenario, window)
         self.scenario = read_scenario(table)
-        self._last: tuple[Any, list[Array], Steps | None] | None = None
+        self._last: tuple[Any, list[Array], tuple[Setup, Trajectory] | None] | None = None
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return what the scenario does at the recorded times, shape (m,) for each output; not a number if it fails."""
-        computed, steps = self._run(scenario, own)
-        self._last = ((scenario, dict(own)), computed, steps)
+        computed, motion = self._made(scenario, own)
+        self._last = ((scenario, dict(own)), computed, motion)
         return computed
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
@@ -84,65 +83,64 @@ class RecordedMotion:
             sizes: How large changes of the values are, shape (p,).
         """
         here = at(values)
-        if self._last is None or self._last[0] != here or self._last[2] is None:
+        if self._last is None or self._last[0] != here:
             self.compute(*here)
         assert self._last is not None
-        steps = self._last[2]
-        if steps is None:
+        _, computed, motion = self._last
+        if motion is None:
             return [np.zeros((len(self.rows), len(values))) for _ in self.recording.outputs]
-        base, _ = self._run(*here, steps)
-        free = self._last[1]
-        ranges = [float(np.ptp(each)) for each in free]
-
-        def changed(k: int, part: float, on: Steps | None, from_: list[Array]) -> list[Array]:
-            moved, change = values.copy(), part * float(sizes[k])
-            moved[k] += change
-            try:
-                there = at(moved)
-            except InputError:
-                moved[k] -= 2.0 * change
-                there = at(moved)
-            if there == here:
-                return [np.zeros(len(each)) for each in from_]
-            found, _ = self._run(*there, on)
-            return [(f - b) / (moved[k] - values[k]) for f, b in zip(found, from_, strict=True)]
+        there, changes = changed(values.tolist(), sizes.tolist(), lambda moved: at(np.array(moved)))
+        feeling = [
+            k for k, (scenario, own) in enumerate(there) if self._with_start(scenario, own) != motion[0].scenario
+        ]
+        others = {k: Setup.of(self._with_start(*there[k])) for k in feeling}
+        near = dict(zip(feeling, nearby(*motion, list(others.values()), changes[feeling]), strict=True))
+        ranges = [float(np.ptp(each)) for each in computed]
 
         def column(k: int) -> list[Array]:
-            found = changed(k, _CHANGE, steps, base)
+            if there[k] == here:
+                return [np.zeros(len(each)) for each in computed]
+            found = self._outputs(others.get(k, motion[0]), near.get(k, motion[1]), there[k][1])
+            slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
             wild = any(
                 not np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size
-                for each, size in zip(found, ranges, strict=True)
+                for each, size in zip(slopes, ranges, strict=True)
             )
             if wild:
                 # Of a motion that hunts, what counts is the mean trend.
-                found = changed(k, _COARSE, None, free)
-            return [np.nan_to_num(each, nan=0.0) for each in found]
+                moved = values.copy()
+                moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
+                found = self._made(*at(moved))[0]
+                slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
+            return [np.nan_to_num(each, nan=0.0) for each in slopes]
 
         columns = in_threads(column, range(len(values)))
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def _run(
-        self, scenario: Scenario, own: Mapping[str, float], steps: Steps | None = None
-    ) -> tuple[list[Array], Steps | None]:
+    def _with_start(self, scenario: Scenario, own: Mapping[str, float]) -> Scenario:
+        """Return a scenario with the starts of joints that are being found."""
         starts = {key.rpartition(".")[2]: value for key, value in own.items() if key in {o.key for o in self.own}}
-        if starts:
-            initial = scenario.simulation.initial
-            assert initial is not None
-            moved = initial.model_copy(update={"position": {**initial.position, **starts}})
-            scenario = scenario.model_copy(
-                update={"simulation": scenario.simulation.model_copy(update={"initial": moved})}
-            )
+        if not starts:
+            return scenario
+        initial = scenario.simulation.initial
+        assert initial is not None
+        moved = initial.model_copy(update={"position": {**initial.position, **starts}})
+        settings = scenario.simulation.model_copy(update={"initial": moved})
+        return scenario.model_copy(update={"simulation": settings})
+
+    def _made(
+        self, scenario: Scenario, own: Mapping[str, float]
+    ) -> tuple[list[Array], tuple[Setup, Trajectory] | None]:
+        """Return the outputs, not numbers if the motion fails, and the motion."""
         try:
-            setup = Setup.of(scenario)
-            trajectory = setup.integrate(steps=steps)
+            setup = Setup.of(self._with_start(scenario, own))
+            trajectory = setup.integrate()
             failed = bool(trajectory.failure)
         except IntegrationError:
             failed = True
         if failed:
             return [np.full(len(self.rows), np.nan) for _ in self.recording.outputs], None
-        found = self._outputs(setup, trajectory, own)
-        ends = [each.times for each in trajectory.islands] or [trajectory.breakpoints]
-        return found, ends
+        return self._outputs(setup, trajectory, own), (setup, trajectory)
 
     def _outputs(self, setup: Setup, trajectory: Trajectory, own: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, with their own offsets, scales and delays."""

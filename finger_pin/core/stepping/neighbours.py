@@ -1,0 +1,209 @@
+"""Motions near one that is known: what it would be with other numbers, to first order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.evaluation.law_code import SPEED
+from finger_pin.core.jit import call
+from finger_pin.core.stepping.collocation import (
+    COLLOCATION,
+    MEMORY_SIZE,
+    SINGULAR,
+    TIME,
+    Collocation,
+    collocate,
+)
+from finger_pin.core.stepping.interpolation import Between
+from finger_pin.core.stepping.island_motion import IslandMotion
+from finger_pin.core.stepping.island_stepper import Part
+from finger_pin.core.stepping.radau import NODES, WEIGHTS
+from finger_pin.core.tables import END, FIRST, KINK, Tables
+from finger_pin.description.routing import Array
+
+# Intervals that are filled at a time.
+_ROOM = 256
+# A step that ends at a knot ends so much before it, of the time.
+_BEFORE = 1.0 - 2.0**-53
+# Weights of the values at the begin and the nodes of an interval in powers of the share: the polynomial through them.
+_POLYNOMIAL = np.linalg.inv(np.vander(np.array([0.0, *NODES]), increasing=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Derivative:
+    """S of an island over time, by p numbers.
+
+    Attributes:
+        ends: Ends of the intervals, shape (m,), s.
+        begins: Their begins, shape (m,), s.
+        solution: S at the begin and the nodes of each, shape (m, 4, n, p).
+    """
+
+    ends: Array
+    begins: Array
+    solution: Array
+
+    def at(self, times: Array, k: int) -> Array:
+        """Return S of a number, shape (t, n)."""
+        place = np.clip(np.searchsorted(self.ends, times, side="right"), 0, len(self.ends) - 1)
+        share = (times - self.begins[place]) / (self.ends[place] - self.begins[place])
+        weights = np.vander(np.clip(share, 0.0, 1.0), 4, increasing=True) @ _POLYNOMIAL
+        found: Array = np.einsum("tj,tjn->tn", weights, self.solution[place, :, :, k])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class NearbyMotion:
+    """The motion of an island with one number changed.
+
+    Attributes:
+        motion: The motion without.
+        derivative: S.
+        number: Which.
+        change: By how much.
+    """
+
+    motion: IslandMotion
+    derivative: Derivative
+    number: int
+    change: float
+
+    def interpolate(self, at: Array) -> tuple[Array, Array]:
+        """Return states at times and the quaternions from which angles count, as the motion does."""
+        states, attitudes = self.motion.interpolate(at)
+        return states + self.change * self.derivative.at(np.asarray(at, dtype=float), self.number), attitudes
+
+
+def fits(motions: Sequence[IslandMotion], parts: Sequence[Part]) -> bool:
+    """Return whether a mechanism that starts anew has the same islands, rows and states as motions have."""
+    return len(motions) == len(parts) and all(
+        len(each.start) == len(part.x) and np.array_equal(each.part.tables.groups[:, :2], part.tables.groups[:, :2])
+        for each, part in zip(motions, parts, strict=True)
+    )
+
+
+def differentiate(
+    motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array
+) -> Derivative | None:
+    """Return the derivatives of an island's motion by numbers; None where its linear systems are singular.
+
+    Args:
+        motion: The motion.
+        parts: The island where it starts, then the same with one number changed each.
+        knots: Of each of these, when inputs bend or jump, s.
+        changes: By how much each number is changed, shape (p,).
+    """
+    own, others = parts[0], parts[1:]
+    record, size, count = motion.record, len(motion.start), len(others)
+    rows, columns, held = _bends(own.tables)
+    bends = len(rows) + len(own.control.level)
+    corners, shifts = _corners(record.times, knots[0], knots[1:], changes)
+    width = len(own.tables.parents) + len(own.tables.lumps)
+    felt = [not (_alike(own.tables, each.tables) and _alike(own.control, each.control)) for each in others]
+    memory = np.zeros(MEMORY_SIZE)
+    memory[TIME] = motion.begin
+    begins, ends, solutions = [motion.begin], [np.zeros(0)], [np.zeros((0, 4, size, count))]
+    room = (np.zeros(_ROOM), np.zeros((4 * _ROOM, size, count)))
+    collocation = Collocation(
+        model=own.model.address,
+        changed=np.array(
+            [each.model.address if f else 0 for each, f in zip(others, felt, strict=True)], dtype=np.int64
+        ),
+        changes=np.array(changes, dtype=float),
+        motion=Between(
+            begin=motion.begin,
+            start=motion.start,
+            attitude=motion.attitude,
+            ends=record.times,
+            states=record.states,
+            attitudes=record.attitudes,
+            dense=record.dense,
+            charts=own.tables.charts,
+            width=width,
+            before=np.zeros(size),
+            times=np.zeros(0),
+            found=np.zeros((0, size)),
+            turned=np.zeros((0, *motion.attitude.shape)),
+        ),
+        corners=corners,
+        shifts=shifts,
+        rows=rows,
+        columns=columns,
+        held=held,
+        leaders=np.zeros(len(own.control.level), dtype=np.int64),
+        weights=WEIGHTS,
+        nodes=NODES,
+        memory=memory,
+        sides=np.zeros(bends),
+        before=np.zeros(bends),
+        between=np.zeros(bends),
+        after=np.zeros(bends),
+        derivative=_start(motion, others, changes, width),
+        state=np.zeros(size),
+        right=np.zeros(size + 1),
+        part=np.zeros(size),
+        resolvents=np.zeros((3, size, size)),
+        given=np.zeros((3, size, count)),
+        square=np.zeros((2, size, size)),
+        wide=np.zeros((2, size, size + count)),
+        pivots=np.zeros(size, dtype=np.int64),
+        ends=room[0],
+        solution=room[1],
+    )
+    while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
+        ends.append(room[0][:taken].copy())
+        solutions.append(room[1][: 4 * taken].reshape(taken, 4, size, count).copy())
+        if taken < _ROOM:
+            found = np.concatenate(ends)
+            return Derivative(found, np.concatenate([begins, found[:-1]]), np.concatenate(solutions))
+    return None
+
+
+def _start(motion: IslandMotion, others: Sequence[Part], changes: Array, width: int) -> Array:
+    """Return S at the start, shape (n, p)."""
+    found = np.stack([(each.x - motion.start) / change for each, change in zip(others, changes, strict=True)], axis=1)
+    for k, (other, change) in enumerate(zip(others, changes, strict=True)):
+        for f, first in enumerate(other.tables.charts):
+            # Half of a small turn q^-1 q' about the body's axes is its vector part.
+            vector, scalar = motion.attitude[f, :3], motion.attitude[f, 3]
+            moved, rest = other.attitude[f, :3], other.attitude[f, 3]
+            turn = scalar * moved - rest * vector - np.cross(vector, moved)
+            found[first : first + 3, k] = 2.0 * np.sign(scalar * rest + vector @ moved) * turn / change
+    return np.ascontiguousarray(found)
+
+
+def _bends(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows at which laws bend, what changes its sign there, and whether rows can be held on a side."""
+    count = len(tables.state)
+    kink = np.full(count, -1)
+    for group in tables.groups:
+        kink[group[FIRST] : group[END]] = group[KINK]
+    # Law (9) bends where sliding turns round.
+    rubbing = (tables.state >= 0) & (kink < 0)
+    rows = np.flatnonzero((kink >= 0) | rubbing)
+    return rows, np.where(kink[rows] >= 0, kink[rows], SPEED), (kink[rows] >= 0).astype(np.int64)
+
+
+def _corners(ends: Array, knots: Array, others: Sequence[Array], changes: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return at which steps inputs bend or jump, one more than the row of the shifts, and how these move, s."""
+    corners = np.zeros(len(ends), dtype=np.int64)
+    at = np.flatnonzero(np.isin(ends, knots * _BEFORE))
+    corners[at] = 1 + np.arange(len(at))
+    which = np.searchsorted(knots * _BEFORE, ends[at])
+    shifts = [
+        (other[which] - knots[which]) / change if len(other) == len(knots) else np.zeros(len(at))
+        for other, change in zip(others, changes, strict=True)
+    ]
+    return corners, np.ascontiguousarray(np.stack(shifts, axis=1))
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Return whether two tables have the same numbers."""
+    if hasattr(one, "_fields"):
+        return all(_alike(a, b) for a, b in zip(one, other, strict=True))
+    return bool(np.array_equal(one, other))
