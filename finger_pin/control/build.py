@@ -15,9 +15,10 @@ from finger_pin.control.distribution import Distribution, PseudoInverse
 from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.hand import joined_controller
 from finger_pin.control.joint_compensation import JointCompensation
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
-from finger_pin.control.proportional import Controller, ProportionalController
+from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.routed import RoutedController
 from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward
@@ -30,7 +31,7 @@ from finger_pin.exceptions import ClosureWarning, InputError
 from finger_pin.mechanism.finger import Finger
 
 
-def build_controller(scenario: Scenario, finger: Finger | None = None) -> Controller:
+def build_controller(scenario: Scenario, finger: Finger | None = None) -> LoopController:
     """Return the controller that a scenario describes.
 
     Tensions in open loop, or the paper's, unless an entry asks for more; then a `CompensatedController`, inside a

@@ -7,15 +7,12 @@ from typing import Protocol
 
 import numpy as np
 
-from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.hand import HandController
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.moved_objects import Guides
-from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.palm import PalmPath
-from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.position_drive import DriveSignals
-from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
-from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
+from finger_pin.control.proportional import Controller, ControlSignals
+from finger_pin.control.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.control.signal import Signal
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -83,8 +80,8 @@ class ClosedLoop:
     """
 
     finger: Finger
-    controller: Controller
-    reference: Reference
+    controller: LoopController
+    reference: LoopReference
     fingertip_force: Array
     dynamics: Dynamics
     varying_force: Signal | None = None
@@ -154,7 +151,7 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
-        controller, tension = _remembering_nothing(self.controller), None
+        controller, tension = self.controller.without_memory(), None
         if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
@@ -186,12 +183,9 @@ class ClosedLoop:
 
     def knots(self, tolerance: float) -> Array:
         """Return the times at which a signal bends or jumps by more than a relative tolerance, s, in order."""
-        owners = (self.reference, self.controller)
-        signals = [each.signal for each in owners if isinstance(each, SignalReference | OpenLoopTensions)]
-        if isinstance(self.controller, CompensatedController) and self.controller.fingertip is not None:
-            signals.append(self.controller.fingertip.wanted)
         guided = [each and each.signal for each in (self.palm, self.guides)]
-        signals += [each for each in (self.varying_force, *guided) if each]
+        other = [each for each in (self.varying_force, *guided) if each]
+        signals = (*self.reference.signals(), *self.controller.signals(), *other)
         return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
     def longest_step(self, tolerance: float) -> float:
@@ -249,16 +243,3 @@ class ClosedLoop:
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
-
-
-def _remembering_nothing(controller: Controller) -> Controller | None:
-    """Return a controller that may be asked for the start beforehand, as it will answer alike later; None without."""
-    if isinstance(controller, ProportionalController | CompensatedController | OpenLoopTensions):
-        return controller
-    if isinstance(controller, PassiveTensionLoop):
-        return controller.controller
-    if isinstance(controller, HandController):
-        own = [_remembering_nothing(each) for each in controller.controllers]
-        known = [each for each in own if each is not None]
-        return HandController(known, controller.routing) if len(known) == len(own) else None
-    return None

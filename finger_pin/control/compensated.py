@@ -9,8 +9,10 @@ import numpy as np
 from finger_pin.control.distribution import Distribution, Plan
 from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.joint_compensation import JointCompensation
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
+from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward, undivided
 from finger_pin.control.torque import TorqueLaw
 from finger_pin.description.routing import Array, Routing
@@ -20,7 +22,7 @@ _SETTLED, _NEWTON, _TURNS = 1e-9, 20, 200
 
 
 @dataclass(frozen=True, eq=False)
-class CompensatedController:
+class CompensatedController(LoopController):
     """A controller with the interface of the paper's, and any of the compensations.
 
     The torque that the tendons have to exert is tau = tau^d + tau^f(f_hat): friction of the joints grows with the
@@ -50,6 +52,14 @@ class CompensatedController:
     ) -> ControlSignals:
         """Return the torque that is asked of the tendons and the commands, for shapes (..., n)."""
         return self.command_above(self.minimum, time, reference, position, velocity)
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return what the fingertip is to exert."""
+        return () if self.fingertip is None else (self.fingertip.wanted,)
+
+    def without_memory(self) -> CompensatedController:
+        """Return itself: it remembers nothing."""
+        return self
 
     def command_above(
         self, minimum: Array, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import SignalReference
 from finger_pin.control.signal import Signal
-from finger_pin.core.control import Control, held_control, planned_control, scheduled_control
+from finger_pin.core.control import Control, held_control
 from finger_pin.core.evaluation import time_functions as signal_core
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+
+if TYPE_CHECKING:
+    from finger_pin.control.closed_loop import ClosedLoop
 
 
 def build_stepper(
@@ -43,18 +44,10 @@ def build_stepper(
 
 def compiled_control(loop: ClosedLoop) -> Control | None:
     """Return a loop's controller, reference and varying force as arrays, or None where the first two are Python."""
-    controller, reference, mechanism = loop.controller, loop.reference, loop.finger.mechanism
-    control = None
-    if len(loop.finger.actuators.positioned) == mechanism.channels:
+    if len(loop.finger.actuators.positioned) == loop.finger.mechanism.channels:
         # Nothing of what the controller plans goes to the finger at once.
-        control = held_control(mechanism.channels, mechanism.coordinates)
-    elif isinstance(controller, OpenLoopTensions):
-        schedule = core_signal(controller.signal)
-        schedule.harmonics[loop.finger.actuators.positioned] = 0.0
-        schedule.coefficients[..., loop.finger.actuators.positioned] = 0.0
-        control = scheduled_control(schedule, mechanism.coordinates)
-    elif isinstance(controller, ProportionalController) and isinstance(reference, SignalReference):
-        control = paper_control(controller, reference, loop.finger)
+        return sampled_control(loop)
+    control = loop.controller.as_control(loop.reference, loop.finger)
     return None if control is None else with_force(control, loop)
 
 
@@ -62,35 +55,6 @@ def sampled_control(loop: ClosedLoop) -> Control:
     """Return inputs that hold what a sampled controller says, with the loop's varying force."""
     mechanism = loop.finger.mechanism
     return with_force(held_control(mechanism.channels, mechanism.coordinates), loop)
-
-
-def paper_control(controller: ProportionalController, reference: SignalReference, finger: Finger) -> Control:
-    """Return controller and reference as inputs of a finger's mechanism, whose coordinates begin with the joints.
-
-    What it plans for tendons that motors in position drive pull is no input.
-    """
-    routing, mechanism = finger.routing, finger.mechanism
-    tendons = np.arange(len(routing.tendons))
-    further = mechanism.coordinates - len(routing.joints)
-    positioned = np.isin(tendons, finger.actuators.positioned)
-
-    def padded(values: Array) -> Array:
-        return np.concatenate([values, np.zeros((*values.shape[:-1], further))], axis=-1)
-
-    matrix = reference.coupling.matrix
-    return planned_control(
-        mechanism.channels,
-        gain=padded(controller.gain),
-        minimum=controller.minimum,
-        inverse=padded(controller.inverse),
-        internal=controller.internal,
-        channel=np.where((tendons < routing.actuated) & ~positioned, tendons, -1),
-        reference=core_signal(reference.signal),
-        coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
-        offset=padded(reference.coupling.offset),
-        damping=padded(controller.damping),
-        loop=controller.loop,
-    )
 
 
 def with_force(control: Control, loop: ClosedLoop) -> Control:

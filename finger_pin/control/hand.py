@@ -6,42 +6,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from finger_pin.control.measurement import MeasuringController
-from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
+from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array, Routing
 
 
-def joined_controller(controllers: Sequence[Controller], routing: Routing) -> Controller:
+def joined_controller(controllers: Sequence[LoopController], routing: Routing) -> LoopController:
     """Return the controller of a hand from those of its fingers, in the order of the routing's.
 
-    Where all are the paper's, or all give tensions in open loop, so does the whole, and is compiled like them.
+    Where all are of a kind that can be joined, such as the paper's, so is the whole, and is compiled like them.
     """
-    paper = [each for each in controllers if isinstance(each, ProportionalController)]
-    if len(paper) == len(controllers):
-        return _joined_paper(paper, routing)
-    schedules = [each for each in controllers if isinstance(each, OpenLoopTensions)]
-    if len(schedules) == len(controllers):
-        return OpenLoopTensions(Signal.joined([each.signal for each in schedules]), routing)
-    if any(isinstance(each, MeasuringController) for each in controllers):
-        return MeasuringHandController(controllers, routing)
-    return HandController(controllers, routing)
+    kind, *others = {type(each) for each in controllers}
+    joined = None if others else kind.joined(controllers, routing)
+    return joined or HandController(controllers, routing)
 
 
-def _joined_paper(controllers: Sequence[ProportionalController], routing: Routing) -> ProportionalController:
-    tendons, joints = len(routing.tendons), len(routing.joints)
-    gain, damping, minimum, internal = np.zeros(joints), np.zeros(joints), np.zeros(tendons), np.zeros(tendons)
-    inverse, loop = np.zeros((tendons, joints)), np.zeros(tendons, dtype=np.int64)
-    for index, (each, (turned, pulled)) in enumerate(zip(controllers, routing.fingers, strict=True)):
-        gain[turned], damping[turned] = each.gain, each.damping
-        minimum[pulled], internal[pulled] = each.minimum, each.internal
-        inverse[np.ix_(pulled, turned)], loop[pulled] = each.inverse, index
-    return ProportionalController(gain, minimum, inverse, internal, damping, loop)
-
-
-class HandController:
+class HandController(LoopController):
     """Controllers of any kind, one for each finger.
 
     Attributes:
@@ -49,9 +31,10 @@ class HandController:
         routing: Of the hand.
     """
 
-    def __init__(self, controllers: Sequence[Controller], routing: Routing) -> None:
+    def __init__(self, controllers: Sequence[LoopController], routing: Routing) -> None:
         """Put controllers side by side."""
         self.controllers, self.routing = tuple(controllers), routing
+        self.measures = any(each.measures for each in controllers)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
@@ -69,12 +52,17 @@ class HandController:
                 shortfall[..., joints] = own.shortfall
         return ControlSignals(torque, tension, shortfall if limited else None)
 
-
-class MeasuringHandController(HandController, MeasuringController):
-    """The same where some listen to tension sensors."""
-
     def sense(self, tension: Array, elapsed: float) -> None:
-        """Pass delivered tensions, shape (t,), N, on to those that listen, with the time since the last ones, s."""
+        """Pass delivered tensions, shape (t,), N, on to all, with the time since the last ones, s."""
         for controller, (_, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
-            if isinstance(controller, MeasuringController):
-                controller.sense(tension[tendons], elapsed)
+            controller.sense(tension[tendons], elapsed)
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return what any of them follows."""
+        return tuple(signal for each in self.controllers for signal in each.signals())
+
+    def without_memory(self) -> HandController | None:
+        """Return those that remember nothing side by side, if there is one of each."""
+        own = [each.without_memory() for each in self.controllers]
+        known = [each for each in own if each is not None]
+        return HandController(known, self.routing) if len(known) == len(own) else None

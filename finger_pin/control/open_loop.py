@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.control.compiled import core_signal
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
+from finger_pin.control.reference import LoopReference, ReferenceSignals
 from finger_pin.control.signal import Signal
+from finger_pin.core.control import Control, scheduled_control
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import ForceSignal, InputSignal, SignalSettings
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False)
-class OpenLoopTensions:
+class OpenLoopTensions(LoopController):
     """f^a over time.
 
     The torque that goes with it is what it would exert free of friction; passive tensions are planned to be zero.
@@ -76,6 +81,26 @@ class OpenLoopTensions:
             np.concatenate([pulled, planned], axis=-1),
             inputs=given[..., actuated:],
         )
+
+    def as_control(self, reference: LoopReference, finger: Finger) -> Control:
+        """Return the schedule as inputs, but for motors in position drive, which pull as their loops say."""
+        schedule, positioned = core_signal(self.signal), finger.actuators.positioned
+        schedule.harmonics[positioned] = 0.0
+        schedule.coefficients[..., positioned] = 0.0
+        return scheduled_control(schedule, finger.mechanism.coordinates)
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return the schedule."""
+        return (self.signal,)
+
+    def without_memory(self) -> OpenLoopTensions:
+        """Return itself: it remembers nothing."""
+        return self
+
+    @classmethod
+    def joined(cls, controllers: Sequence[OpenLoopTensions], routing: Routing) -> OpenLoopTensions:
+        """Return the schedule of a hand from those of its fingers."""
+        return cls(Signal.joined([each.signal for each in controllers]), routing)
 
 
 def _actuators(scenario: Scenario) -> tuple[str, ...]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.measurement import MeasuringController
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array
 
 
-class PassiveTensionLoop(MeasuringController):
+class PassiveTensionLoop(LoopController):
     """Raises or lowers the internal tension until the passive tendons carry what is desired.
 
     A passive tendon cannot be commanded; (20) only chooses an angle of the follower joint at which, free of friction
@@ -32,6 +32,8 @@ class PassiveTensionLoop(MeasuringController):
         correction: k_P e + I at present, shape (p,), N.
     """
 
+    measures = True
+
     def __init__(
         self, controller: CompensatedController, wish: Array, proportional: float, integral: float, limit: float
     ) -> None:
@@ -50,6 +52,10 @@ class PassiveTensionLoop(MeasuringController):
         lowest = np.clip(self.controller.minimum[actuated:] - self.wish, -self.limit, 0.0)
         self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)
         self.correction = self.proportional * error + self._sum
+
+    def without_memory(self) -> CompensatedController:
+        """Return the controller inside, without the correction."""
+        return self.controller
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

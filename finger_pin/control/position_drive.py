@@ -34,6 +34,10 @@ class DriveSignals(Protocol):
 
     channels: NDArray[np.int64]
 
+    @property
+    def compiled(self) -> Drives | None:
+        """The loops as arrays that work the voltages out; None where these are given."""
+
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return what is asked for."""
 
@@ -52,6 +56,7 @@ class GivenVoltages:
 
     channels: NDArray[np.int64]
     signal: Signal
+    compiled: None = None
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return what is asked for."""

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.control.reference import ReferenceSignals
+from finger_pin.control.compiled import core_signal
+from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.reference import LoopReference, ReferenceSignals
+from finger_pin.core.control import Control, planned_control
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.laws.controller import internal_level, proportional_torque
+from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +47,7 @@ class Controller(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ProportionalController:
+class ProportionalController(LoopController):
     """The paper's controller: proportional torque, distributed over the tendons by the pseudo-inverse.
 
     The paper has no damping; where there is some, tau^d = K_P (theta^d - theta) + K_D (theta^d' - theta').
@@ -93,3 +98,49 @@ class ProportionalController:
             fingers = [np.max(levels[..., self.loop == each], axis=-1) for each in range(int(self.loop.max()) + 1)]
             level = np.stack(fingers, axis=-1)[..., self.loop]
         return ControlSignals(torque, minimal + level * self.internal)
+
+    def as_control(self, reference: LoopReference, finger: Finger) -> Control | None:
+        """Return it as inputs of a finger's mechanism, whose coordinates begin with the joints.
+
+        What it plans for tendons that motors in position drive pull is no input.
+        """
+        desired, routing, mechanism = reference.planned(), finger.routing, finger.mechanism
+        if desired is None:
+            return None
+        tendons = np.arange(len(routing.tendons))
+        further = mechanism.coordinates - len(routing.joints)
+        positioned = np.isin(tendons, finger.actuators.positioned)
+
+        def padded(values: Array) -> Array:
+            return np.concatenate([values, np.zeros((*values.shape[:-1], further))], axis=-1)
+
+        matrix = desired.coupling.matrix
+        return planned_control(
+            mechanism.channels,
+            gain=padded(self.gain),
+            minimum=self.minimum,
+            inverse=padded(self.inverse),
+            internal=self.internal,
+            channel=np.where((tendons < routing.actuated) & ~positioned, tendons, -1),
+            reference=core_signal(desired.signal),
+            coupling=np.concatenate([matrix, np.zeros((further, len(matrix)))]),
+            offset=padded(desired.coupling.offset),
+            damping=padded(self.damping),
+            loop=self.loop,
+        )
+
+    def without_memory(self) -> ProportionalController:
+        """Return itself: it remembers nothing."""
+        return self
+
+    @classmethod
+    def joined(cls, controllers: Sequence[ProportionalController], routing: Routing) -> ProportionalController:
+        """Return the controller of a hand from those of its fingers, with a lambda of (22) for each."""
+        tendons, joints = len(routing.tendons), len(routing.joints)
+        gain, damping, minimum, internal = np.zeros(joints), np.zeros(joints), np.zeros(tendons), np.zeros(tendons)
+        inverse, loop = np.zeros((tendons, joints)), np.zeros(tendons, dtype=np.int64)
+        for index, (each, (turned, pulled)) in enumerate(zip(controllers, routing.fingers, strict=True)):
+            gain[turned], damping[turned] = each.gain, each.damping
+            minimum[pulled], internal[pulled] = each.minimum, each.internal
+            inverse[np.ix_(pulled, turned)], loop[pulled] = each.inverse, index
+        return cls(gain, minimum, inverse, internal, damping, loop)

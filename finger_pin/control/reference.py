@@ -32,6 +32,16 @@ class Reference(Protocol):
         """Return theta^d and its rate at one time, or at times of shape (m,)."""
 
 
+class LoopReference(Reference, Protocol):
+    """A reference in a loop, which says what those who run it have to know."""
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return the functions of time that it follows: steps end where they bend."""
+
+    def planned(self) -> SignalReference | None:
+        """Return it as signals, which the compiled core can follow; None of what is Python."""
+
+
 @dataclass(frozen=True, eq=False)
 class SignalReference:
     """A signal per joint, then equation (20) for the followers, whose own signals do not count.
@@ -82,3 +92,11 @@ class SignalReference:
         base, rate = self.signal.at(time)
         matrix = self.coupling.matrix.T
         return ReferenceSignals(base @ matrix + self.coupling.offset, rate @ matrix)
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return the functions of time that it follows."""
+        return (self.signal,)
+
+    def planned(self) -> SignalReference:
+        """Return it as signals."""
+        return self

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.torque import TorqueLaw
@@ -15,7 +16,7 @@ from finger_pin.mechanism.finger import Finger
 
 
 @dataclass(frozen=True, eq=False)
-class RoutedController:
+class RoutedController(LoopController):
     """tau^d by the pseudo-inverse of H_c(theta)^T, raised by the internal tensions of the posture.
 
     Where a posture has no force closure, tensions below f0 are raised to it alone, which turns joints.

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.measurement import MeasuringController, Sensors
+from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.measurement import Sensors
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.core.stepping.stepper import TABLEAUS
@@ -20,7 +21,7 @@ from finger_pin.exceptions import InputError
 _COINCIDENT = 1e-9
 
 
-class SampledController:
+class SampledController(LoopController):
     """A controller that is asked at multiples of a period, in order, and then answers for any time up to the next.
 
     What it says at a sample acts after the delay, and holds until what it says at the next one acts. Before the first
@@ -77,7 +78,7 @@ class SampledController:
         loop, controller = self._loop, self._loop.controller
         state = loop.finger.layout.unpack(x.copy())
         motion = self._sensors.motion(state)
-        if isinstance(controller, MeasuringController):
+        if controller.measures:
             acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
             strands = loop.dynamics.evaluate(x, acting, loop.force(time)).tendons.strands
             delivered = loop.finger.routing.tendon_tension(strands)

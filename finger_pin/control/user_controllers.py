@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
-from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.hand import HandController
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
-from finger_pin.control.passive_loop import PassiveTensionLoop
-from finger_pin.control.proportional import Controller, ControlSignals, ProportionalController
-from finger_pin.control.reference import Reference, ReferenceSignals, SignalReference
-from finger_pin.control.routed import RoutedController
+from finger_pin.control.proportional import Controller, ControlSignals
+from finger_pin.control.reference import LoopReference, Reference, ReferenceSignals, SignalReference
+from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
@@ -65,6 +63,13 @@ class OwnReference:
             np.array([each.position for each in found]), np.array([each.velocity for each in found])
         )
 
+    def signals(self) -> tuple[Signal, ...]:
+        """Return nothing: it is Python."""
+        return ()
+
+    def planned(self) -> None:
+        """Return None: it is Python."""
+
     def _one(self, time: float) -> ReferenceSignals:
         found = self.reference.at(time + self.start)
         values = []
@@ -79,7 +84,7 @@ class OwnReference:
         return ReferenceSignals(*values)
 
 
-class OwnController:
+class OwnController(LoopController):
     """A controller of one's own.
 
     It returns `ControlSignals`, or only the tensions: of all tendons, or of the actuated ones.
@@ -102,6 +107,7 @@ class OwnController:
             )
             raise InputError("controller", allowed, type(controller).__name__)
         self.controller, self.problem, self.problem_time = controller, "", -np.inf
+        self.measures = isinstance(controller, MeasuringController)
         self._routing, self._start, self._asked = routing, start, False
 
     def command(
@@ -123,6 +129,11 @@ class OwnController:
             np.array([each.tension for each in found]),
             np.array(missing) if len(missing) == len(found) else None,
         )
+
+    def sense(self, tension: Array, elapsed: float) -> None:
+        """Pass on what the sensors say, if it listens."""
+        if isinstance(self.controller, MeasuringController):
+            self.controller.sense(tension, elapsed)
 
     def _one(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:
         first, self._asked = not self._asked, True
@@ -167,16 +178,6 @@ class OwnController:
                 raise InputError("controller", allowed, float(tension))
 
 
-class OwnMeasuringController(OwnController, MeasuringController):
-    """A controller of one's own that also listens to tension sensors."""
-
-    controller: MeasuringController
-
-    def sense(self, tension: Array, elapsed: float) -> None:
-        """Pass on what the sensors say."""
-        self.controller.sense(tension, elapsed)
-
-
 def _numbers(value: object) -> Array:
     try:
         return np.asarray(value, dtype=float)
@@ -184,7 +185,7 @@ def _numbers(value: object) -> Array:
         return np.full((), np.nan)
 
 
-def choose_controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> Controller:
+def choose_controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> LoopController:
     """Return what a caller gives as controller, ready to be asked, or the scenario's if nothing is given.
 
     Raises:
@@ -194,14 +195,12 @@ def choose_controller(given: Controller | Samples | None, scenario: Scenario, fi
         return build_controller(scenario, finger)
     if isinstance(given, tuple | list):
         return OpenLoopTensions.from_samples(given, scenario, finger.routing)
-    own = ProportionalController | CompensatedController | PassiveTensionLoop | OpenLoopTensions | HandController
-    if isinstance(given, own | RoutedController):
+    if isinstance(given, LoopController):
         return given
-    kind = OwnMeasuringController if isinstance(given, MeasuringController) else OwnController
-    return kind(given, finger.routing, scenario.simulation.start_time)
+    return OwnController(given, finger.routing, scenario.simulation.start_time)
 
 
-def choose_reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> Reference:
+def choose_reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:
     """Return what a caller gives as reference, ready to be asked, or the scenario's if nothing is given.
 
     Raises:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import copy
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -178,28 +177,6 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
         override(checked, whole, Path())
         resolve_signals(whole, Path())
         return validate(Scenario, whole, ())
-
-
-def scenario_of(attributes: Mapping[Any, Any]) -> Scenario:
-    """Return the scenario that a result was computed from, given the result's attributes.
-
-    Raises:
-        InputError: If they do not hold one.
-    """
-    text = attributes.get("scenario")
-    if not isinstance(text, str):
-        raise InputError("result.attrs.scenario", "must be the scenario as TOML text")
-    return _scenario_in(text)
-
-
-# What reads a result asks for it more than once.
-@lru_cache(maxsize=4)
-def _scenario_in(text: str) -> Scenario:
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError("result.attrs.scenario", "must be the scenario as TOML text") from error
-    return validate(Scenario, table, ())
 
 
 def to_toml(description: Description) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
@@ -22,7 +23,7 @@ from finger_pin.mechanism.finger import Finger
 _STRONGEST = 20.0
 
 
-class Action:
+class Action(LoopController):
     """Actions of an episode, in the place of a scenario's controller.
 
     Attributes:
@@ -65,7 +66,7 @@ class Action:
         self.begin(0.0)
 
     @property
-    def drives(self) -> Drives | None:
+    def compiled(self) -> Drives | None:
         """The loops of motors in position drive, with the goals so far; None without."""
         return self._drives
 

@@ -72,7 +72,7 @@ class SideBySide(ClosedLoop):
         """
         first, accelerated = loops[0], "joint_acceleration" in names
         own = {each.name: getattr(first, each.name) for each in fields(ClosedLoop)}
-        own["drives"] = None if actions[0].drives is None else actions[0]
+        own["drives"] = None if actions[0].compiled is None else actions[0]
         if apart:
             own["dynamics"] = CompiledFingers([_compiled(each) for each in loops], accelerated=accelerated)
             own["palm"] = first.palm and replace(first.palm, signal=cast(Signal, _PalmSignals(loops)))

@@ -97,13 +97,13 @@ class World:
         self._scenario, self.origin = scenario, origin or ClosedLoop.from_scenario(scenario).compiled()
         self.action = Action(self.task.action, self.origin.finger, self.task.duration)
         self.stepper = self._stepper_at(self.origin.initial_state())
-        if self.action.drives is not None:
-            self.stepper.drive(self.action.drives)
+        if self.action.compiled is not None:
+            self.stepper.drive(self.action.compiled)
 
     @property
     def loop(self) -> ClosedLoop:
         """What moves, with the actions in the place of its controller."""
-        driven = self.action if self.action.drives is not None else None
+        driven = self.action if self.action.compiled is not None else None
         return replace(self.origin, controller=self.action, drives=driven)
 
     def _stepper_at(self, x: Array) -> Stepper:
@@ -203,9 +203,9 @@ class World:
         if not self._step:
             raise InputError("result", "is of steps, and there are none yet: call step")
         stepper, end = self._stepper_at(self._begun), self.stepper.time
-        if self.action.drives is not None:
+        if self.action.compiled is not None:
             stepper.drive(self.action.again())
-        held = self.action.replayed() if self.action.drives is None else None
+        held = self.action.replayed() if self.action.compiled is None else None
         trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=held)
         times = np.arange(round(end * sample_rate) + 1) / sample_rate
         motions = Motions(self.loop, trajectory, times)

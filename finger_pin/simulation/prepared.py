@@ -24,8 +24,9 @@ from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import attributes_of, record, recorded
 from finger_pin.simulation.run_arrays import RunArrays
-from finger_pin.simulation.running import Setup, run
+from finger_pin.simulation.running import run
 from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
+from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
 
 if TYPE_CHECKING:

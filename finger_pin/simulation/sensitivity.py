@@ -23,7 +23,7 @@ from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.run_arrays import RunArrays
-from finger_pin.simulation.running import Setup
+from finger_pin.simulation.setup import Setup
 
 #: Change of a number, of its size: far above rounding, far below where anything bends.
 CHANGE = 1e-7

@@ -11,7 +11,7 @@ import numpy as np
 
 import finger_pin as fp
 from benchmarks.store import Store, say
-from finger_pin.simulation.running import Setup
+from finger_pin.simulation.setup import Setup
 
 SCENARIOS = ("fig6", "stick_slip", "servo", "press", "hand")
 #: What the prepared runs record.

@@ -158,8 +158,8 @@ def test_a_result_without_what_is_needed_is_told_so(fig6, missing):
         joint_reactions(fig6.isel(time=slice(0, 2)).drop_vars(missing))
 
 
-def test_a_result_without_its_scenario_is_told_so(fig6):
-    with pytest.raises(fp.InputError, match="scenario"):
+def test_a_result_without_its_finger_is_told_so(fig6):
+    with pytest.raises(fp.InputError, match="finger"):
         joint_reactions(fig6.isel(time=slice(0, 2)).drop_attrs())
 
 

@@ -18,8 +18,8 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
-from finger_pin.simulation.running import Setup
 from finger_pin.simulation.sensitivity import changed, nearby
+from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates
 from finger_pin.studies.identification.problem import At, Own, own_number
 from finger_pin.studies.identification.recordings import Recording

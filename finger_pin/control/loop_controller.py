@@ -1,0 +1,59 @@
+"""What a loop asks of its controller, besides its commands."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Self
+
+from finger_pin.control.reference import LoopReference, ReferenceSignals
+from finger_pin.control.signal import Signal
+from finger_pin.core.control import Control
+from finger_pin.description.routing import Array, Routing
+
+if TYPE_CHECKING:
+    from finger_pin.control.proportional import ControlSignals
+    from finger_pin.mechanism.finger import Finger
+
+
+class LoopController(ABC):
+    """A controller in a loop: it commands, and says what those who run it have to know.
+
+    A new kind of controller needs `command`, and overrides what it can answer better: by default it is Python, and may
+    remember what it was asked.
+
+    Attributes:
+        measures: Whether it listens to tension sensors, by `sense`; then it has to be sampled.
+        problem: What has gone wrong inside, or empty; the motion ends there.
+        problem_time: When, s.
+    """
+
+    measures = False
+    problem = ""
+    problem_time = float("-inf")
+
+    @abstractmethod
+    def command(
+        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
+    ) -> ControlSignals:
+        """Return the commands for shapes (..., n)."""
+
+    def sense(self, tension: Array, elapsed: float) -> None:  # noqa: B027 - most do not listen
+        """Take delivered tensions, shape (t,), N, and the time since the last ones, s."""
+
+    def as_control(self, reference: LoopReference, finger: Finger) -> Control | None:
+        """Return it as arrays for the compiled core, with a reference; None of what is Python."""
+        return None
+
+    def signals(self) -> tuple[Signal, ...]:
+        """Return the functions of time that it follows: steps end where they bend."""
+        return ()
+
+    def without_memory(self) -> LoopController | None:
+        """Return what answers alike however often it is asked, for the start; None if nothing does."""
+        return None
+
+    @classmethod
+    def joined(cls, controllers: Sequence[Self], routing: Routing) -> LoopController | None:
+        """Return one controller of this kind for all fingers of a hand; None if they have to stand side by side."""
+        return None

@@ -1,0 +1,202 @@
+"""A scenario made ready: everything that moves it, once, and what integrates it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import build_stepper, compiled_control, sampled_control
+from finger_pin.control.loop_controller import LoopController
+from finger_pin.control.position_drive import PositionDrives
+from finger_pin.control.sampling import SampledController, sampling_settings
+from finger_pin.core.stepping.cvode import integrate_cvode
+from finger_pin.core.stepping.encounters import meetings
+from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
+from finger_pin.description.routing import Array
+from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario, SimulationSettings
+from finger_pin.exceptions import (
+    InputError,
+)
+from finger_pin.simulation.accuracy import (
+    CHUNK,
+)
+from finger_pin.simulation.initial_state import check_motors
+
+if TYPE_CHECKING:
+    pass
+
+#: What to try where an integrator cannot go on.
+ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
+# Where tolerances are tight already, it is rounding that an integrator cannot get below.
+_TIGHT = 1e-8
+_ADVICE_TIGHT = "a larger simulation.rtol and simulation.atol_scale, or softer contacts and tendons"
+_ADVICE_RUNAWAY = "a smaller controller.gain, heavier links, or a start within the joints' ranges"
+_CONTINUOUS = "Radau"
+#: Steps between two looks at a compiled simulation that is observed.
+CHUNK_OBSERVED = 4
+
+#: Ends of the steps of every island, s.
+Steps = Sequence[Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A scenario with everything that moves it, once.
+
+    Attributes:
+        scenario: What is simulated.
+        loop: Finger, controller and reference, with what is sampled for this one motion.
+        method: The integrator; not the scenario's where its controller is Python and acts continuously.
+        answers: The controller itself, where the loop samples it.
+        sampled: What samples it, if anything does.
+    """
+
+    scenario: Scenario
+    loop: ClosedLoop
+    method: str
+    answers: LoopController
+    sampled: SampledController | None
+
+    @classmethod
+    def of(
+        cls, scenario: Scenario, loop: ClosedLoop | None = None, own: str = "", control_period: float | None = None
+    ) -> Setup:
+        """Make a scenario ready.
+
+        Args:
+            scenario: What to simulate.
+            loop: Its loop, where something in it is a user's own.
+            own: What that is, as `own_parts` says.
+            control_period: As for `simulate`.
+
+        Raises:
+            InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
+                a motor turns too fast at the start, or a user's own controller answers wrongly.
+        """
+        method = scenario.simulation.method
+        loop = loop or ClosedLoop.from_scenario(scenario)
+        if loop.finger.actuators.names:
+            # Before the controller is sampled: then it must not be asked for a start.
+            loop = replace(loop, start=loop.initial_state())
+            check_motors(loop.finger, loop.initial_state())
+        if loop.finger.surroundings is not None:
+            loop.finger.surroundings.check(loop.finger.layout.unpack(loop.initial_state()))
+        sampling = sampling_settings(scenario, control_period)
+        if sampling is None and loop.controller.measures:
+            raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
+        positioned = bool(np.any(loop.finger.actuators.holds))
+        if positioned and method not in TABLEAUS:
+            raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
+        if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
+            if positioned:
+                raise InputError(
+                    "controller.sampling.period", "is missing: beside position drives this controller is sampled"
+                )
+            method = _CONTINUOUS
+        if scenario.simulation.method not in METHODS_IN_NUMPY:
+            loop = loop.compiled()
+        answers = loop.controller
+        sampled = None if sampling is None else SampledController(loop, sampling)
+        if positioned:
+            duration = scenario.simulation.duration
+            drives = PositionDrives(loop.finger, loop.controller, loop.reference, duration)
+            loop = replace(loop, drives=drives)
+        if sampled is not None:
+            loop = replace(loop, controller=sampled)
+        elif own:
+            # A wrong answer of a user's own controller is refused before anything is computed.
+            loop.evaluate(0.0, loop.initial_state())
+        return cls(scenario, loop, method, answers, sampled)
+
+    def integrate(
+        self,
+        watch: Watch | None = None,
+        stop: Stop | None = None,
+        *,
+        scenario: Scenario | None = None,
+        chunk: int = CHUNK,
+        steps: Steps | None = None,
+    ) -> Trajectory:
+        """Integrate, at the tolerances of another scenario if given.
+
+        Args:
+            watch: Called with the simulated time and the state now and then.
+            stop: Asked now and then.
+            scenario: Like this one, with tolerances of its own.
+            chunk: Steps between two calls.
+            steps: To be taken whatever their errors: what comes out is then as smooth a function of start and
+                parameters as the equations are.
+        """
+        settings = (scenario or self.scenario).simulation
+        if self.method in TABLEAUS:
+            return self._compiled(settings, watch, stop, chunk, steps)
+        loop = self.loop
+        common: dict[str, Any] = {
+            "rtol": settings.rtol,
+            "atol": settings.atol_scale * loop.finger.layout.scales(),
+            "longest": loop.longest_step(settings.rtol),
+            "meeting": meetings(loop.finger.mechanism),
+            "watch": watch,
+            "stop": stop,
+        }
+        start, duration = loop.initial_state(), settings.duration
+        if self.method == "CVODE":
+            return integrate_cvode(loop.rhs, start, duration, **common)
+        return integrate(loop.rhs, start, duration, method=self.method, **common)
+
+    def _compiled(
+        self, settings: SimulationSettings, watch: Watch | None, stop: Stop | None, chunk: int, steps: Steps | None
+    ) -> Trajectory:
+        """Integrate by a method of the compiled core."""
+        loop = self.loop
+        stepper = self.stepper(settings)
+        if loop.drives is not None and loop.drives.compiled is not None:
+            stepper.drive(loop.drives.compiled)
+        knots = loop.knots(settings.rtol)
+        if steps is not None:
+            stepper.repeat([np.union1d(ends, knots) for ends in steps])
+        return integrate_compiled(
+            stepper,
+            settings.duration,
+            loop.finger.layout.names,
+            held=self.sampled,
+            knots=None if steps is not None else knots,
+            watch=watch,
+            chunk=chunk,
+            together=chunk == CHUNK_OBSERVED,
+            stop=stop,
+        )
+
+    def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
+        """Return what the compiled core steps, at the start, by default at the scenario's tolerances."""
+        given, loop = settings or self.scenario.simulation, self.loop
+        return build_stepper(
+            loop.finger,
+            compiled_control(loop) or sampled_control(loop),
+            loop.initial_state(),
+            loop.fingertip_force,
+            method=self.method,
+            rtol=given.rtol,
+            atol_scale=given.atol_scale,
+        )
+
+    def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
+        """Return why a trajectory ended early, and what to try.
+
+        Args:
+            trajectory: One that failed.
+            slow: What made it slow, if that is known.
+        """
+        answers, settings = self.answers, self.scenario.simulation
+        if answers.problem_time >= trajectory.breakpoints[-1]:
+            return answers.problem, "another controller"
+        advice = _ADVICE_TIGHT if min(settings.rtol, settings.atol_scale) < _TIGHT else ADVICE
+        if "physical range" in trajectory.failure:
+            advice = _ADVICE_RUNAWAY
+        return f"{trajectory.failure}; {slow}" if slow else trajectory.failure, advice
