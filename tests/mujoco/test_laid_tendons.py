@@ -1,8 +1,11 @@
 """Tendons laid over a model without any: the same in MuJoCo and in what we read of it."""
 
+import tomllib
+
 import mujoco
 import numpy as np
 import pytest
+from motions import differences, ours
 
 import finger_pin as fp
 
@@ -28,7 +31,7 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path):
     (tmp_path / "laid.toml").write_text(LAID)
     (tmp_path / "bare.xml").write_text(BARE)
     described = fp.from_mujoco(tmp_path / "bare.xml", tendons=tmp_path / "laid.toml")
-    assert list(described.tendons) == ["flexor"] and list(described.tree.actuators) == ["extensor"]
+    assert list(described.tendons) == ["extensor", "flexor"] and not described.tree.actuators
     spec = mujoco.MjSpec.from_string(BARE)
     fp.mujoco.lay_tendons(spec, tmp_path / "laid.toml")
     fp.mujoco.add_friction(spec, tendons={"*": {"coulomb": 0.12}}, joints={"*": {}})
@@ -46,6 +49,19 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path):
     assert signals.turn[signals.index("extensor")] == pytest.approx(0.7)
     assert signals.turn[signals.index("flexor")] == pytest.approx(hand.paths.turn(data.qpos)[order.index(1)], abs=1e-9)
     assert signals.tension[signals.index("flexor")] == pytest.approx(3.0)
+
+
+def test_they_move_alike_there_and_here_with_friction_around_joints_and_along_a_path():
+    spec = mujoco.MjSpec.from_string(BARE)
+    fp.mujoco.lay_tendons(spec, tomllib.loads(LAID)["tendons"])
+    for each in (*spec.joints, *spec.tendons):
+        each.limited = 0
+    scenario, result = ours(spec, 0.1)
+    fp.mujoco.add_friction(spec, tendons={"*": {}}, joints={"*": {"viscous": 0.0}})
+    errors = differences(spec.compile(), scenario, result, (5e-5, 2.5e-5))
+    assert np.all(abs(result.tendon_stiction.values).max(axis=0) > 0.01)
+    assert np.ptp(result.joint_position.values, axis=0).max() > 0.05
+    assert errors[-1] < 1e-3 and errors[0] / errors[1] > 1.8
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,11 @@
 import mujoco
 import numpy as np
 import pytest
+from motions import differences, ours
 from mujoco_models import ROUTED, asset
 from validation import mujoco_motion
 
 import finger_pin as fp
-from finger_pin.description.exercise import exercise
-from finger_pin.description.loading import read_scenario
 from finger_pin.mujoco import add_friction, friction
 
 DURATION = 0.06
@@ -27,32 +26,6 @@ def test_the_paper_s_finger_in_mujoco_nears_our_motion_at_the_first_order_of_its
     assert abs(result["tendon_stiction"].values).max() > 0.2 and abs(ours[-1] - ours[0]).max() > 0.003
     assert errors[-1] < 1e-5
     assert np.all(errors[:-1] / errors[1:] > 1.8)
-
-
-def ours(spec, duration):
-    """Return the scenario in which every actuator of a model goes to and fro, and our motion, without ranges."""
-    still = {"simulation.duration": duration, "simulation.rtol": 1e-9, "simulation.atol_scale": 1e-9}
-    still |= {"finger.stroke_limiter.stiffness": 1e-9, "simulation.sample_rate": 100.0}
-    scenario = read_scenario(exercise(fp.from_mujoco(spec)), still)
-    return scenario, fp.simulate(scenario)
-
-
-def differences(model, scenario, result, steps):
-    """Return MuJoCo's largest differences from our motion by time step, rad or m."""
-    given = {**scenario.controller.inputs, **scenario.controller.tensions}
-    signals = [given[model.actuator(i).name.replace(":", "_")] for i in range(model.nu)]
-    positions, errors = result.joint_position.values, []
-    for step in steps:
-        data, model.opt.timestep, error, every = mujoco.MjData(model), step, 0.0, round(0.01 / step)
-        data.qpos = positions[0]
-        for count in range(1, (len(positions) - 1) * every + 1):
-            swing = [2.0 * np.pi * each.frequency * data.time + each.phase for each in signals]
-            data.ctrl = [s.offset + s.amplitude * np.sin(angle) for s, angle in zip(signals, swing, strict=True)]
-            mujoco.mj_step(model, data)
-            if count % every == 0:
-                error = max(error, abs(data.qpos - positions[count // every]).max())
-        errors.append(error)
-    return errors
 
 
 def test_a_routed_hand_with_our_friction_moves_in_mujoco_as_here():

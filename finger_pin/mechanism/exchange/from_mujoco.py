@@ -38,11 +38,11 @@ def from_mujoco(
 ) -> FingerDescription:
     """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
 
-    Motors that can only pull a tendon through space become tendons of the hand, with friction along their path and
-    slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons and joints,
-    which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the model's. Ranges
-    are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of (9). What is
-    not carried over stands in ``tree.left_out``.
+    Motors that can only pull a tendon, through space or around hinges, become tendons of the hand, with friction along
+    their path and slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons
+    and joints, which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the
+    model's. Ranges are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level
+    of (9). What is not carried over stands in ``tree.left_out``.
 
     Args:
         model: A `mujoco.MjModel`, or the path of an XML file.

@@ -12,6 +12,9 @@ from finger_pin.mechanism.exchange.mujoco_flags import undriven
 from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct
 from finger_pin.mechanism.exchange.mujoco_rest import Rest
 
+# As `Crossing` has it, m.
+_LARGEST_RADIUS = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class ActuatorReader:
@@ -47,7 +50,7 @@ class ActuatorReader:
 
     @cached_property
     def pulling(self) -> list[int]:
-        """The motors that can only pull a tendon through space."""
+        """The motors that can only pull a tendon, through space or around joints."""
         return [i for i in self.laws if self._pulls(i)]
 
     def table(self) -> Table:
@@ -78,8 +81,21 @@ class ActuatorReader:
         """Return the tendons that motors pull, by the names of these."""
         model = self.model
         names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
-        along = [self.names.tendons[model.actuator_trnid[i, 0]] for i in self.pulling]
-        return {name: {"along": path} for name, path in zip(names, along, strict=True)}
+        return {name: self._route(int(model.actuator_trnid[i, 0])) for name, i in zip(names, self.pulling, strict=True)}
+
+    def _route(self, tendon: int) -> Table:
+        """Return the path of a tendon, or the joints that it crosses, which all bend it."""
+        around = self._around(tendon)
+        if not around:
+            return {"along": self.names.tendons[tendon]}
+        return {"crossings": {self.names.joints[j]: {"radius": -arm, "bends": True} for j, arm in around.items()}}
+
+    def _around(self, tendon: int) -> dict[int, float]:
+        """Return the joints that a fixed tendon runs over, and its coefficients; none of one through space."""
+        model = self.model
+        pieces = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
+        fixed = model.wrap_type[pieces[0]] == self.mujoco.mjtWrap.mjWRAP_JOINT
+        return {int(model.wrap_objid[k]): float(model.wrap_prm[k]) for k in pieces} if fixed else {}
 
     def _foreign(self, i: int) -> str | None:
         """Return why what an actuator drives, or who computes it, is not carried over; None where it is."""
@@ -116,15 +132,18 @@ class ActuatorReader:
         return i if first is None else int(first[i])
 
     def _pulls(self, i: int) -> bool:
-        model, types = self.model, self.mujoco
+        model, mujoco = self.model, self.mujoco
         at, control = int(model.actuator_trnid[i, 0]), self._control(i)
         if (
-            model.actuator_trntype[i] != types.mjtTrn.mjTRN_TENDON
+            model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_TENDON
             or any(self.laws[i][1:])
             or not model.actuator_ctrllimited[control]
             or model.actuator_forcelimited[i]
-            or model.wrap_type[model.tendon_adr[at]] == types.mjtWrap.mjWRAP_JOINT
         ):
             return False
+        # What is no radius of a hinge is a transmission, and no tendon.
+        for joint, arm in self._around(at).items():
+            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > _LARGEST_RADIUS:
+                return False
         exerted = model.actuator_gear[i, 0] * self.laws[i][0] * model.actuator_ctrlrange[control]
         return bool(np.all(exerted <= 0.0) and np.any(exerted))
