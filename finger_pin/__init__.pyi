@@ -24,6 +24,7 @@ from .mechanism.finger import Finger as Finger
 from .mechanism.finger import Hand as Hand
 from .mechanism.rows import Rows as Rows
 from .simulation.convergence import check_convergence as check_convergence
+from .simulation.frames import in_world as in_world
 from .simulation.netcdf import load as load
 from .simulation.netcdf import save as save
 from .simulation.prepared import prepare as prepare

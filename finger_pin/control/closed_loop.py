@@ -221,16 +221,16 @@ class ClosedLoop:
         return None if mover is None else mover.base(time)
 
     def motion(self, time: Array, state: State) -> Motion:
-        """Return fingertips and energies at times (m,) and states, in the world: the base frame of a palm at rest."""
+        """Return fingertips, base frame, and energies in the world at times (m,) and states."""
         base, around, objects = self.base(time), self.finger.surroundings, None
         found = self.dynamics.motion(state.position, state.velocity, base)
         if around is not None and state.object_pose is not None and state.object_velocity is not None:
             objects = around.energies(state.object_pose, state.object_velocity, base)
         if self.palm is not None:
-            found = self.palm.to_world(time, found, self.finger.rigid_body.mass)
+            higher = found.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)
+            found = replace(found, potential_energy=higher)
             if around is not None and objects is not None:
-                lifted = objects[1] - np.sum(around.mass) * self.palm.place(time)[0] @ self.palm.gravity
-                objects = objects[0], lifted
+                objects = objects[0], objects[1] + self.palm.lifted(time, float(np.sum(around.mass)))
         return replace(found, objects=objects)
 
     def powers(self, time: Array, x: Array) -> Array:

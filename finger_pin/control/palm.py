@@ -11,7 +11,6 @@ from finger_pin.description.hand import PATH, HandDescription
 from finger_pin.description.routing import Array
 from finger_pin.laws.palm import base_motion
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.kinematics import Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,17 +67,15 @@ class PalmPath:
         numbers = np.stack(np.broadcast_arrays(*found), axis=-1)
         return np.concatenate([numbers, self._world(2, time)], axis=-1) if self.carries else numbers
 
-    def to_world(self, time: Array, motion: Motion, mass: float) -> Motion:
-        """Return what is seen from the palm, at times (m,), as the world sees it.
+    def velocity(self, time: Array) -> tuple[Array, Array]:
+        """Return the palm's velocity, m/s, and angular velocity, rad/s, along the world's axes, shape (m, 3)."""
+        at, rate = self.signal.at(time)
+        sp, cp, sy, cy = np.sin(at[..., 4]), np.cos(at[..., 4]), np.sin(at[..., 5]), np.cos(at[..., 5])
+        roll, pitch, yaw = np.moveaxis(rate[..., 3:], -1, 0)
+        # About the axes of yaw, pitch and roll, each turned by those before it.
+        turning = [roll * cp * cy - pitch * sy, roll * cp * sy + pitch * cy, yaw - roll * sp]
+        return rate[..., :3], np.stack(turning, axis=-1)
 
-        Args:
-            time: Shape (m,), s.
-            motion: With kinetic energies of the motion in the world already, and tips in the palm's frame.
-            mass: Of all that is carried, kg, which gains weight energy with the palm's height.
-        """
-        place, rotation = self.place(time)
-        several = motion.tip.ndim == 3
-        tips = motion.tip if several else motion.tip[:, None]
-        tips = tips @ np.swapaxes(rotation, -1, -2) + place[:, None]
-        lifted = motion.potential_energy - mass * place @ self.gravity
-        return Motion(tips if several else tips[:, 0], motion.kinetic_energy, lifted)
+    def lifted(self, time: Array, mass: float) -> Array:
+        """Return the potential energy that a mass gains with the palm's height at times (m,), J."""
+        return np.asarray(-mass * self.place(time)[0] @ self.gravity)

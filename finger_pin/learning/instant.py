@@ -118,11 +118,8 @@ class SideBySide(ClosedLoop):
         return LoopSignals(ReferenceSignals(nothing, nothing), control, evaluate(x, command, self.force(time), base))
 
     def motion(self, time: Array, state: State) -> Motion:
-        """Return fingertips at times (w,) and states, in the world; energies are those of a palm at rest."""
-        found = self.dynamics.motion(state.position, state.velocity)
-        if self.palm is None:
-            return found
-        return self.palm.to_world(time, found, self.finger.rigid_body.mass)
+        """Return fingertips, base frame, at times (w,) and states; energies are those of a palm at rest."""
+        return self.dynamics.motion(state.position, state.velocity)
 
 
 class _PalmSignals:

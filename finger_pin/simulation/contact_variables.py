@@ -52,7 +52,7 @@ def contact_variables(finger: Finger) -> Variables:
             "object_position": (axes, "m", "position of a free object"),
             "object_orientation": (turns, "1", "its orientation, a unit quaternion"),
             "object_velocity": (axes, "m/s", "its velocity"),
-            "object_angular_velocity": (axes, "rad/s", "its angular velocity, in its own frame"),
+            "object_angular_velocity": (axes, "rad/s", "its angular velocity"),
         }
     return table
 
@@ -81,7 +81,7 @@ def contact_values(finger: Finger, signals: FingerSignals) -> dict[str, Array]:
         "object_position": pose[..., :3],
         "object_orientation": pose[..., 3:],
         "object_velocity": velocity[..., :3],
-        "object_angular_velocity": velocity[..., 3:],
+        "object_angular_velocity": _turned(pose[..., 3:], velocity[..., 3:]),
     }
 
 
@@ -114,10 +114,19 @@ def last_touching(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
         found = tuple(map(str, last[dimension].values)) if dimension in last.coords else ()
         if found != expected:
             raise InputError("initial", f"is a result with other {dimension}s: they must be {', '.join(expected)}")
-    return {
-        part: np.concatenate([last[name].values for name in names], axis=-1).reshape(-1)
-        for part, names in parts.items()
-    }
+    values = {part: np.concatenate([last[name].values for name in names], axis=-1) for part, names in parts.items()}
+    if around.free:
+        # A state has angular velocities in the objects' own frames.
+        rates, back = values["object_velocity"], last["object_orientation"].values * [-1.0, -1.0, -1.0, 1.0]
+        values["object_velocity"] = np.concatenate([rates[..., :3], _turned(back, rates[..., 3:])], axis=-1)
+    return {part: each.reshape(-1) for part, each in values.items()}
+
+
+def _turned(quaternion: Array, vector: Array) -> Array:
+    """Turn vectors by unit quaternions x, y, z, w, shapes (..., 3) and (..., 4)."""
+    axis, scalar = quaternion[..., :3], quaternion[..., 3:]
+    across = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + scalar * across + np.cross(axis, across))
 
 
 def _split(values: Array, size: int) -> Array:

@@ -16,7 +16,7 @@ from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.simulation.motions import Motions
-from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
+from finger_pin.simulation.variables import BASE_FRAME, SHORTFALL, coordinates, variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,6 +72,7 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
     statistics = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,
+        "frame": BASE_FRAME,
         "method": method,
         "rtol": scenario.simulation.rtol,
         "atol_scale": scenario.simulation.atol_scale,

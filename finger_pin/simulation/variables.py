@@ -23,6 +23,8 @@ _MOTOR, _TIME = ("time", "motor"), ("time",)
 #: A variable that is left out of a whole result where nothing limits tensions.
 SHORTFALL = "torque_shortfall"
 RESIDUAL = "energy_residual"
+#: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.
+BASE_FRAME, WORLD_FRAME = "base", "world"
 
 
 class Variable(NamedTuple):
@@ -34,8 +36,7 @@ class Variable(NamedTuple):
         units: SI.
         long_name: In words.
         equation: Number of its equation in the paper; empty for none.
-        frame: Whose axes its components are along: ``base``, a palm's if there is one, ``world`` or ``object``; empty
-            for what has no components.
+        frame: Whose axes its components are along, `BASE_FRAME` or `WORLD_FRAME`; empty for what has none.
         booked: What it is of the energy account, if it belongs there.
     """
 
@@ -104,16 +105,14 @@ def variables(loop: ClosedLoop) -> dict[str, Variable]:
         SHORTFALL: Variable(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
     table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _more(loop)
-    return {name: each._replace(frame=_frame(name, each, loop)) for name, each in table.items()}
+    return {name: each._replace(frame=_frame(name, each)) for name, each in table.items()}
 
 
-def _frame(name: str, variable: Variable, loop: ClosedLoop) -> str:
-    """Return the frame of a variable with components: the base's by default."""
+def _frame(name: str, variable: Variable) -> str:
+    """Return the frame of a variable with components: the base's, but for where that itself is."""
     if not {"axis", "quaternion"} & set(variable.dims):
         return ""
-    if name.startswith("palm_") or (name == "fingertip_position" and loop.palm is not None):
-        return "world"
-    return "object" if name == "object_angular_velocity" else "base"
+    return WORLD_FRAME if name.startswith("palm_") else BASE_FRAME
 
 
 def _more(loop: ClosedLoop) -> dict[str, Variable]:
@@ -152,6 +151,12 @@ def _of_palm(loop: ClosedLoop) -> dict[str, Variable]:
             ("time", "axis"), lambda of: path.place(of.times)[0], "m", "place of the palm in the world"
         ),
         "palm_orientation": Variable(("time", "quaternion"), turned, "1", text),
+        "palm_velocity": Variable(
+            ("time", "axis"), lambda of: path.velocity(of.times)[0], "m/s", "velocity of the palm in the world"
+        ),
+        "palm_angular_velocity": Variable(
+            ("time", "axis"), lambda of: path.velocity(of.times)[1], "rad/s", "angular velocity of the palm"
+        ),
     }
 
 

@@ -57,17 +57,14 @@ def test_the_palm_turns_up_and_the_cylinder_with_it(grasp):
     assert facing == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
 
 
-def test_variables_name_their_frames(grasp):
+def test_variables_name_their_frames_of_which_the_base_s_is_the_default(grasp):
     frames = {name: grasp[name].attrs.get("frame", "") for name in grasp}
     with_components = {name for name in grasp if {"axis", "quaternion"} & set(grasp[name].dims)}
     assert {name for name, frame in frames.items() if frame} == with_components
     others = {name: frame for name, frame in frames.items() if frame not in ("", "base")}
-    assert others == {
-        "fingertip_position": "world",
-        "palm_position": "world",
-        "palm_orientation": "world",
-        "object_angular_velocity": "object",
-    }
+    assert others == {f"palm_{name}": "world" for name in ("position", "orientation", "velocity", "angular_velocity")}
+    assert grasp.attrs["frame"] == "base"
+    assert {each.attrs.get("frame", "world") for each in fp.in_world(grasp).values()} == {"world"}
 
 
 def test_friction_alone_carries_the_cylinder_once_it_is_lifted(grasp):
