@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -76,7 +76,7 @@ class Prepared:
         """Build what the runs share; use `prepare`."""
         self.family, self.record, self._finger = family, record, finger
         loop = self._loop(family.scenario)
-        self._check(loop)
+        refuse_unknown("record", record, variables(loop))
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
 
@@ -155,7 +155,7 @@ class Prepared:
 
     def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
         setup = Setup.of(scenario, self._loop(scenario, initial))
-        self._check(setup.loop)
+        refuse_unknown("record", self.record, variables(setup.loop))
         return setup
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
@@ -206,14 +206,15 @@ class Prepared:
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
 
-    def _check(self, loop: ClosedLoop) -> None:
-        """Raise unless the result of a loop has everything that is recorded."""
-        known = variables(loop)
-        for name in self.record:
-            if name not in known:
-                near = nearest(name, known)
-                hint = f"; did you mean {near}?" if near else ""
-                raise InputError("record", f"the result has no such variable; it has {', '.join(known)}{hint}", name)
+
+def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise unless a result has all variables of some names."""
+    known = list(known)
+    for name in names:
+        if name not in known:
+            near = nearest(name, known)
+            hint = f"; did you mean {near}?" if near else ""
+            raise InputError(entry, f"the result has no such variable; it has {', '.join(known)}{hint}", name)
 
 
 def _tight(scenario: Scenario) -> Scenario:

@@ -249,11 +249,15 @@ class Simulator:
 
     def clone(self) -> Simulator:
         """Return an independent simulator in the same condition: both go on bit by bit alike."""
-        twin = copy.copy(self)
+        twin = object.__new__(type(self))
+        twin.__dict__ |= self.__dict__
         twin._compiled = CompiledFinger(self.finger)
         twin._stepper = self._stepper.copy()
         twin._told = self._told.copy()
         return twin
+
+    # Simulators that share what is stepped would step each other.
+    __copy__ = clone
 
 
 def step_many(

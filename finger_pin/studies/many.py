@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
@@ -19,8 +20,10 @@ from finger_pin.exceptions import InputError, IntegrationError, Interrupted, Sel
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
-from finger_pin.simulation.prepared import prepare
+from finger_pin.simulation.prepared import prepare, refuse_unknown
 from finger_pin.simulation.simulate import simulate
+from finger_pin.simulation.variables import Variable
+from finger_pin.simulation.variables import variables as known_variables
 from finger_pin.studies.executing import Crew, Lost
 
 _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time", "self_locking_margin")
@@ -66,6 +69,7 @@ def simulate_many(
     if not runs:
         raise InputError("scenarios", "at least one is needed")
     _check_alike(runs)
+    _check_kept(runs, variables or (), finger)
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | Lost] = {}
@@ -110,10 +114,8 @@ def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str,
 
 
 def _recorded(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...]) -> xr.Dataset:
-    try:
-        prepared = prepare(scenario, record=keep, finger=finger)
-    except InputError as error:
-        raise InputError("variables", error.allowed, error.value) from None
+    known = known_variables(ClosedLoop.from_scenario(scenario, finger=finger))
+    prepared = prepare(scenario, record=[name for name in keep if name in known], finger=finger)
     return prepared.run(stop=stop).dataset()
 
 
@@ -128,6 +130,16 @@ def _check_alike(runs: Sequence[Scenario]) -> None:
         ):
             if value != expected:
                 raise InputError(f"scenarios[{index}].{entry}", f"must be {expected}, as in the first scenario", value)
+
+
+def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | None) -> None:
+    """Raise unless every variable is one of at least one run."""
+    known: dict[str, Variable] = {}
+    for run in runs:
+        if set(keep) <= set(known):
+            return
+        known |= known_variables(ClosedLoop.from_scenario(run, finger=finger))
+    refuse_unknown("variables", keep, known)
 
 
 def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost]) -> xr.Dataset:

@@ -78,6 +78,8 @@ def test_what_only_some_runs_have_is_nan_in_the_others_and_said() -> None:
             elif "time" in stacked[name].dims:
                 assert np.isnan(stacked[name].values[index]).all()
                 assert str(index) in stacked[name].attrs["comment"]
+    kept = fp.simulate_many(runs, workers=1, variables=["motor_voltage"]).motor_voltage
+    np.testing.assert_array_equal(kept.values, stacked.motor_voltage.values)
     assert stacked.sizes["motor"] == 4 and len(stacked.contact) > len(fp.simulate(runs[2]).contact)
     assert np.isnan(stacked.self_locking_margin.values[3]) and set(stacked.failure.values) == {""}
 
