@@ -163,7 +163,7 @@ def test_a_deep_copy_and_a_pickle_go_on_bit_by_bit_alike_and_leave_the_original_
     command = np.full(finger.mechanism.channels, 2.0)
     for _ in range(3):
         simulator.step(command, 1e-3)
-    twins = [copy.deepcopy(simulator), pickle.loads(pickle.dumps(simulator))]
+    twins = [copy.copy(simulator), copy.deepcopy(simulator), pickle.loads(pickle.dumps(simulator))]
     begin = simulator.x
     moved = [twin.step(command + 1.0, 1e-3).position for twin in twins]
     np.testing.assert_array_equal(simulator.x, begin)
