@@ -16,6 +16,8 @@ from finger_pin.mechanism.finger import FingerLike, as_finger
 
 # The descent: its length, s2, and the acceleration, in parts of the first, at which it has arrived.
 _LONGEST, _ARRIVED = 1e4, 1e-6
+# Of an angle, rad, for differences.
+_SHIFT = 1e-7
 # Largest acceleration that is rest, in parts of the joints' and masses' scales over a square second.
 _REST = 1e-4
 
@@ -93,13 +95,20 @@ def equilibrium(
             return float(np.max(np.abs(acceleration(scale * y) / scale))) - _ARRIVED * begun
 
         arrived.terminal = True  # type: ignore[attr-defined]
+
+        def slopes(y: Array) -> Array:
+            # Angles on limiters are tiny: steps that are parts of them would be lost in rounding.
+            shifts = _SHIFT * np.eye(len(y))
+            columns = [acceleration(scale * (y + each)) - acceleration(scale * (y - each)) for each in shifts]
+            return np.transpose(columns) / (2.0 * _SHIFT * scale[:, None])
+
         down = scipy.integrate.solve_ivp(
             lambda _, y: acceleration(scale * y) / scale, (0.0, _LONGEST), places / scale, "Radau", events=arrived,
             rtol=1e-6, atol=1e-9,
         )  # fmt: skip
         # Damped, so that it stays where the finger may rest anywhere.
         polished = scipy.optimize.least_squares(
-            lambda y: acceleration(scale * y) / scale, down.y[:, -1], method="lm", xtol=1e-15
+            lambda y: acceleration(scale * y) / scale, down.y[:, -1], slopes, method="lm", xtol=1e-15
         )
         nearer = min((down.y[:, -1], polished.x), key=lambda y: np.max(np.abs(acceleration(scale * y) / scale)))
         places = scale * nearer

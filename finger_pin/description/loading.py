@@ -180,7 +180,14 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
 
 
 def to_toml(description: Description) -> str:
-    """Return the TOML text of a description, complete: reading it gives the same description back."""
+    """Return the TOML text of a description, complete: reading it gives the same description back.
+
+    Raises:
+        InputError: If it is none.
+    """
+    if not isinstance(description, Scenario | HandDescription | FingerDescription):
+        allowed = "must be a finger, hand or scenario, as fp.load_finger(name), or finger.description"
+        raise InputError("description", allowed, type(description).__name__)
     if isinstance(description, FingerDescription) and description.hand is not None:
         description = description.hand
     return tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True)))

@@ -154,7 +154,7 @@ def estimate_error(
         return error, ""
     return error, (
         f"the run errs by about {error:.1g} rad rms: repeated at rtol {rtol:g} it differs by that. "
-        "The motion is sensitive, as close to self-locking or in a loop that hunts; "
+        "The motion is sensitive, as close to self-locking, in a loop that hunts or of a body that tumbles; "
         "try a smaller simulation.rtol and atol_scale"
     )
 
