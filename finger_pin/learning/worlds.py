@@ -40,14 +40,26 @@ class Worlds:
         self.task, self.each = task, [first, *(first.twin() for _ in range(count - 1))]
         loops, actions = [world.origin for world in self.each], [world.action for world in self.each]
         self._now = SideBySide.of(loops, actions, task.variables, apart=first.rebuilt)
-        known = known_variables(self._now)
-        self._variables = {name: known[name] for name in task.variables}
+        self._name_variables()
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
         self._steppers = Together([world.stepper for world in self.each])
         # What cannot be drawn is said now, not at the hundredth reset.
         self.begin(range(count), self._randoms)
+
+    def _name_variables(self) -> None:
+        known = known_variables(self._now)
+        self._variables = {name: known[name] for name in self.task.variables}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but what computes the variables, which are functions without names of their own."""
+        return {name: value for name, value in self.__dict__.items() if name != "_variables"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take it up, and find these again."""
+        self.__dict__ |= state
+        self._name_variables()
 
     def spaces(self) -> tuple[Box, Box]:
         """Return the spaces of one world's observations and actions, both of 32-bit floats.

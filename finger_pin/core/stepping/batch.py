@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,6 +68,10 @@ class Together:
             np.zeros(len(parts)),
             np.zeros(len(parts), dtype=np.int64),
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another one is made, by `copy.deepcopy` or from a pickle: it binds copies of the steppers."""
+        return Together, (self._steppers,)
 
     def advance(self, ends: ArrayLike) -> Indices:
         """Advance each to a time, or not at all if that is `RESTING`; return the status of each, as `advance` does.
