@@ -140,6 +140,11 @@ class HandDescription(Description):
     )
     palm: Palm = Palm()
     fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="By name.")
+    fingers_touch: bool | None = Field(
+        None,
+        strict=True,
+        description="Whether links of different fingers touch each other; by default where there are objects, too.",
+    )
 
     @field_validator("fingers")
     @classmethod

@@ -113,6 +113,8 @@ class Finger:
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
         placed = None if self.paths is None else self.paths.placed
+        if objects is None and description.hand is not None and description.hand.fingers_touch:
+            objects = {}
         around = None if objects is None else Surroundings.of(objects, description, mechanism, placed)
         self.surroundings = around
         self.mechanism = mechanism if around is None else around.around(mechanism)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -75,6 +75,8 @@ class Surroundings:
             own = tree_solids(tree, placed, extended)
         else:
             own = finger_solids(_links(description), extended)
+        if hand is not None and hand.fingers_touch is False:
+            own = [replace(each, group=hand.name) for each in own]
         for name in objects:
             for what, taken in (("joint", description.joints), ("shape", [each.name for each in own])):
                 if name in taken:

@@ -201,3 +201,22 @@ def test_powers_of_many_states_are_those_of_each_alone(scene, pushed):
 
 def last_state(finger, result, k):
     return packed_state(result.isel(time=slice(k, k + 1)), finger)
+
+
+@pytest.mark.parametrize("touch", [None, True, False])
+def test_fingers_touch_each_other_without_objects_where_they_are_told_to(touch):
+    """One is led into its neighbour: through it, or up to it."""
+    into = {"kind": "points", "times": [0.0, 0.2], "values": [0.0, 0.3], "amplitude": 0.0}
+    led = {"simulation.duration": 0.3, "reference.joints.index.abduction": into, "hand.fingers_touch": touch}
+    hand = fp.simulate(fp.load_scenario("hand", {key: value for key, value in led.items() if value is not None}))
+    assert ("contact" in hand.coords) == bool(touch)
+    if touch:
+        pushed = hand.contact_normal_force.max("time").values
+        assert {str(name).split(".")[0] for name in hand.contact.values[pushed > 0.1]} == {"index"}
+        assert float(hand.contact_gap.min()) > -1e-3
+
+
+def test_fingers_that_are_told_not_to_touch_still_touch_objects():
+    described = fp.load_scenario("grasp", {"hand.fingers_touch": False})
+    finger = fp.Finger(described.finger, objects=described.environment.objects)
+    assert all("cylinder" in name or "table" in name for name in finger.surroundings.contacts.names)
