@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,7 +12,6 @@ from finger_pin.core.chains import Chains, read_chains
 from finger_pin.core.evaluation.law_code import SIGNALS, addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import Paths, reached, read_paths
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 
@@ -141,19 +140,54 @@ def _read(mechanism: Mechanism) -> Tables:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
-    model = body.model
     if body not in _CHAINS:
-        _CHAINS[body] = read_chains(model)
-    chains = _CHAINS[body]
-    parents, last, turns = chains.parents, chains.last, chains.turns
+        _CHAINS[body] = read_chains(body.model)
+    chains, count = _CHAINS[body], sum(table.count for table in rows)
+    paths = read_paths([path for table in rows for path in table.paths], chains)
+    return Tables(
+        guided=mechanism.guided,
+        lumps=mechanism.inertia,
+        laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
+        books=_books(mechanism),
+        paths=paths,
+        **_of_body(body, chains),
+        **_of_states(mechanism, count),
+        **_of_wiring(mechanism, count),
+        **_of_arms(mechanism, reached(paths, count, mechanism.coordinates)),
+    )
+
+
+def _of_body(body: RigidBody, chains: Chains) -> dict[str, Any]:
+    """Return the tree of rigid bodies, its tips, and how joints are loaded as pins."""
+    model, last, turns = body.model, chains.last, chains.turns
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
-    first_body = [*(int(joint.idx_v) for joint in model.joints[1:]), -1]
     tips = [model.frames[tip] for tip in body.tips]
     holders = [int(tip.parentJoint) for tip in tips]
     carriers = [body.carriers[joint] for joint in joint_of]
-    count = sum(table.count for table in rows)
+    offsets = [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
+    directions = [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(carriers, joint_of, strict=True)]
+    return {
+        "parents": chains.parents,
+        "roots": chains.roots,
+        "kinds": chains.kinds,
+        "bodies": chains.bodies,
+        "charts": chains.charts,
+        "chart_frames": chains.chart_frames,
+        "gravity": np.array(model.gravity.linear),
+        "tip_body": np.array([last[joint] for joint in holders], dtype=np.int64),
+        "tip_offset": np.array(offsets).reshape(-1, 3),
+        "tip_force": np.zeros((len(tips), 3)),
+        "loaded": False,
+        "carriers": np.array([last[joint] for joint in carriers], dtype=np.int64),
+        "directions": np.array(directions).reshape(-1, 3),
+        "carried": np.ascontiguousarray(body.supports[:, joint_of - 1]),
+    }
+
+
+def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
+    """Return the numbers of the laws, and the states and contacts among the rows."""
+    rows = mechanism.rows
     ends = np.cumsum([0, *(table.count for table in rows)])
-    first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
     state, touch = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
     parameters = np.zeros((max((len(table.law.parameters) for table in rows), default=0), count))
     for table, own, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
@@ -165,6 +199,20 @@ def _read(mechanism: Mechanism) -> Tables:
             stateful = stateful[touch[begin:end] == 2]
         if table.states:
             state[stateful] = np.arange(own.start, own.stop)
+    return {
+        "parameters": parameters,
+        "state": state,
+        "state_row": np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
+        "touch": touch,
+        "touching": int(np.count_nonzero(touch)),
+    }
+
+
+def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
+    """Return how rows are fed and loaded by earlier ones, from outside, and as pins."""
+    rows, ends = mechanism.rows, np.cumsum([0, *(table.count for table in mechanism.rows)])
+    first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
+    first_body = [*(int(joint.idx_v) for joint in mechanism.body.model.joints[1:]), -1]
     terms: list[int] = []
     weights: list[float] = []
     starts: list[list[int]] = []
@@ -177,78 +225,50 @@ def _read(mechanism: Mechanism) -> Tables:
                     terms.extend(first_row[group] + found)
                     weights.extend(matrix[k, found])
                 starts[-1].append(len(terms))
-    none: list[Array] = [np.zeros((0, mechanism.coordinates))]
-
-    def stacked(name: str) -> Array:
-        return np.concatenate([*none, *(getattr(table, name) for table in rows)])
-
-    arm, measure, bends = stacked("arm"), stacked("measure"), stacked("bends")
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
-    paths = read_paths([path for table in rows for path in table.paths], chains)
-    routed = reached(paths, count, mechanism.coordinates)
+    groups = [
+        (
+            begin,
+            end,
+            bool(table.inputs),
+            bool(table.loads) or np.any(table.pins >= 0),
+            SIGNALS + table.law.signals.index(table.law.kink) if table.law.kink else -1,
+        )
+        for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
+    ]
+    return {
+        "groups": np.array(groups, dtype=np.int64).reshape(-1, 5),
+        "channel": channel,
+        "fed_row": np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
+        "input_start": np.array(starts[0], dtype=np.int64),
+        "load_start": np.array(starts[1], dtype=np.int64),
+        "terms": np.array(terms, dtype=np.int64),
+        "weights": np.array(weights, dtype=float),
+        "pins": np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
+    }
+
+
+def _of_arms(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return arms, measures and bends, entry by entry where any is not zero or paths lead."""
+    rows, none = mechanism.rows, np.zeros((0, mechanism.coordinates))
+    arm, measure, bends = (
+        np.concatenate([none, *(getattr(table, name) for table in rows)]) for name in ("arm", "measure", "bends")
+    )
     arm_start, arm_row, arm_at = _sparse((arm != 0.0) | (measure != 0.0) | routed)
     bend_start, bend_row, bend_at = _sparse((bends != 0.0) | routed)
-    return Tables(
-        parents=parents,
-        roots=chains.roots,
-        kinds=chains.kinds,
-        bodies=chains.bodies,
-        charts=chains.charts,
-        chart_frames=chains.chart_frames,
-        guided=mechanism.guided,
-        gravity=np.array(model.gravity.linear),
-        lumps=mechanism.inertia,
-        tip_body=np.array([last[joint] for joint in holders], dtype=np.int64),
-        tip_offset=np.array(
-            [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
-        ).reshape(-1, 3),
-        tip_force=np.zeros((len(tips), 3)),
-        loaded=False,
-        carriers=np.array([last[joint] for joint in carriers], dtype=np.int64),
-        directions=np.array(
-            [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(carriers, joint_of, strict=True)]
-        ).reshape(-1, 3),
-        groups=np.array(
-            [
-                (
-                    begin,
-                    end,
-                    bool(table.inputs),
-                    bool(table.loads) or np.any(table.pins >= 0),
-                    SIGNALS + table.law.signals.index(table.law.kink) if table.law.kink else -1,
-                )
-                for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 5),
-        laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
-        books=_books(mechanism),
-        parameters=parameters,
-        offset=np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
-        arm_start=arm_start,
-        arm_at=arm_at,
-        arm_row=arm_row,
-        arm=arm[arm_row, arm_at],
-        measure=measure[arm_row, arm_at],
-        state=state,
-        state_row=np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
-        touch=touch,
-        touching=int(np.count_nonzero(touch)),
-        channel=channel,
-        fed_row=np.flatnonzero((channel >= 0) | (np.diff(starts[0]) > 0)),
-        input_start=np.array(starts[0], dtype=np.int64),
-        load_start=np.array(starts[1], dtype=np.int64),
-        terms=np.array(terms, dtype=np.int64),
-        weights=np.array(weights, dtype=float),
-        pins=np.array([first_body[pin] for table in rows for pin in table.pins], dtype=np.int64),
-        carried=np.ascontiguousarray(body.supports[:, joint_of - 1]),
-        bend_start=bend_start,
-        bend_at=bend_at,
-        bend_row=bend_row,
-        bend=bends[bend_row, bend_at],
-        curvature_offset=np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
-        paths=paths,
-    )
+    return {
+        "offset": np.concatenate([np.zeros(0), *(table.offset for table in rows)]),
+        "arm_start": arm_start,
+        "arm_at": arm_at,
+        "arm_row": arm_row,
+        "arm": arm[arm_row, arm_at],
+        "measure": measure[arm_row, arm_at],
+        "bend_start": bend_start,
+        "bend_at": bend_at,
+        "bend_row": bend_row,
+        "bend": bends[bend_row, bend_at],
+        "curvature_offset": np.concatenate([np.zeros(0), *(table.curvature_offset for table in rows)]),
+    }
 
 
 def _books(mechanism: Mechanism) -> NDArray[np.int64]:

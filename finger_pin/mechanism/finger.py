@@ -68,8 +68,8 @@ class Finger:
         """Build a finger.
 
         Args:
-            description: The finger, or what `load_finger` takes: the name of one, or the path of a file. A hand, or the
-                name of one that ships, is all its fingers together, whose joints and tendons have dotted names.
+            description: The finger, its name, or the path of its file. A hand is all its fingers together, whose joints
+                and tendons have dotted names.
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).

@@ -161,12 +161,8 @@ class Mechanism:
         q, v, z = self.split(x)
         joints, turning = int(self.body.model.nv), q[..., : self.body.model.nq]
         linear, lead = self.linear_positions(q), x.shape[:-1]
-        tips = len(self.body.tips)
-        pressed = force is not None and bool(np.any(force))
-        forces = np.zeros((*lead, tips, 3))
-        if pressed:
-            given = np.asarray(force, dtype=float)
-            forces[...] = given[..., None, :] if tips == 1 else given
+        forces = self._forces(force, lead)
+        pressed = bool(np.any(forces))
         command = np.asarray(command, dtype=float)
         found: dict[str, RowSignals] = {}
         touching: list[tuple[Paths, Array]] = []
@@ -219,6 +215,13 @@ class Mechanism:
             guided_power=guided_power,
             rate=np.concatenate([moving, v[..., joints:], acceleration, *rates], axis=-1),
         )
+
+    def _forces(self, force: Array | None, lead: tuple[int, ...]) -> Array:
+        """Return the forces at all tips, shape (..., t, 3)."""
+        tips = len(self.body.tips)
+        given = np.zeros(3) if force is None else np.asarray(force, dtype=float)
+        one = tips == 1 or force is None
+        return np.broadcast_to(given[..., None, :] if one else given, (*lead, tips, 3))
 
     def _routed(self, table: Rows, q: Array) -> Reach:
         """Return what paths through space add to the rows of a table, shape (..., k) and (..., k, N)."""

@@ -35,22 +35,7 @@ def wild_scenario(seed: int) -> fp.Scenario:
             "name": "wild",
             "joints": joints,
             "tendons": _tendons(rng, magnitude, names, passive),
-            "tendon_friction": {
-                "coulomb": magnitude(1e-3, 0.5, none=0.1),
-                "stiction_ratio": float(rng.uniform(1.0, 3.0)),
-                "stiffness": magnitude(1e3, 1e6),
-                "viscous": magnitude(1e-3, 10.0, none=0.2),
-                "stribeck_velocity": magnitude(1e-4, 0.1),
-                "floor": magnitude(1e-8, 1e-3),
-            },
-            "joint_friction": {
-                "coulomb": coulomb,
-                "stiction": coulomb * float(rng.uniform(1.0, 2.0)),
-                "stiffness": magnitude(0.1, 100.0),
-                "viscous": magnitude(1e-6, 1e-2, none=0.2),
-                "stribeck_velocity": magnitude(1e-3, 1.0),
-                "floor": magnitude(1e-9, 1e-6),
-            },
+            **_frictions(rng, magnitude, coulomb),
             "passive_tendon": {"stiffness": magnitude(1e3, 3e5), "mass": magnitude(1e-6, 1e-3)},
             "stroke_limiter": {"stiffness": magnitude(1.0, 1e5), "damping": magnitude(1e-2, 100.0, none=0.1)},
         },
@@ -74,16 +59,45 @@ def wild_scenario(seed: int) -> fp.Scenario:
             if index not in coupling
         }
     }
+    initial = _initial(rng, magnitude, joints)
+    if initial:
+        scenario["simulation"]["initial"] = initial
+    return fp.Scenario.model_validate(scenario)
+
+
+def _frictions(rng: np.random.Generator, magnitude: Any, coulomb: float) -> dict[str, Any]:
+    """Return the friction of tendons and of joints, whose Coulomb coefficient is given."""
+    return {
+        "tendon_friction": {
+            "coulomb": magnitude(1e-3, 0.5, none=0.1),
+            "stiction_ratio": float(rng.uniform(1.0, 3.0)),
+            "stiffness": magnitude(1e3, 1e6),
+            "viscous": magnitude(1e-3, 10.0, none=0.2),
+            "stribeck_velocity": magnitude(1e-4, 0.1),
+            "floor": magnitude(1e-8, 1e-3),
+        },
+        "joint_friction": {
+            "coulomb": coulomb,
+            "stiction": coulomb * float(rng.uniform(1.0, 2.0)),
+            "stiffness": magnitude(0.1, 100.0),
+            "viscous": magnitude(1e-6, 1e-2, none=0.2),
+            "stribeck_velocity": magnitude(1e-3, 1.0),
+            "floor": magnitude(1e-9, 1e-6),
+        },
+    }
+
+
+def _initial(rng: np.random.Generator, magnitude: Any, joints: dict[str, Any]) -> dict[str, Any]:
+    """Return a start: one in three with a joint beyond its range, one in three in motion."""
+    initial: dict[str, Any] = {}
     if rng.random() < 1 / 3:
-        name = str(rng.choice(names))
+        name = str(rng.choice(list(joints)))
         lower, upper = joints[name]["range"]
         beyond = magnitude(1e-3, 0.5)
-        position = {name: upper + beyond if rng.random() < 0.5 else lower - beyond}
-        scenario["simulation"]["initial"] = {"position": position}
+        initial["position"] = {name: upper + beyond if rng.random() < 0.5 else lower - beyond}
     if rng.random() < 1 / 3:
-        velocity = {name: float(rng.normal() * magnitude(0.1, 30.0)) for name in names}
-        scenario["simulation"].setdefault("initial", {})["velocity"] = velocity
-    return fp.Scenario.model_validate(scenario)
+        initial["velocity"] = {name: float(rng.normal() * magnitude(0.1, 30.0)) for name in joints}
+    return initial
 
 
 def _joint(rng: np.random.Generator, magnitude: Any) -> dict[str, Any]:

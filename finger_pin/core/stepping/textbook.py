@@ -104,7 +104,7 @@ def integrate(
         run.solvers.append(made)
         return made
 
-    x, reason, interrupted, current, window = np.array(start, dtype=float), "", False, None, 0.0
+    x, reason, interrupted, current = np.array(start, dtype=float), "", False, None
     while run.times[-1] < duration and not reason and not interrupted:
         try:
             # At the edge of what floating point holds, a rejected trial step overflows before its error is measured.
@@ -117,11 +117,7 @@ def integrate(
                 raise
             reason = f"the state or its Jacobian is not finite ({error})"
             break
-        reached, reason = float(current.t), str(message) if current.status == "failed" else ""
-        if not reason and not np.all(np.isfinite(current.y)):
-            reason = "the state is not finite"
-        if not reason and not reached > run.times[-1]:
-            reason = "the step size is less than the spacing between numbers"
+        reached, reason = float(current.t), _trouble(current, message, run.times[-1])
         if reason:
             break
         dense = current.dense_output()
@@ -131,29 +127,27 @@ def integrate(
             continue
         run.times.append(reached)
         run.dense.append(dense)
-        x, steps = current.y.copy(), len(run.dense)
-        if steps % _WINDOW == 0:
-            if reached - window < _WINDOW * _LEAST_MEAN_STEP:
-                reason = f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each"
-            window = reached
-        if steps > _MOST_STEPS:
-            reason = f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory"
+        x = current.y.copy()
+        reason = run.exhausted
         if watch is not None:
             watch(reached, x)
         interrupted = stop is not None and not reason and reached < duration and stop()
     return Trajectory(
         breakpoints=np.array(run.times),
         interpolate=run.interpolant(start),
-        statistics=Statistics(
-            steps=len(run.dense),
-            evaluations=system.evaluations,
-            jacobians=sum(int(each.njev) for each in run.solvers),
-            factorisations=sum(int(each.nlu) for each in run.solvers),
-            wall_time=time.perf_counter() - began,
-        ),
+        statistics=run.statistics(system.evaluations, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
     )
+
+
+def _trouble(solver: Any, message: str | None, last: float) -> str:
+    """Return what is wrong with a step that scipy has made from a time, s; empty for nothing."""
+    if solver.status == "failed":
+        return str(message)
+    if not np.all(np.isfinite(solver.y)):
+        return "the state is not finite"
+    return "" if float(solver.t) > last else "the step size is less than the spacing between numbers"
 
 
 def _transposed(dense: Any) -> Callable[[Array], Array]:
@@ -167,6 +161,21 @@ class _Steps:
     times: list[float]
     dense: list[Any]
     solvers: list[Any]
+
+    @property
+    def exhausted(self) -> str:
+        """Why there must be no more steps: the last ones were too short, or there are too many; empty if there may."""
+        steps = len(self.dense)
+        if steps > _MOST_STEPS:
+            return f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory"
+        if steps % _WINDOW == 0 and self.times[-1] - self.times[-1 - _WINDOW] < _WINDOW * _LEAST_MEAN_STEP:
+            return f"the last {_WINDOW} steps advanced by less than {_LEAST_MEAN_STEP:g} s each"
+        return ""
+
+    def statistics(self, evaluations: int, wall_time: float) -> Statistics:
+        """Return what the steps took."""
+        jacobians, factorisations = (sum(int(getattr(each, n)) for each in self.solvers) for n in ("njev", "nlu"))
+        return Statistics(len(self.dense), evaluations, jacobians, factorisations, wall_time)
 
     def interpolant(self, start: Array) -> Callable[[Array], Array]:
         """Return what maps times to states."""
