@@ -113,12 +113,19 @@ def _best(law: Problem, weights: Array, places: Sequence[Array]) -> Fit:
 
 
 def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
-    """Return which samples of every signal are held out in turn: whole recordings, or readings of the same load."""
+    """Return which samples of every signal are held out in turn: recordings, windows, or readings of the same load."""
     names = list(dict.fromkeys(signal.recording for signal in problem.signals))
     if len(names) > 1:
         return [[np.full(len(s.measured), s.recording == name) for s in problem.signals] for name in names]
     if any(signal.ordered for signal in problem.signals):
-        return []
+        # The windows of one recording follow each other; samples of one window do not stand for themselves.
+        groups = problem.groups.tolist()
+        window = [groups[:k].count(group) for k, group in enumerate(groups)]
+        parts = min(max(window) + 1, _PARTS)
+        return [
+            [np.full(len(s.measured), w % parts == part) for s, w in zip(problem.signals, window, strict=True)]
+            for part in range(parts)
+        ]
     groups = [np.unique(np.nan_to_num(signal.load), return_inverse=True)[1] % _PARTS for signal in problem.signals]
     return [[group == part for group in groups] for part in range(int(max(g.max() for g in groups)) + 1)]
 
