@@ -61,7 +61,7 @@ def expected_error(scenario: Scenario) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Attempt:
     """A run whose energy account has been seen to.
 
     Attributes:
@@ -84,7 +84,7 @@ def close_account(
     trajectory: Trajectory,
     repeated: Callable[[Scenario, Stop], Trajectory],
     recorded: Callable[[Trajectory], xr.Dataset],
-) -> Run:
+) -> Attempt:
     """Record a run, and repeat it at tighter tolerances as long as its energy account does not close to ten times them.
 
     Small forces and slow drifts are within the tolerances of the state and yet may be all that a run's energy is. The
@@ -97,7 +97,7 @@ def close_account(
         recorded: Makes the result of a trajectory.
     """
     result, settings = recorded(trajectory), scenario.simulation
-    first = run = Run(scenario, trajectory, result, left_open(result))
+    first = run = Attempt(scenario, trajectory, result, left_open(result))
     limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
     whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
     for _ in range(_MOST_REPETITIONS):
@@ -113,13 +113,13 @@ def close_account(
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
             f"{first.left:.2g} of the energy exchanged"
         )
-        run = Run(tighter, other, result, left_open(result), run.trajectory)
+        run = Attempt(tighter, other, result, left_open(result), run.trajectory)
     # Of a power that is booked wrong, say, the tolerances know nothing.
     return run if run.left < max(limit, _HELPS * first.left) else first
 
 
 def estimate_error(
-    scenario: Scenario, run: Run, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
+    scenario: Scenario, run: Attempt, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
 ) -> tuple[float, str]:
     """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
 
