@@ -33,7 +33,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
     scenario = fp.load_scenario(name, {"simulation.duration": duration})
     prepared = fp.prepare(scenario, ["simulation.duration"], RECORDED)
     brief = prepared.scenario([_SHORT])
-    times = _processor_time(
+    times = processor_time(
         {
             "simulate": lambda: fp.simulate(scenario),
             "run": lambda: prepared.run(),
@@ -43,7 +43,7 @@ def _runs(name: str, rounds: int, quick: bool) -> dict[str, float]:
         rounds,
     )
     # What is short is dearer to time than to do.
-    times |= _processor_time(
+    times |= processor_time(
         {
             "short simulate": lambda: fp.simulate(brief),
             "short run": lambda: prepared.run([_SHORT]),
@@ -85,12 +85,12 @@ def _simulator(rounds: int) -> dict[str, float]:
     }
     for _ in range(10):
         jobs["step"]()
-    times = _processor_time(jobs, 20 * rounds)
-    together = _processor_time({"": lambda: fp.step_many(worlds, [next(tensions) for _ in worlds], period)}, rounds)
+    times = processor_time(jobs, 20 * rounds)
+    together = processor_time({"": lambda: fp.step_many(worlds, [next(tensions) for _ in worlds], period)}, rounds)
     return times | {"step_many, per world": together[""] / many}
 
 
-def _processor_time(jobs: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
+def processor_time(jobs: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
     """Return the least processor time of every job, s; the jobs take turns."""
     least = dict.fromkeys(jobs, math.inf)
     for _ in range(rounds):

@@ -125,6 +125,19 @@ def _contact(study: Mapping[str, Any]) -> Iterator[str]:
         yield ""
     for each in study["mujoco"]:
         yield from _mujoco(each)
+    yield "scenarios with many contacts, at their own tolerances: processor time"
+    rows = [
+        (
+            name,
+            f"{each['contacts']}",
+            f"{each['duration']:g} s",
+            _seconds(each["integration"]),
+            _seconds(each["whole"]),
+            f"{each['duration'] / each['whole']:.3g}x",
+        )
+        for name, each in study["crowded"].items()
+    ]
+    yield from table(("", "contacts", "motion", "integration", "simulate()", "real time"), rows)
 
 
 def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:

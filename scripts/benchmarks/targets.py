@@ -49,6 +49,9 @@ def targets(stages: Mapping[str, Any]) -> list[Target]:
     for name, real_time, ratio in (("fig6", 150.0, 50.0), ("stick_slip", 10.0, 80.0)):
         if name in studies:
             found += _speed(name, studies[name], real_time, ratio)
+    for name in (stages.get("contact") or {}).get("crowded", {}):
+        crowd = stages["contact"]["crowded"][name]
+        found.append(target(f"{name}, whole simulate()", crowd["duration"] / crowd["whole"], ">=", 1.0, "x"))
     if stages.get("mujoco"):
         found += _mujoco(stages["mujoco"])
     if stages.get("step-interface"):

@@ -168,7 +168,11 @@ def stages():
                 n: {kind: {"hand": 1.0 / int(n), "fingers": 0.9} for kind in ("integration", "whole")} for n in "12"
             }
         },
-        "contact": {"scenarios": {"press": study}, "mujoco": [compared]},
+        "contact": {
+            "scenarios": {"press": study},
+            "mujoco": [compared],
+            "crowded": {"pour": {"duration": 1.5, "contacts": 496, "integration": 1.0, "whole": 3.0}},
+        },
         "mujoco": compared,
         "mujoco-friction": {
             "version": "4.0.0",
@@ -211,6 +215,7 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["step interface at 1 kHz, steps"] is True
     assert verdicts["step interface at 1 kHz, with controller"] is False
     assert verdicts["MuJoCo, lumped mass, worst error 0.001 rad: Python loop"] is True
+    assert verdicts["pour, whole simulate()"] is False
     assert verdicts["hand over one finger, integration"] is False
     assert verdicts["hand, two threads, integration"] is True
     assert verdicts["prepared run of 10 ms beside its steps"] is True
