@@ -74,9 +74,10 @@ class Prepared:
 
     def __init__(self, family: Family, record: tuple[str, ...], finger: Finger | None = None) -> None:
         """Build what the runs share; use `prepare`."""
-        self.family, self.record, self._finger = family, record, finger
-        loop = self._loop(family.scenario)
+        self.family, self.record, self._given = family, record, finger
+        loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
         refuse_unknown("record", record, variables(loop))
+        self._finger = loop.finger
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
 
@@ -155,7 +156,8 @@ class Prepared:
 
     def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
         setup = Setup.of(scenario, self._loop(scenario, initial))
-        refuse_unknown("record", self.record, variables(setup.loop))
+        if setup.loop.finger is not self._finger:
+            refuse_unknown("record", self.record, variables(setup.loop))
         return setup
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
@@ -195,14 +197,17 @@ class Prepared:
             stop: Asked now and then; when it returns true the run ends there.
         """
         scenario = self.scenario(values)
-        own, loop = own_parts(None, None, None, initial, self._finger), self._loop(scenario, initial)
+        own, loop = own_parts(None, None, None, initial, self._given), self._loop(scenario, initial)
         return interruptible(lambda asked: run(scenario, loop, own, progress=progress, stop=asked), stop)
 
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
         """Return the loop of one of the family."""
-        finger, described = self._finger, scenario.finger
-        if finger is not None and described is not self.family.scenario.finger:
-            finger = finger.changed(described)
+        known, finger = self.family.scenario, self._given
+        if scenario.finger == known.finger and scenario.environment.objects == known.environment.objects:
+            # Nothing of it changes in a run: all share it, also in threads.
+            finger = self._finger
+        elif finger is not None:
+            finger = finger.changed(scenario.finger)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
 

@@ -105,7 +105,10 @@ def variables(loop: ClosedLoop) -> dict[str, Variable]:
         SHORTFALL: Variable(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
     table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _more(loop)
-    return {name: each._replace(frame=_frame(name, each)) for name, each in table.items()}
+    for name, each in table.items():
+        if frame := _frame(name, each):
+            table[name] = each._replace(frame=frame)
+    return table
 
 
 def _frame(name: str, variable: Variable) -> str:

@@ -40,29 +40,30 @@ def call(unit: Unit, table: Any, kind: Kind) -> int:
     return unit(block.ctypes.data)
 
 
-def _address(array: NDArray[Any]) -> int:
+def _address(array: Any) -> int:
     """Return where the numbers of an array lie."""
     if array.size and array.flags.writeable:
         # Sooner than NumPy says it itself.
-        return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
     return int(array.ctypes.data)
 
 
-def _write(value: Any, kind: Any, words: list[int]) -> None:
-    if isinstance(kind, Kind):
-        for part, own in zip(value, kind.fields.values(), strict=True):
-            _write(part, own, words)
-    elif isinstance(kind, Numbers):
-        fitting = isinstance(value, np.ndarray) and value.ndim == kind.dimensions and value.flags.c_contiguous
-        if not fitting or value.dtype != _DTYPES[kind.dtype]:
-            raise TypeError(f"{value!r} cannot be bound as {kind}")
-        words += (_address(value), *value.shape)
-    elif isinstance(value, bool | int) and kind in (int, bool):
-        words.append(int(value))
-    elif isinstance(value, float) and kind is float:
-        words.append(int(np.float64(value).view(np.int64)))
-    else:
-        raise TypeError(f"{value!r} cannot be bound as {kind}")
+def _write(table: Any, kind: Kind, words: list[int]) -> None:
+    for value, own in zip(table, kind.fields.values(), strict=True):
+        if isinstance(own, Numbers):
+            fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous
+            if not fitting or value.dtype != _DTYPES[own.dtype]:
+                raise TypeError(f"{value!r} cannot be bound as {own}")
+            words.append(_address(value))
+            words.extend(value.shape)
+        elif isinstance(own, Kind):
+            _write(value, own, words)
+        elif isinstance(value, bool | int) and own in (int, bool):
+            words.append(int(value))
+        elif isinstance(value, float) and own is float:
+            words.append(int(np.float64(value).view(np.int64)))
+        else:
+            raise TypeError(f"{value!r} cannot be bound as {own}")
 
 
 @_generated
