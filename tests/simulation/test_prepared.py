@@ -1,6 +1,7 @@
 """Prepared scenarios: many runs with other numbers, bit for bit those of scenarios that are read anew."""
 
 import itertools
+import re
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,6 +15,9 @@ from finger_pin.description.family import Family
 from finger_pin.exceptions import InputError, Interrupted
 
 SCENARIOS = ("fig6", "stick_slip", "servo", "servo_position", "press", "pinch", "hand", "grasp")
+
+# The other fingers have the keys of the thumb, and the hand of `grasp` is that of `hand`.
+ALIKE = re.compile(r"grasp\.hand\.|hand\.hand\.fingers\.(?!thumb)")
 
 
 def numbers(table, above=()):
@@ -51,8 +55,7 @@ def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
     """The scenario of each number alone; and, of all that can be changed together, everything a run computes with."""
     scenario, together = fp.load_scenario(name), {}
     for key, value in numbers(scenario.model_dump(mode="python", exclude_none=True)):
-        if name == "grasp" and key.startswith("hand."):
-            # The same hand as in `hand`.
+        if ALIKE.match(f"{name}.{key}"):
             continue
         given, family = changed(value), Family(scenario, [key])
         try:
