@@ -6,7 +6,7 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
@@ -22,6 +22,37 @@ NETWORK = {"net_arch": [128, 128], "log_std_init": -1.0}
 COLUMNS = ("steps", "seconds", "reward")
 
 
+class Goal(NamedTuple):
+    """When a task is solved: an observed error is small, on average over the last `_LAST` steps of an episode.
+
+    Attributes:
+        columns: Of the observation, where the error stands.
+        within: How small, SI.
+        scale, unit: To print it.
+    """
+
+    columns: slice
+    within: float
+    scale: float
+    unit: str
+
+
+GOALS = {
+    "Reach": Goal(slice(11, 14), 5e-3, 1e3, "mm"),
+    "Press": Goal(slice(-2, -1), 0.3, 1.0, "N"),
+    "Grasp": Goal(slice(-3, None), 5e-3, 1e3, "mm"),
+}
+_LAST = 25
+
+
+class Found(NamedTuple):
+    """What a policy does in new episodes: mean reward per step, part that is solved, median of the last error."""
+
+    reward: float
+    solved: float
+    error: float
+
+
 def train(
     task: Annotated[str, typer.Argument(metavar="TASK", help="Reach, Press or Grasp.")] = "Reach",
     steps: Annotated[int, typer.Option(metavar="N", help="Control steps of all worlds together.")] = 400_000,
@@ -34,16 +65,18 @@ def train(
 
     Ctrl-C keeps the policy so far, and the same command goes on with it.
     """
-    if task not in ("Reach", "Press", "Grasp"):
+    if task not in GOALS:
         raise wrong("TASK", f"{task}: must be Reach, Press or Grasp")
     for name, value in (("--steps", steps), ("--worlds", worlds)):
         if value < 1:
             raise wrong(name, "must be above 0")
     folder = output / task.lower()
     policy = Policy.trained(folder, task, steps, worlds, seed, restart=restart)
-    errors = policy.evaluate(task, episodes=100)
+    found, goal = policy.evaluate(task, episodes=100), GOALS[task]
     draw_curve(policy.curve, task, folder / "curve.png")
-    print_text(f"{task}: reward {errors:.3f} a step over 100 new episodes (1 at best). Results are in {folder}")
+    text = f"{task}: of 100 new episodes {100.0 * found.solved:.0f} end within {goal.scale * goal.within:g} {goal.unit}"
+    text += f" (median {goal.scale * found.error:.2g} {goal.unit}); reward {found.reward:.3f} a step, 1 at best"
+    print_text(f"{text}. Results are in {folder}")
 
 
 class Policy:
@@ -99,8 +132,8 @@ class Policy:
             environment.close()
         return cls(model, folder, np.array(curve))
 
-    def evaluate(self, task: str, episodes: int, **fields: Any) -> float:
-        """Return the mean reward per step over new episodes, without exploration.
+    def evaluate(self, task: str, episodes: int, **fields: Any) -> Found:
+        """Return how the policy does in new episodes, without exploration.
 
         Args:
             task: Name.
@@ -112,13 +145,20 @@ class Policy:
         environment = VecNormalize.load(str(self.folder / "normalisation.pkl"), build_worlds(task, episodes, **fields))
         environment.training = environment.norm_reward = False
         environment.seed(10_000)
-        seen, total, count, going = environment.reset(), 0.0, 0, np.ones(episodes, dtype=bool)
+        seen, rewards, errors = environment.reset(), [], []
+        going, lost = np.ones(episodes, dtype=bool), np.zeros(episodes, dtype=bool)
         while going.any():
+            raw = np.asarray(environment.get_original_obs())
+            errors.append(np.linalg.norm(raw[:, GOALS[task].columns], axis=1))
             action, _ = self.model.predict(seen, deterministic=True)
-            seen, reward, over, _ = environment.step(action)
-            total, count, going = total + float(reward[going].sum()), count + int(going.sum()), going & ~over
+            seen, reward, over, info = environment.step(action)
+            rewards.append(np.where(going, reward, np.nan))
+            # Episodes that end before their time have failed.
+            lost |= [going[i] and over[i] and not info[i]["TimeLimit.truncated"] for i in range(episodes)]
+            going &= ~over
         environment.close()
-        return total / count
+        last = np.where(lost, np.inf, np.mean(errors[-_LAST:], axis=0))
+        return Found(float(np.nanmean(rewards)), float(np.mean(last < GOALS[task].within)), float(np.median(last)))
 
 
 def build_worlds(task: str, count: int, **fields: Any) -> Any:

@@ -34,6 +34,8 @@ class CompiledFingers:
             accelerated: Whether accelerations are wanted, which take most of the time; they are NaN else.
         """
         self._fingers, self._first = list(fingers), fingers[0]
+        # Says where tips are as long as bodies are the same, whoever is the first: that it binds once.
+        self._mover = fingers[0]
         mechanism, count = self._first.mechanism, len(fingers)
         tables = mechanism.tables
         self._room = mechanism.room(count, accelerated=accelerated)
@@ -45,7 +47,7 @@ class CompiledFingers:
         self._bases = np.zeros((count, 15 + self._guided))
         # By whether there are forces at the tips, and whether the base moves.
         self._blocks: dict[tuple[bool, bool], list[NDArray[np.uint8]]] = {}
-        # Whether tendons have other arms than the first one's, and whether tips are elsewhere at the same angles.
+        # Whether tendons have other arms than the first one's, and whether tips are elsewhere than the mover's.
         self._differs = np.array([self._differences(each) for each in fingers])
 
     def replace(self, index: int, finger: CompiledFinger) -> None:
@@ -62,7 +64,7 @@ class CompiledFingers:
         pair, joints = (finger, self._first), len(finger.finger.routing.joints)
         rows = [[table for table in each.finger.mechanism.rows if table.group in PULLING] for each in pair]
         alike = all(np.array_equal(own.arm, other.arm) for own, other in zip(*rows, strict=True))
-        tables = [each.mechanism.tables for each in pair]
+        tables = [each.mechanism.tables for each in (finger, self._mover)]
         bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]
         return not alike or any(table.routed for table in rows[0]), not all(map(np.array_equal, *bodies))
 
@@ -127,7 +129,7 @@ class CompiledFingers:
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertips and energies of the rigid bodies at positions and velocities, shape (m, n)."""
         if not self._differs[:, 1].any() and base is None:
-            return self._first.motion(position, velocity)
+            return self._mover.motion(position, velocity)
         bases = [None] * len(position) if base is None else base
         found = [each.motion(*given) for each, *given in zip(self._fingers, position, velocity, bases, strict=True)]
         tips, kinetic, potential = (np.array([getattr(each, name) for each in found]) for name in _MOTION)

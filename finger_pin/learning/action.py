@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.position_drive import build_drives, loop_period
@@ -15,12 +16,15 @@ from finger_pin.control.proportional import ControlSignals
 from finger_pin.control.reference import ReferenceSignals
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.stepper import Stepper
+from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 # Tension that an action may ask for by default, and by which it may stretch a tendon on a spool, N.
 _STRONGEST = 20.0
+# Of the tensions that goals of joints stretch tendons by, which turn no joint, the largest, N.
+_CLOSING = 5.0
 
 
 class Action(LoopController):
@@ -34,13 +38,15 @@ class Action(LoopController):
         channels: Inputs that are voltages of motors in position drive.
     """
 
-    def __init__(self, kind: str, finger: Finger, duration: float) -> None:
+    def __init__(self, kind: str, finger: Finger, duration: float, nominal: Finger, coupling: PassiveCoupling) -> None:
         """Read a finger.
 
         Args:
             kind: One of `task.ACTIONS`.
             finger: The finger.
             duration: Of an episode, s.
+            nominal: What the drives take it for: goals of joints become angles of its spools.
+            coupling: The joints that passive tendons drive.
 
         Raises:
             InputError: If the finger has no such actuators.
@@ -53,14 +59,20 @@ class Action(LoopController):
                 names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
                 raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
             width = finger.mechanism.channels
-            self.low, self.high, self._scale = np.zeros(width), np.full(width, _STRONGEST), np.ones(width)
+            self.low, self.high = np.zeros(width), np.full(width, _STRONGEST)
+            self._goals: Callable[[Array], Array] = np.array
         else:
             if len(finger.actuators.positioned) != finger.mechanism.channels:
                 raise InputError("action", f'"{kind}" needs motors in position drive at all tendons')
             radius = finger.actuators.spools.max(axis=0)
-            self._scale = 1.0 / radius if kind == "tendon_length" else np.ones(len(radius))
-            least, most = _reach(finger)
-            self.low, self.high = least / self._scale, most / self._scale
+            if kind == "joint_position":
+                free = np.delete(np.arange(len(finger.routing.joints)), coupling.followers)
+                limiter, self._goals = nominal.stroke_limiter, partial(_spools, nominal, coupling, free)
+                self.low, self.high = limiter.lower[free], limiter.upper[free]
+            else:
+                scale = radius if kind == "tendon_length" else np.ones(len(radius))
+                self._goals = partial(_over, scale)
+                self.low, self.high = (each * scale for each in _reach(finger))
             rows = math.ceil(duration / loop_period(finger)) + 1
             self._drives = build_drives(finger, np.zeros((rows, len(radius))))
         self.begin(0.0)
@@ -85,7 +97,7 @@ class Action(LoopController):
         """Take an action at a time, s; the first one acts at once."""
         self.given = action
         arrival = time + self._delay if self._begins or self._waiting else time
-        self._waiting.append((arrival, action * self._scale))
+        self._waiting.append((arrival, self._goals(action)))
 
     def next_piece(self, stepper: Stepper, begin: float, end: float) -> float:
         """Hold what has arrived; return until when it acts, s, at most until the end.
@@ -164,6 +176,19 @@ class Action(LoopController):
         if self._drives is None and (low[pulling] < 0.0).any():
             raise InputError("limits", "tensions must not be negative: a tendon cannot push", low.tolist())
         return low, high
+
+
+def _over(scale: Array, action: Array) -> Array:
+    return np.asarray(action / scale)
+
+
+def _spools(finger: Finger, coupling: PassiveCoupling, free: NDArray[np.int64], goal: Array) -> Array:
+    """Return the spool angles that goals of the free joints need, shape (m,), rad, with all tendons taut in balance."""
+    base = np.zeros(len(finger.routing.joints))
+    base[free] = goal
+    position, closure = coupling.matrix @ base + coupling.offset, finger.routing.force_closure()
+    tension = _CLOSING * closure.tension[: finger.routing.actuated]
+    return finger.actuators.angle(position, tension, finger.excursion(position))
 
 
 def _reach(finger: Finger) -> tuple[Array, Array]:

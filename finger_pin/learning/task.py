@@ -21,7 +21,7 @@ Signals = Mapping[str, Array]
 #: A function of them, for all worlds at once.
 Function = Callable[[Signals], ArrayLike]
 #: Ways in which a policy acts.
-ACTIONS = ("tension", "motor_position", "tendon_length")
+ACTIONS = ("tension", "motor_position", "tendon_length", "joint_position")
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,7 +129,12 @@ def _grasp() -> dict[str, Any]:
         "reward": _held,
         "done": _lost,
         "observation": _observed(
-            "joint_position", "joint_velocity", "fingertip_position", "object_position", "palm_position"
+            "joint_position",
+            "joint_velocity",
+            "fingertip_position",
+            "object_position",
+            "palm_position",
+            from_grip=from_grip,
         ),
         "privileged": ("contact_normal_force",),
         "randomise": {

@@ -15,6 +15,7 @@ from finger_pin.control.compiled import build_stepper, sampled_control
 from finger_pin.core.stepping.batch import RESTING
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.family import Family
 from finger_pin.description.loading import load_scenario
 from finger_pin.description.routing import Array
@@ -26,6 +27,7 @@ from finger_pin.learning.instant import instant, known_variables
 from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
+from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import record
 from finger_pin.views.viewer.video import draw_picture
@@ -59,8 +61,10 @@ class World:
         self.drawn: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
+        self._nominal: tuple[Finger, PassiveCoupling] | None = None
         self.reason, self._step, self._now = "", 0, 0.0
         self._build(family.scenario, origin)
+        self.stepper = self._stepper_at(self.origin.initial_state())
 
     @classmethod
     def of(cls, scenario: Scenario | str | Path, task: Task) -> World:
@@ -95,10 +99,10 @@ class World:
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
         """Build what moves, under inputs that are held."""
         self._scenario, self.origin = scenario, origin or ClosedLoop.from_scenario(scenario).compiled()
-        self.action = Action(self.task.action, self.origin.finger, self.task.duration)
-        self.stepper = self._stepper_at(self.origin.initial_state())
-        if self.action.compiled is not None:
-            self.stepper.drive(self.action.compiled)
+        finger, family = self.origin.finger, self._family.scenario
+        # Drives know what the scenario says, not what was drawn.
+        self._nominal = self._nominal or (finger, family.coupling(finger.routing))
+        self.action = Action(self.task.action, finger, self.task.duration, *self._nominal)
 
     @property
     def loop(self) -> ClosedLoop:
@@ -107,9 +111,9 @@ class World:
         return replace(self.origin, controller=self.action, drives=driven)
 
     def _stepper_at(self, x: Array) -> Stepper:
-        """Return a stepper that starts from a state."""
+        """Return a stepper that starts from a state, with the loops of the action if there are any."""
         loop, settings = self.origin, self._scenario.simulation
-        return build_stepper(
+        stepper = build_stepper(
             loop.finger,
             sampled_control(loop),
             x,
@@ -118,6 +122,9 @@ class World:
             rtol=settings.rtol,
             atol_scale=settings.atol_scale,
         )
+        if self.action.compiled is not None:
+            stepper.drive(self.action.compiled)
+        return stepper
 
     @property
     def time(self) -> float:
@@ -140,7 +147,10 @@ class World:
         if self._randomisation.keys:
             self._build(self._family.at([self.drawn[key] for key in self._randomisation.keys]))
         self._begun = self._start()
-        self.stepper.restart(self._begun, time=0.0)
+        if self.rebuilt:
+            self.stepper = self._stepper_at(self._begun)
+        else:
+            self.stepper.restart(self._begun, time=0.0)
         task = self.task
         context = {} if task.draw is None else task.draw(random)
         self.context = {name: np.asarray(value, dtype=float) for name, value in context.items()}

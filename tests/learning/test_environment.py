@@ -204,6 +204,21 @@ def test_goals_of_spools_are_lengths_over_radius():
     assert np.all((reached > goal) & (reached < goal + 0.06))
 
 
+def test_goals_of_joints_are_reached_whatever_slack_is_known():
+    key = "finger.actuators.*.pretension"
+    task = dict(reward=nothing, action="joint_position", observation=["joint_position"])
+    goal, found = np.array([0.05, 0.6, 0.7]), {}
+    for name, drawn in (("known", {}), ("slack", {key: Uniform(0.0, 0.0)})):
+        drawn_in = {f"finger.actuators.M{k}.pretension": 40.0 for k in range(1, 5)}
+        environment = Environment(fp.load_scenario("servo_position", COARSE | drawn_in), **task, randomise=drawn)
+        environment.reset(seed=0)
+        for _ in range(25):
+            found[name], *_ = environment.step(goal)
+    # What proportional loops and friction leave; and 40 N over 20 N/mm of slack, 2 mm of rope on radii of 5 to 8 mm.
+    np.testing.assert_allclose(found["known"][:3], goal, atol=0.02)
+    assert 0.05 < np.abs(found["slack"][:3] - goal).max() < 0.4
+
+
 def test_an_episode_is_a_result():
     environment = Environment(FIG6, reward=nothing)
     environment.reset(seed=0)
