@@ -81,7 +81,8 @@ def simulate(
             the result's attribute ``self_locking_margin`` says how close. With a controller or reference of one's own
             there is neither.
         AccuracyWarning: If the run errs by far more than its tolerances suggest; the attribute ``estimated_error`` says
-            by how much, rad rms over joints and time. It has none where the core does not integrate in one piece.
+            by how much, rad rms over joints and time. It has none where the error cannot be judged, which is said, nor
+            where the core does not integrate in one piece.
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     scenario = load_scenario(scenario)

@@ -108,6 +108,7 @@ class Part:
             k=np.zeros((len(tableau.nodes), len(x))),
             start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
+            end=np.zeros(len(x)),
             drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
             joints=np.flatnonzero(~of_objects & led),

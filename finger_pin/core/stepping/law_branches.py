@@ -11,8 +11,8 @@ from finger_pin.core.jit import call_at, compiled
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.tables import END, FIRST, KINK
 
-# What a kink may add to the states in the step after it, as a share of their own size.
-_ADDED = 0.02
+# A step after a kink that is rejected costs as much as two that grow.
+_SHARE = 0.25
 
 
 @compiled
@@ -75,14 +75,18 @@ def price(integration: Any, model: Any, time: float, h: float, r: Any) -> Any:
 
 
 @compiled
-def past_kink(h: float, share: float, cost: float, rtol: float) -> Any:
+def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) -> Any:
     """Return how long the step after a kink may be, s.
 
-    Stiff methods damp what they are too long for, and both of a pair alike, so that the error tells nothing: an impact
-    would be swallowed. The jump of the rates, `cost` over the step, has grown over its last 1 - share. Growing on,
-    j t^2 / 2 with j = cost / ((1 - share) h^2), it may add a share of what the states are themselves.
+    Stiff methods damp what they are too long for, and both of a pair alike: of a vibration of y radians in a step the
+    difference is at most radian y^order, and falls again as 1 / y. An impact would be swallowed. So the step has a
+    share of those radians by which the difference is the tolerance; one of more would be rejected if the difference
+    told. The jump of the rates, `cost` over the step, has grown over its last 1 - share. Growing on, it adds
+    cost (t / h)^2 / (2 (1 - share)) tolerances; an impact, which turns a speed back, y^2 / 2 of that speed, and so at
+    most y^2 / (2 rtol) tolerances. Of a slower one the difference tells, but for speeds of a few tolerances.
     """
-    return h * np.sqrt(2.0 * _ADDED * (1.0 - share) / max(rtol * cost, 1e-300))
+    radians = _SHARE * (rtol / tableau.radian) ** (1.0 / tableau.order)
+    return h * radians * np.sqrt((1.0 - share) / max(rtol * cost, 1e-300))
 
 
 @compiled

@@ -12,7 +12,7 @@ from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.broad_phase import depart, list_awake, settle
-from finger_pin.core.stepping.drift import carry, weigh
+from finger_pin.core.stepping.drift import carry, defect, weigh
 from finger_pin.core.stepping.error_norm import step_error, worst
 from finger_pin.core.stepping.flights import NOTHING, UNSEEN, survey
 from finger_pin.core.stepping.law_branches import hold, passed, past_kink, price, release, strayed
@@ -46,6 +46,7 @@ class Integration(NamedTuple):
         k: Scratch for the stages, shape (s, size).
         start: Scratch, f(t, x) at the start of a step, shape (size,).
         r: Scratch, shape (size + 1,).
+        end: Scratch, shape (size,).
         drift: Estimate of the error so far, shape (size,).
         kinks: Where each row was between the sides of its kink when the step began, shape (K,).
         joints: Coordinates whose error is estimated.
@@ -62,6 +63,7 @@ class Integration(NamedTuple):
     k: Matrix
     start: Vector
     r: Vector
+    end: Vector
     drift: Vector
     kinks: Vector
     joints: Indices
@@ -251,7 +253,8 @@ def advance(address: int, end: float) -> int:
                 trend = (memory[LAST_ERROR] / max(error, 1e-10) ** 2) ** exponent
                 predicted = _SAFETY * h / memory[LAST_STEP] * trend
                 factor = min(factor, max(_SHRINK, predicted))
-            if memory[CULPRIT] < 0.0:
+            again = memory[CULPRIT] < 0.0
+            if again:
                 # Right after a rejection the step does not grow.
                 factor = min(factor, 1.0)
                 memory[CULPRIT] = 0.0
@@ -267,10 +270,8 @@ def advance(address: int, end: float) -> int:
             if jumped and not cut:
                 memory[HELD_STEP] = h * min(factor, 1.5)
             jumped = False
-            if share < 1.0:
-                # The rest of the step would have been on the other side.
-                for c in range(size):
-                    drift[c] -= 0.5 * (1.0 - share) * r[c]
+            if share < 1.0 or outcome < 0 or (again and tables.touching > 0):
+                defect(integration, model, time, h)
             memory[BEHIND] = carry(
                 model.linear, h, tableau.gamma, drift, k[count - 1], memory[BEHIND], share < 1.0, r, model.rate
             )
@@ -293,7 +294,7 @@ def advance(address: int, end: float) -> int:
                 memory[STEP], memory[LAST_STEP] = max(memory[STEP], whole), 0.0
                 whole = 0.0
             if share < 1.0:
-                memory[STEP] = min(memory[STEP], past_kink(h, share, cost, rtol))
+                memory[STEP] = min(memory[STEP], past_kink(h, share, cost, rtol, tableau))
             if taken[0] < times.size:
                 times[taken[0]] = memory[TIME]
                 for c in range(size):

@@ -8,7 +8,8 @@ in the form that OrdinaryDiffEq.jl publishes.
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, wraps
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ class Tableau(NamedTuple):
         nodes: c, shape (s,); stage i is taken at t + c_i h.
         time: d, shape (s,); r_i has h d_i df/dt.
         dense: H, shape (m, s); the interpolant's coefficients are H k.
+        radian: |k_s| of a step of one radian of x' = i x, from x = 1; of y radians it is about y^order times that.
     """
 
     gamma: float
@@ -38,6 +40,23 @@ class Tableau(NamedTuple):
     nodes: Vector
     time: Vector
     dense: Matrix
+    radian: float = 0.0
+
+
+def _completed(method: Callable[[], Tableau]) -> Callable[[], Tableau]:
+    """Return a method with what follows from its coefficients."""
+
+    @cache
+    @wraps(method)
+    def completed() -> Tableau:
+        tableau = method()
+        k = np.zeros(len(tableau.nodes), dtype=complex)
+        for i in range(len(k)):
+            right = 1j * (1.0 + tableau.stage[i] @ k) + tableau.coupling[i] @ k
+            k[i] = right / (1.0 / tableau.gamma - 1j)
+        return tableau._replace(radian=float(abs(k[-1])))
+
+    return completed
 
 
 def _lower(*rows: list[float]) -> Array:
@@ -48,7 +67,7 @@ def _lower(*rows: list[float]) -> Array:
     return matrix
 
 
-@cache
+@_completed
 def rodas4() -> Tableau:
     """Return Rodas4: 6 stages, order 4(3), cubic interpolant."""
     last = [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950]
@@ -82,7 +101,7 @@ def rodas4() -> Tableau:
     )
 
 
-@cache
+@_completed
 def rodas5p() -> Tableau:
     """Return Rodas5P: 8 stages, order 5(4), quartic interpolant."""
     last = [-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946]

@@ -1,0 +1,26 @@
+"""What runs with impacts know of their own error; hundreds of them by `scripts/impacts.py`."""
+
+import numpy as np
+import pytest
+from impacts import judge
+from validation.impact_scenarios import at_tolerance, impact_scenario
+
+import finger_pin as fp
+from finger_pin.views.summary import summarize
+
+
+@pytest.mark.parametrize(("family", "seed"), [("drops", 11), ("pinch", 12), ("pinch", 13)])
+def test_the_estimate_carries_what_an_impact_multiplies(family, seed):
+    """Nearly all of their error comes from kinks: contacts that close and open, stick and slip."""
+    found = judge(family, seed)
+    assert 1.0 / 3.0 < found.ratio < 30.0
+
+
+def test_a_motion_in_which_impacts_multiply_errors_beyond_bounds_says_that_it_cannot_be_judged():
+    # It drops on a floor, spinning, and rattles to rest.
+    scenario = at_tolerance(impact_scenario("drops", 7), 1e-3)
+    with pytest.warns(fp.exceptions.AccuracyWarning, match="error of the run cannot be judged: .* differs by"):
+        result = fp.simulate(scenario)
+    assert "estimated_error" not in result.attrs
+    assert "cannot be judged" in summarize(result).replace("\n", " ")
+    assert np.isfinite(result.object_position).all()
