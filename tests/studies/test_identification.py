@@ -152,6 +152,17 @@ def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_pat
     assert run("identify", ["no_such_bench"]) == 2
 
 
+@pytest.mark.parametrize("whole", [True, False], ids=["a scenario", "a name and overrides"])
+def test_a_scenario_that_no_file_has_is_written_out_with_the_numbers_found(tmp_path, whole):
+    turn = {"finger.tendons.T1.curvature_offset": 2.5}
+    data = readings(np.random.default_rng(3))
+    bench = {"bench": fp.load_scenario("canal", turn)} if whole else {"bench": "canal", "overrides": turn}
+    recorded = {"recordings": {"pull": steady()}, "data": {"pull": data}}
+    result = fp.identify(**bench, parameters=BOUNDS, **recorded, starts=1, output=tmp_path)
+    numbers = dict(zip(result.parameter.values.tolist(), result.estimate.values.tolist(), strict=True))
+    assert fp.load_scenario(tmp_path / "identified.toml") == fp.load_scenario("canal", turn | numbers)
+
+
 def ramp(rng, coulomb, drag, correlation=0.0, rate=100.0):
     """The scenario canal drawn in evenly, in closed form: k theta + c theta' = r f, f by the capstan law and a drag.
 

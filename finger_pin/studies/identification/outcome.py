@@ -1,4 +1,4 @@
-"""What comes out of an identification: a Dataset, a scenario that extends the bench, and a page."""
+"""What comes out of an identification: a Dataset, a scenario with the numbers found, and a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 
-from finger_pin.description.loading import ScenarioLike
+from finger_pin.description.family import Family
+from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
@@ -186,31 +187,45 @@ def write_outcome(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem
 
 
 def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> str:
-    """Return the text of a scenario that extends the bench, with the numbers found and their intervals."""
-    name = "" if isinstance(bench, Scenario) else str(bench)
-    path = Path(name).expanduser()
-    if path.suffix == ".toml":
-        try:
-            name = Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
-        except ValueError:
-            # Another drive.
-            name = str(path.absolute())
+    """Return the text of a scenario with the numbers found and their intervals.
+
+    It extends the bench; where no file says all of it, as it was given as a Scenario or with overrides, it is whole.
+    """
     recordings = ", ".join(dict.fromkeys(signal.recording for signal in problem.signals))
-    lines = ["# What an identification has found; intervals at 95 %.", tomli_w.dumps({"extends": name}).strip(), ""]
+    extended = not isinstance(bench, Scenario) and load_scenario(bench) == problem.scenario
+    lines = ["# What an identification has found; intervals at 95 %."]
+    if extended:
+        lines += [tomli_w.dumps({"extends": _from_folder(str(bench), folder)}).strip(), ""]
+    numbers: dict[str, float] = {}
     for key, value, low, high, unit in zip(
         problem.keys[: problem.asked],
-        *(result[each].values for each in ("estimate", "lower", "upper", "units")),
+        *(result[each].values.tolist() for each in ("estimate", "lower", "upper", "units")),
         strict=True,
     ):
-        if key.startswith("recordings."):
-            lines.append(f"# {key} = {float(value):.6g}, {_end(float(low))} to {_end(float(high))} {unit}")
-            continue
         plain, index = split(key)
-        ends = f"{_end(float(low))} to {_end(float(high))}"
-        what = "" if unit == "1" else f" {unit}"
+        ends = f"{_end(low)} to {_end(high)}{'' if unit == '1' else f' {unit}'}"
+        if not key.startswith("recordings."):
+            numbers[key] = value
+        if not extended or key not in numbers:
+            lines.append(f"# {key} = {value:.6g}, {ends}, from {recordings}")
+            continue
         where = "" if index is None else f"number [{index}], "
-        lines.append(f"{plain} = {_toml(problem, key, float(value))} # {where}{ends}{what}, from {recordings}")
+        lines.append(f"{plain} = {_toml(problem, key, value)} # {where}{ends}, from {recordings}")
+    if not extended:
+        lines += ["", to_toml(Family(problem.scenario, tuple(numbers)).at(list(numbers.values()))).rstrip()]
     return "\n".join(lines) + "\n"
+
+
+def _from_folder(bench: str, folder: Path) -> str:
+    """Return what a scenario in a folder extends: a name as it is, a path from the folder."""
+    path = Path(bench).expanduser()
+    if path.suffix != ".toml":
+        return bench
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:
+        # Another drive.
+        return str(path.absolute())
 
 
 def _end(value: float) -> str:
