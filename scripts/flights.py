@@ -16,7 +16,6 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.control.compiled import core_signal
-from finger_pin.control.signal import Signal
 from finger_pin.core.control import held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -28,6 +27,7 @@ from finger_pin.mechanism.contacts import contact_rows
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.solids import add_free_objects, link_solid, object_solids
+from finger_pin.references.signal import Signal
 
 G = 9.81
 #: Touches that are not as deep, m, and misses that are as near, are left out: they are within the tolerances.

@@ -8,7 +8,7 @@ import pytest
 import scipy.optimize
 
 import finger_pin as fp
-from finger_pin.control.reference import ReferenceSignals
+from finger_pin.references.reference import ReferenceSignals
 
 #: Reversals of the references of fig6 after its start, by joint, s.
 REVERSALS = {

@@ -20,7 +20,6 @@ from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.routed import RoutedController
-from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
 from finger_pin.description.routing import Array, Routing
@@ -29,6 +28,7 @@ from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import ClosureWarning, InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.signal import Signal
 
 
 def build_controller(scenario: Scenario, finger: Finger | None = None) -> LoopController:

@@ -12,8 +12,6 @@ from finger_pin.control.moved_objects import Guides
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.proportional import Controller, ControlSignals
-from finger_pin.control.reference import LoopReference, Reference, ReferenceSignals
-from finger_pin.control.signal import Signal
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.routing import Array
@@ -24,6 +22,8 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
+from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
+from finger_pin.references.signal import Signal
 
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4

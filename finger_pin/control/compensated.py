@@ -11,11 +11,11 @@ from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.joint_compensation import JointCompensation
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
-from finger_pin.control.signal import Signal
 from finger_pin.control.tendon_feedforward import TendonFeedforward, undivided
 from finger_pin.control.torque import TorqueLaw
 from finger_pin.description.routing import Array, Routing
+from finger_pin.references.reference import ReferenceSignals
+from finger_pin.references.signal import Signal
 
 # Newton's method converges in a few iterations; if it cycles, plain iteration takes over.
 _SETTLED, _NEWTON, _TURNS = 1e-9, 20, 200

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger_pin.control.signal import Signal
 from finger_pin.core.control import Control, held_control
 from finger_pin.core.evaluation import time_functions as signal_core
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.signal import Signal
 
 if TYPE_CHECKING:
     from finger_pin.control.closed_loop import ClosedLoop

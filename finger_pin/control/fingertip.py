@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array
+from finger_pin.references.signal import Signal
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ import numpy as np
 
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
-from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array, Routing
+from finger_pin.references.reference import ReferenceSignals
+from finger_pin.references.signal import Signal
 
 
 def joined_controller(controllers: Sequence[LoopController], routing: Routing) -> LoopController:

@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self
 
-from finger_pin.control.reference import LoopReference, ReferenceSignals
-from finger_pin.control.signal import Signal
 from finger_pin.core.control import Control
 from finger_pin.description.routing import Array, Routing
+from finger_pin.references.reference import LoopReference, ReferenceSignals
+from finger_pin.references.signal import Signal
 
 if TYPE_CHECKING:
     from finger_pin.control.proportional import ControlSignals

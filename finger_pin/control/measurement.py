@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.state import State
+from finger_pin.references.reference import ReferenceSignals
 
 
 class MeasuringController(ABC):

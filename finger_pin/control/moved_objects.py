@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.signal import Signal
 from finger_pin.description.hand import PathSignal
 from finger_pin.description.objects import PATH
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
+from finger_pin.references.signal import Signal
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from finger_pin.control.compiled import core_signal
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import LoopReference, ReferenceSignals
-from finger_pin.control.signal import Signal
 from finger_pin.core.control import Control, scheduled_control
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
@@ -20,6 +18,8 @@ from finger_pin.description.signals import ForceSignal, InputSignal, SignalSetti
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import LoopReference, ReferenceSignals
+from finger_pin.references.signal import Signal
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.signal import Signal
 from finger_pin.description.hand import PATH, HandDescription
 from finger_pin.description.routing import Array
 from finger_pin.laws.palm import base_motion
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.signal import Signal
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ import numpy as np
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array
+from finger_pin.references.reference import ReferenceSignals
 
 
 class PassiveTensionLoop(LoopController):

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from finger_pin.control.compiled import core_signal
 from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.reference import LoopReference, ReferenceSignals
 from finger_pin.core.control import Control, planned_control
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.laws.controller import internal_level, proportional_torque
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import LoopReference, ReferenceSignals
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ import numpy as np
 
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.torque import TorqueLaw
 from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.laws.controller import internal_level
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import ReferenceSignals
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,12 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.measurement import Sensors
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.controller import SamplingSettings
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.references.reference import ReferenceSignals
 
 # A delay this close to a multiple of the period, in periods, is one: a step between the two would be of no length.
 _COINCIDENT = 1e-9

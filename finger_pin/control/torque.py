@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Array
 from finger_pin.laws.controller import proportional_torque
+from finger_pin.references.reference import ReferenceSignals
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,12 +16,12 @@ from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.proportional import Controller, ControlSignals
-from finger_pin.control.reference import LoopReference, Reference, ReferenceSignals, SignalReference
-from finger_pin.control.signal import Signal
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals, SignalReference
+from finger_pin.references.signal import Signal
 
 #: Times, shape (m,), s, and values, one row for each.
 Samples = tuple[ArrayLike, ArrayLike]

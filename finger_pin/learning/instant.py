@@ -10,8 +10,6 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
-from finger_pin.control.signal import Signal
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.compiled_fingers import CompiledFingers
 from finger_pin.core.stepping.textbook import Statistics, Trajectory
@@ -19,6 +17,8 @@ from finger_pin.description.routing import Array
 from finger_pin.learning.action import Action
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
+from finger_pin.references.reference import ReferenceSignals
+from finger_pin.references.signal import Signal
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.variables import RESIDUAL, Variable, variables
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.proportional import Controller
-from finger_pin.control.reference import Reference
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
@@ -20,6 +19,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import Reference
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.initial_state import own_parts
 from finger_pin.simulation.simulate import simulate

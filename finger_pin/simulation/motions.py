@@ -7,12 +7,12 @@ from functools import cached_property
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
+from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.contact_variables import contact_values
 from finger_pin.simulation.energy import Flows, energies, powers

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.proportional import Controller
-from finger_pin.control.reference import Reference
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.notebook import notebook_bar

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.compiled import build_stepper, core_signal
 from finger_pin.control.moved_objects import Guides
-from finger_pin.control.reference import Reference
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.control import held_control
@@ -25,6 +24,7 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
+from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import numbers
 from finger_pin.simulation.step_log import Told
 

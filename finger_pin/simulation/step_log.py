@@ -12,8 +12,6 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.position_drive import GivenVoltages
-from finger_pin.control.reference import Reference, SignalReference
-from finger_pin.control.signal import Signal
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.integrator import integrate_compiled
@@ -24,6 +22,8 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import Reference, SignalReference
+from finger_pin.references.signal import Signal
 from finger_pin.simulation.accuracy import check_memory, left_open, open_account
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import record

@@ -15,7 +15,6 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
-from finger_pin.control.reference import SignalReference
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -24,6 +23,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism import joint_friction, tendons
 from finger_pin.mechanism.books import LOST
 from finger_pin.mechanism.finger import Finger
+from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.simulate import simulate
 from finger_pin.studies.executing import quiet

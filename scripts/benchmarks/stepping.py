@@ -11,7 +11,7 @@ import finger_pin as fp
 from benchmarks.runs import rms, settled
 from benchmarks.store import Store
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import ReferenceSignals, SignalReference
+from finger_pin.references.reference import ReferenceSignals, SignalReference
 
 PERIOD = 1e-3
 # Of errors below 1e-4 rad a controller sees less than of its sensors' noise.

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.control.routed import RoutedController
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import ClosureWarning
+from finger_pin.references.reference import ReferenceSignals
 
 HEIGHT, REACH = 0.01, 0.03
 

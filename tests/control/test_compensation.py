@@ -9,8 +9,8 @@ import pytest
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.exceptions import InputError
+from finger_pin.references.reference import ReferenceSignals
 
 WISH = 4.0
 #: Only the passive tendon's minimum counts, so that it is planned to carry exactly what (20) makes it carry.

@@ -7,8 +7,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.proportional import ProportionalController
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.routing import Routing
+from finger_pin.references.reference import ReferenceSignals
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 
 import finger_pin as fp
 from finger_pin.control.direction import direction
-from finger_pin.control.reference import ReferenceSignals
+from finger_pin.references.reference import ReferenceSignals
 
 WISH = 4.0
 FEEDFORWARD = {"controller.tendon_friction_feedforward.share": 1.0}

@@ -9,8 +9,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.results import ResultFolder
 from finger_pin.views.summary import summarize
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.exceptions import InputError
+from finger_pin.references.reference import ReferenceSignals
 
 LOOP = {"controller.passive_tension_loop.integral": 10.0, "controller.sampling.period": 1e-3}
 

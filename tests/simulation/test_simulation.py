@@ -9,9 +9,9 @@ import xarray as xr
 
 import finger_pin as fp
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.control.reference import ReferenceSignals
 from finger_pin.description.scenario import METHODS
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
+from finger_pin.references.reference import ReferenceSignals
 
 
 def short(duration=0.02, **settings):

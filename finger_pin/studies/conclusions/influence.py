@@ -19,11 +19,11 @@ import numpy as np
 
 from finger_pin.analysis import self_locking_margin
 from finger_pin.analysis.transmission import coupling_in_motion
-from finger_pin.control.reference import SignalReference
 from finger_pin.description.routing import Array, ForceClosure
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.references.reference import SignalReference
 from finger_pin.studies.conclusions.runs import (
     Measures,
     Progress,

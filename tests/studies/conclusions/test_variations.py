@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.reference import SignalReference
+from finger_pin.references.reference import SignalReference
 from finger_pin.studies.conclusions.runs import (
     at_speed,
     internal_passive_tension,

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control.reference import SignalReference
-from finger_pin.control.signal import Signal
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
+from finger_pin.references.reference import SignalReference
+from finger_pin.references.signal import Signal
 
 
 @pytest.fixture(scope="module")

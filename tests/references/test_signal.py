@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from finger_pin.control.signal import Signal
 from finger_pin.core.evaluation import time_functions as core
 from finger_pin.description.signals import ForceSignal, JointReference
 from finger_pin.exceptions import InputError
+from finger_pin.references.signal import Signal
 
 STEP = JointReference(kind="step", offset=0.1, time=0.5, height=0.4)
 RAMP = JointReference(kind="ramp", time=1.0, duration=0.5, height=-0.6)
