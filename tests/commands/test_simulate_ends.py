@@ -41,7 +41,7 @@ TOO_STIFF = {
     "finger.tendon_friction.viscous": 0.0,
     "simulation.rtol": 1e-12,
     "simulation.atol_scale": 2e-15,
-    "simulation.sample_rate": 1e6,
+    "simulation.sample_rate": 1e7,
 }
 
 
@@ -49,7 +49,7 @@ def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_t
     run, here, quick
 ):
     sets = [part for key, value in TOO_STIFF.items() for part in ("--set", f"{key}={value}")]
-    code, out, lines = run("fig6", "--output", "out", "--duration", "1", *sets)
+    code, out, lines = run("fig6", "--output", "out", "--duration", "0.1", *sets)
     assert (code, len(lines)) == (3, 1)
     said = re.fullmatch(
         r"simulate.py: the integration stopped at t = ([\d.e-]+) s: .* largest in passive_velocity\[T5\]; "
@@ -58,7 +58,7 @@ def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_t
     )
     assert said
     kept, scenario = fp.load("out/trajectory.nc"), load_scenario("out/scenario.toml")
-    assert 0.0 < kept.attrs["end_time"] < 1.0 == scenario.simulation.duration
+    assert 0.0 < kept.attrs["end_time"] < 0.1 == scenario.simulation.duration
     assert kept.attrs["end_time"] == pytest.approx(float(said[1]), rel=1e-5)
     assert len(kept.time) > 10 and kept.time[-1] <= kept.attrs["end_time"]
     assert all(np.isfinite(values).all() for values in kept.data_vars.values())
