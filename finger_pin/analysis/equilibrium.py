@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,33 +88,37 @@ def equilibrium(
     state = layout.unpack(rest)
     places = np.concatenate([state.position, state.passive_position])
     scale = np.concatenate([np.ones(joints), np.full(len(places) - joints, 1e-3)])
-    begun = float(np.max(np.abs(acceleration(places) / scale)))
-    if begun > _REST:
 
-        def arrived(_: float, y: Array) -> float:
-            return float(np.max(np.abs(acceleration(scale * y) / scale))) - _ARRIVED * begun
+    def slope(y: Array) -> Array:
+        return np.asarray(acceleration(scale * y) / scale)
 
-        arrived.terminal = True  # type: ignore[attr-defined]
-
-        def slopes(y: Array) -> Array:
-            # Angles on limiters are tiny: steps that are parts of them would be lost in rounding.
-            shifts = _SHIFT * np.eye(len(y))
-            columns = [acceleration(scale * (y + each)) - acceleration(scale * (y - each)) for each in shifts]
-            return np.transpose(columns) / (2.0 * _SHIFT * scale[:, None])
-
-        down = scipy.integrate.solve_ivp(
-            lambda _, y: acceleration(scale * y) / scale, (0.0, _LONGEST), places / scale, "Radau", events=arrived,
-            rtol=1e-6, atol=1e-9,
-        )  # fmt: skip
-        # Damped, so that it stays where the finger may rest anywhere.
-        polished = scipy.optimize.least_squares(
-            lambda y: acceleration(scale * y) / scale, down.y[:, -1], slopes, method="lm", xtol=1e-15
-        )
-        nearer = min((down.y[:, -1], polished.x), key=lambda y: np.max(np.abs(acceleration(scale * y) / scale)))
-        places = scale * nearer
-    left = float(np.max(np.abs(acceleration(places) / scale)))
-    if not left < max(_REST, 1e-9 * begun):
+    begun = float(np.max(np.abs(slope(places / scale))))
+    y = _downhill(slope, places / scale, _ARRIVED * begun) if begun > _REST else places / scale
+    if not float(np.max(np.abs(slope(y)))) < max(_REST, 1e-9 * begun):
         raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
+    places = scale * y
     x = placed(places)
     torque = finger.evaluate(x, command, pushed).tendon_torque
     return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
+
+
+def _downhill(slope: Callable[[Array], Array], start: Array, enough: float) -> Array:
+    """Return the place of no slope that a slope leads to from a start, shape (k,)."""
+
+    def arrived(_: float, y: Array) -> float:
+        return float(np.max(np.abs(slope(y)))) - enough
+
+    arrived.terminal = True  # type: ignore[attr-defined]
+
+    def slopes(y: Array) -> Array:
+        # Angles on limiters are tiny: steps that are parts of them would be lost in rounding.
+        shifts = _SHIFT * np.eye(len(y))
+        return np.transpose([slope(y + each) - slope(y - each) for each in shifts]) / (2.0 * _SHIFT)
+
+    descent = scipy.integrate.solve_ivp(
+        lambda _, y: slope(y), (0.0, _LONGEST), start, "Radau", events=arrived, rtol=1e-6, atol=1e-9
+    )
+    # Damped, so that it stays where the finger may rest anywhere.
+    polished = scipy.optimize.least_squares(slope, descent.y[:, -1], slopes, method="lm", xtol=1e-15)
+    ends: tuple[Array, Array] = (descent.y[:, -1], polished.x)
+    return min(ends, key=lambda y: float(np.max(np.abs(slope(y)))))

@@ -15,7 +15,7 @@ from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,14 +88,26 @@ def self_locking_map(
     shape = (samples,) * len(axes)
     postures = np.tile(base, (*shape, 1))
     postures[..., columns] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    postures = postures @ coupling.matrix.T
-    flat = postures.reshape(-1, len(base))
-    signs, sliding = directions_of_motion(finger.tendons, np.ones(len(base), dtype=bool))
-    weight = np.array([finger.static_torque(theta) for theta in flat])
-    minimum = expand(minimum_tension, len(routing.tendons))
+    flat = (postures @ coupling.matrix.T).reshape(-1, len(base))
+    coefficient, tension = _worst(finger, flat, expand(minimum_tension, len(routing.tendons)))
+    return SelfLockingMap(
+        joints=chosen,
+        angles=axes,
+        coefficient=coefficient.reshape(shape),
+        tension=tension.reshape(shape),
+        tip=np.array([finger.rigid_body.tip_position(theta) for theta in flat]).reshape(*shape, 3),
+        actual=float(np.max(finger.joint_friction.static)),
+    )
+
+
+def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Array]:
+    """Return critical coefficient and greatest tension at m postures, shape (m,) each, in the worst directions."""
+    routing, (count, size) = finger.routing, positions.shape
+    signs, sliding = directions_of_motion(finger.tendons, np.ones(size, dtype=bool))
+    weight = np.array([finger.static_torque(theta) for theta in positions])
     loop, static = FrictionLoop.of(finger.tendons, None), finger.joint_friction.static
-    coefficient, tension = np.full(len(flat), np.inf), np.zeros(len(flat))
-    alone = len(routing.tendons) == len(base) + 1
+    coefficient, tension = np.full(count, np.inf), np.zeros(count)
+    alone = len(routing.tendons) == size + 1
     counted = slice(None)
     if alone:
         # The friction of actuated tendons scales columns of the balance in f, and leaves where f_i = 0 as it was. With
@@ -104,29 +116,22 @@ def self_locking_map(
     mattering = np.zeros_like(sliding)
     mattering[:, counted] = sliding[:, counted]
     locking = np.unique(np.hstack([signs, mattering]), axis=0)
-    curved = np.abs(flat) @ routing.curvature_matrix[counted].T
+    curved = np.abs(positions) @ routing.curvature_matrix[counted].T
     _, first_of, same = np.unique(curved.round(12), axis=0, return_index=True, return_inverse=True)
     for case in locking:
-        sign = np.broadcast_to(case[: len(base)], flat.shape)
-        slide = np.broadcast_to(case[len(base) :], (len(flat), len(routing.tendons)))
-        kappa = loop.critical(flat[first_of], sign[first_of], slide[first_of])[0]
+        sign = np.broadcast_to(case[:size], positions.shape)
+        slide = np.broadcast_to(case[size:], (count, len(routing.tendons)))
+        kappa = loop.critical(positions[first_of], sign[first_of], slide[first_of])[0]
         coefficient = np.minimum(coefficient, kappa[same.reshape(-1)])
     if alone:
         for case in locking:
             ways = sliding[np.all(np.hstack([signs, mattering]) == case, axis=1)]
-            command = loop.greatest_command(flat, case[: len(base)] * static, ways, minimum, weight)
+            command = loop.greatest_command(positions, case[:size] * static, ways, minimum, weight)
             tension = np.maximum(tension, command)
     else:
         for sign, slide in zip(signs, sliding, strict=True):
-            cases = np.broadcast_to(slide, (len(flat), len(slide)))
-            command = loop.command_to_move(flat, np.broadcast_to(sign * static, flat.shape), cases, minimum, weight)
+            cases = np.broadcast_to(slide, (count, len(slide)))
+            weights = np.broadcast_to(sign * static, positions.shape)
+            command = loop.command_to_move(positions, weights, cases, minimum, weight)
             tension = np.maximum(tension, command[:, : routing.actuated].max(axis=1))
-    tips = [finger.rigid_body.tip_position(theta) for theta in flat]
-    return SelfLockingMap(
-        joints=chosen,
-        angles=axes,
-        coefficient=coefficient.reshape(shape),
-        tension=tension.reshape(shape),
-        tip=np.array(tips).reshape(*shape, 3),
-        actual=float(np.max(static)),
-    )
+    return coefficient, tension

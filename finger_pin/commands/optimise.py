@@ -29,26 +29,29 @@ if TYPE_CHECKING:
 
     from finger_pin.studies.runs import Progress, Stop
 
+_Over = Annotated[
+    list[str],
+    typer.Option(
+        metavar="KEY=RANGE",
+        help="Range of a key, LOW:HIGH or LOW:HIGH:log; keys that go together are KEY,KEY2,-KEY3; repeatable; "
+        "default the finger's radii.",
+    ),
+]
+_Constraint = Annotated[
+    list[str],
+    typer.Option(
+        metavar="BOUND",
+        help="NAME>=VALUE or NAME<=VALUE; repeatable; default self_locking_margin>=1.5 and fingertip_force>=0.8.",
+    ),
+]
+
 
 def optimise(
     scenario: ScenarioName = "fig6",
-    over: Annotated[
-        list[str],
-        typer.Option(
-            metavar="KEY=RANGE",
-            help="Range of a key, LOW:HIGH or LOW:HIGH:log; keys that go together are KEY,KEY2,-KEY3; repeatable; "
-            "default the finger's radii.",
-        ),
-    ] = [],  # noqa: B006
+    over: _Over = [],  # noqa: B006
     minimise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made small; repeatable.")] = [],  # noqa: B006
     maximise: Annotated[list[str], typer.Option(metavar="NAME", help="Metric to be made large; repeatable.")] = [],  # noqa: B006
-    constraint: Annotated[
-        list[str],
-        typer.Option(
-            metavar="BOUND",
-            help="NAME>=VALUE or NAME<=VALUE; repeatable; default self_locking_margin>=1.5 and fingertip_force>=0.8.",
-        ),
-    ] = [],  # noqa: B006
+    constraint: _Constraint = [],  # noqa: B006
     no_constraints: Annotated[bool, typer.Option("--no-constraints", help="Require force closure alone.")] = False,
     population: Annotated[int | None, typer.Option(metavar="N", help="Designs of a generation; default 24.")] = None,
     generations: Annotated[int | None, typer.Option(metavar="N", help="Default 20.")] = None,

@@ -30,28 +30,32 @@ if TYPE_CHECKING:
     from finger_pin.studies.designs import Design
     from finger_pin.studies.runs import Progress, Stop
 
+_Over = Annotated[
+    list[str],
+    typer.Option(
+        metavar="KEY=VALUES",
+        help="Values of a key: START:STOP:N, START:STOP:N:log or A,B,C; for a latin design LOW:HIGH or "
+        "LOW:HIGH:log; repeatable.",
+    ),
+]
+_Design = Annotated[
+    Literal["grid", "list", "latin"],
+    typer.Option(help="Every combination; first values together, then second ones; a Latin hypercube."),
+]
+_Output = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Where results go; default results/sweep-<scenario and keys>.")
+]
+
 
 def sweep(
     scenario: ScenarioName = "fig6",
-    over: Annotated[
-        list[str],
-        typer.Option(
-            metavar="KEY=VALUES",
-            help="Values of a key: START:STOP:N, START:STOP:N:log or A,B,C; for a latin design LOW:HIGH or "
-            "LOW:HIGH:log; repeatable.",
-        ),
-    ] = [],  # noqa: B006
+    over: _Over = [],  # noqa: B006
     metric: Annotated[list[str], typer.Option(metavar="NAME", help="What to measure; repeatable; see --list.")] = [],  # noqa: B006
-    design: Annotated[
-        Literal["grid", "list", "latin"],
-        typer.Option(help="Every combination; first values together, then second ones; a Latin hypercube."),
-    ] = "grid",
+    design: _Design = "grid",
     samples: Annotated[int | None, typer.Option(metavar="N", help="Points of a latin design.")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Of a latin design; default 0.")] = None,
     settings: Settings = [],  # noqa: B006
-    output: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Where results go; default results/sweep-<scenario and keys>.")
-    ] = None,
+    output: _Output = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     restart: Restart = False,
@@ -72,12 +76,7 @@ def sweep(
     if listed:
         print_text(listing())
         return
-    if not over:
-        raise wrong("--over", "at least one key is needed, such as --over controller.gain=0.5:2:7")
-    if (samples is None) == (design == "latin"):
-        raise wrong("--samples", "is needed by --design latin, and by no other")
-    if seed is not None and design != "latin":
-        raise wrong("--seed", "is for --design latin")
+    _check(design, over, samples, seed)
     changed, crew = overrides(settings), pool(workers, scheduler)
     from finger_pin.exceptions import StudyError
     from finger_pin.studies import DEFAULT_METRICS, sweep
@@ -114,8 +113,18 @@ def sweep(
         raise Unsuccessful(f"every run failed; the first one: {result['reason'].values.flat[0]}")
 
 
+def _check(design: str, over: list[str], samples: int | None, seed: int | None) -> None:
+    """Refuse options that do not go together."""
+    if not over:
+        raise wrong("--over", "at least one key is needed, such as --over controller.gain=0.5:2:7")
+    if (samples is None) == (design == "latin"):
+        raise wrong("--samples", "is needed by --design latin, and by no other")
+    if seed is not None and design != "latin":
+        raise wrong("--seed", "is for --design latin")
+
+
 def misses(result: xr.Dataset) -> bool:
-    """Return whether some runs were not made."""
+    """Return true if some runs were not made."""
     return bool((result["status"] == "missing").any())
 
 

@@ -29,9 +29,13 @@ def rows(runs, coupling):
     return {name: compare(name, result, coupling) for name, result in runs.items()}
 
 
-def test_every_case_is_a_scenario():
-    for overrides in CASES.values():
-        fp.control.build_controller(fp.load_scenario("fig6", overrides))
+def test_every_case_is_sampled_alike_and_no_two_are_the_same():
+    cases = [fp.load_scenario("fig6", overrides) for overrides in CASES.values()]
+    for scenario in cases:
+        assert scenario.controller.sampling.period == 1e-3
+        looped = isinstance(fp.control.build_controller(scenario), fp.control.PassiveTensionLoop)
+        assert looped == (scenario.controller.passive_tension_loop is not None)
+    assert all(one.controller != other.controller for k, one in enumerate(cases) for other in cases[:k])
 
 
 def test_friction_compensation_cuts_the_error_by_three_at_no_more_than_1_3_times_the_peak_tension(rows):

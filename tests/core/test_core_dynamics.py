@@ -137,25 +137,30 @@ def test_a_state_or_command_of_the_wrong_size_is_refused_before_compiled_code_se
     assert isinstance(compiled.evaluate(x, np.ones(4)), FingerSignals)
 
 
-def test_one_compilation_serves_all_fingers_and_all_kinds_of_arrays(cases, network):
-    """Compiled code reads one kind alone, and another would be refused."""
-    case = cases["fig6"]
-    x = case.loop.initial_state()
+def test_lists_integers_frozen_and_strided_arrays_are_taken_as_the_numbers_that_they_hold(cases):
+    """Compiled code reads one kind of array alone, and would misread another."""
+    finger = cases["fig6"].loop.finger
+    x = cases["fig6"].loop.initial_state()
     frozen = np.tile(x, (3, 1))
     frozen.flags.writeable = False
-    compiled = CompiledFinger(case.loop.finger)
-    compiled.evaluate(x, [1, 2, 3, 4])
-    compiled.evaluate(frozen, np.ones(4), np.ones((3, 2))[:, 0])
-    compiled.evaluate(np.asfortranarray(frozen), np.ones((3, 4), dtype=np.float32))
-    compiled.motion(frozen[:, :4], np.zeros((3, 4), dtype=int))
-    for each in cases.values():
-        CompiledFinger(each.loop.finger).evaluate(each.loop.initial_state(), np.ones(each.loop.finger.routing.actuated))
-        each.part().advance(1e-4)
+    compiled = CompiledFinger(finger)
+    assert_alike(compiled.evaluate(x, [1, 2, 3, 4]), finger.evaluate(x, np.array([1.0, 2.0, 3.0, 4.0])))
+    strided = np.arange(6.0).reshape(3, 2)[:, 0]
+    assert_alike(
+        compiled.evaluate(frozen, np.ones(4), strided), finger.evaluate(frozen.copy(), np.ones(4), strided.copy())
+    )
+    single = np.ones((3, 4), dtype=np.float32)
+    assert_alike(compiled.evaluate(np.asfortranarray(frozen), single), finger.evaluate(frozen, np.ones((3, 4))))
+    found = compiled.motion(frozen[:, :4], np.zeros((3, 4), dtype=int))
+    np.testing.assert_array_equal(found.tip, compiled.motion(frozen[:, :4].copy(), np.zeros((3, 4))).tip)
+
+
+def test_a_finger_of_one_joint_whose_arrays_are_in_either_order_is_evaluated_and_stepped(network):
     link = {"length": 0.03, "width": 0.01, "mass": 0.01}
     description = network(["only"], {"A": {"only": 5.0}, "B": {"only": -5.0}}).model_dump()
     description["joints"]["only"]["link"] = link
     finger = fp.Finger(fp.FingerDescription.model_validate(description))
     start, scales = finger.rest_state(np.zeros(1)), finger.layout.scales()
+    assert_alike(CompiledFinger(finger).evaluate(start, np.ones(2)), finger.evaluate(start, np.ones(2)))
     control = held_control(finger.mechanism.channels, finger.mechanism.coordinates)
-    Stepper(finger.mechanism, control, start, TABLEAUS["Rodas4"](), 1e-6, 1e-6 * scales).advance(1e-4)
-    CompiledFinger(finger).evaluate(start, np.ones(2))
+    assert Stepper(finger.mechanism, control, start, TABLEAUS["Rodas4"](), 1e-6, 1e-6 * scales).advance(1e-4) == 0

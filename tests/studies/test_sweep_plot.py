@@ -109,16 +109,29 @@ def test_keys_of_one_value_take_no_part():
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), [3.0, 4.0])
 
 
-@pytest.mark.parametrize("shape", [(1,), (2, 2), (2, 2, 2)])
-def test_a_sweep_of_failures_alone_is_drawn(shape, tmp_path):
-    keys = {name: np.arange(1.0, 1.0 + size) for name, size in zip("abc", shape, strict=False)}
-    plot_sweep(made(keys, tuple(keys), m=np.full(shape, np.nan))).savefig(tmp_path / "f.png")
+def test_a_sweep_of_failures_alone_is_drawn_without_a_number():
+    def drawn(*shape):
+        keys = {name: np.arange(1.0, 1.0 + size) for name, size in zip("abc", shape, strict=False)}
+        figure = plot_sweep(made(keys, tuple(keys), m=np.full(shape, np.nan)))
+        figure.draw_without_rendering()
+        return figure.axes[0]
+
+    values, failures = drawn(1).lines[:2]
+    assert np.isnan(values.get_ydata()).all() and failures.get_xdata().tolist() == [1.0]
+    plane = drawn(2, 2)
+    (crosses,) = plane.lines
+    assert np.stack(crosses.get_data(), axis=1).tolist() == [[1.0, 1.0], [1.0, 2.0], [2.0, 1.0], [2.0, 2.0]]
+    assert not plane.collections
+    assert drawn(2, 2, 2).get_title(loc="left").startswith("0 runs, 8 failed")
 
 
-def test_infinite_metrics_are_drawn(tmp_path):
+def test_infinite_metrics_leave_the_finite_ones_drawn():
     for keys in ({"a": [1.0, 2.0]}, {"a": [1.0, 2.0], "b": [1.0]}, {"a": [1.0], "b": [1.0], "c": [1.0, 2.0]}):
         shape = tuple(len(v) for v in keys.values())
-        plot_sweep(made(keys, tuple(keys), m=np.array([np.inf, 1.0]).reshape(shape))).savefig(tmp_path / "f.png")
+        figure = plot_sweep(made(keys, tuple(keys), m=np.array([np.inf, 1.0]).reshape(shape)))
+        figure.draw_without_rendering()
+        assert any(1.0 in np.asarray(line.get_ydata()) for line in figure.axes[0].lines)
+        assert np.isfinite([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()]).all()
 
 
 def test_labels_say_what_a_key_is_and_not_where_it_lies():

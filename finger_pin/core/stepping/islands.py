@@ -89,14 +89,11 @@ def select(tables: Tables, island: Island) -> Tables:
     size = len(tables.parents)
     bodies, lumps = coordinates[coordinates < size], coordinates[coordinates >= size]
     body = _renumbered(bodies, size)
-    row, channel = (
-        _renumbered(rows, len(tables.state)),
-        _renumbered(island.channels, int(max(tables.channel.max(initial=0), island.channels.max(initial=0))) + 1),
-    )
+    row = _renumbered(rows, len(tables.state))
+    channels = int(max(tables.channel.max(initial=0), island.channels.max(initial=0))) + 1
+    channel = _renumbered(island.channels, channels)
     charts = np.isin(tables.charts, bodies)
-    counts = [np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups]
-    present = np.flatnonzero(counts)
-    ends = np.cumsum([0, *(counts[group] for group in present)])
+    present, groups = _groups(tables, rows)
     state = tables.state[rows]
     state[state >= 0] = np.arange(np.count_nonzero(state >= 0))
     coordinate = _renumbered(coordinates, size + len(tables.lumps))
@@ -119,7 +116,7 @@ def select(tables: Tables, island: Island) -> Tables:
         tip_force=tables.tip_force[island.tips],
         carriers=_mapped(body, tables.carriers[bodies]),
         directions=tables.directions[bodies],
-        groups=np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]]),
+        groups=groups,
         laws=tables.laws[present],
         books=tables.books[present],
         parameters=np.ascontiguousarray(tables.parameters[:, rows]),
@@ -148,6 +145,14 @@ def select(tables: Tables, island: Island) -> Tables:
         curvature_offset=tables.curvature_offset[rows],
         paths=select_paths(tables.paths, rows, bodies, lambda old: _mapped(body, old), _entries),
     )
+
+
+def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the groups that some rows belong to, and their entries where these rows stand one after the other."""
+    counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)
+    present = np.flatnonzero(counts)
+    ends = np.cumsum([0, *counts[present]])
+    return present, np.column_stack([ends[:-1], ends[1:], tables.groups[present, 2:]])
 
 
 def select_control(control: Control, island: Island) -> Control:

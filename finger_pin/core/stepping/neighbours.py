@@ -98,38 +98,35 @@ def differentiate(
         knots: Of each of these, when inputs bend or jump, s.
         changes: By how much each number is changed, shape (p,).
     """
+    begins, ends, solutions = [motion.begin], [np.zeros(0)], [np.zeros((0, 4, len(motion.start), len(parts) - 1))]
+    collocation = _collocation(motion, parts, knots, changes)
+    while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
+        ends.append(collocation.ends[:taken].copy())
+        solutions.append(collocation.solution[: 4 * taken].reshape(taken, *solutions[0].shape[1:]).copy())
+        if taken < _ROOM:
+            found = np.concatenate(ends)
+            return Derivative(found, np.concatenate([begins, found[:-1]]), np.concatenate(solutions))
+    return None
+
+
+def _collocation(motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array) -> Collocation:
+    """Return what `collocate` reads and fills, at the start of a motion; arguments as for `differentiate`."""
     own, others = parts[0], parts[1:]
-    record, size, count = motion.record, len(motion.start), len(others)
+    size, count = len(motion.start), len(others)
     rows, columns, held = _bends(own.tables)
     bends = len(rows) + len(own.control.level)
-    corners, shifts = _corners(record.times, knots[0], knots[1:], changes)
+    corners, shifts = _corners(motion.record.times, knots[0], knots[1:], changes)
     width = len(own.tables.parents) + len(own.tables.lumps)
     felt = [not (_alike(own.tables, each.tables) and _alike(own.control, each.control)) for each in others]
     memory = np.zeros(MEMORY_SIZE)
     memory[TIME] = motion.begin
-    begins, ends, solutions = [motion.begin], [np.zeros(0)], [np.zeros((0, 4, size, count))]
-    room = (np.zeros(_ROOM), np.zeros((4 * _ROOM, size, count)))
-    collocation = Collocation(
+    return Collocation(
         model=own.model.address,
         changed=np.array(
             [each.model.address if f else 0 for each, f in zip(others, felt, strict=True)], dtype=np.int64
         ),
         changes=np.array(changes, dtype=float),
-        motion=Between(
-            begin=motion.begin,
-            start=motion.start,
-            attitude=motion.attitude,
-            ends=record.times,
-            states=record.states,
-            attitudes=record.attitudes,
-            dense=record.dense,
-            charts=own.tables.charts,
-            width=width,
-            before=np.zeros(size),
-            times=np.zeros(0),
-            found=np.zeros((0, size)),
-            turned=np.zeros((0, *motion.attitude.shape)),
-        ),
+        motion=_steps(motion, own, width),
         corners=corners,
         shifts=shifts,
         rows=rows,
@@ -152,16 +149,28 @@ def differentiate(
         square=np.zeros((2, size, size)),
         wide=np.zeros((2, size, size + count)),
         pivots=np.zeros(size, dtype=np.int64),
-        ends=room[0],
-        solution=room[1],
+        ends=np.zeros(_ROOM),
+        solution=np.zeros((4 * _ROOM, size, count)),
     )
-    while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
-        ends.append(room[0][:taken].copy())
-        solutions.append(room[1][: 4 * taken].reshape(taken, 4, size, count).copy())
-        if taken < _ROOM:
-            found = np.concatenate(ends)
-            return Derivative(found, np.concatenate([begins, found[:-1]]), np.concatenate(solutions))
-    return None
+
+
+def _steps(motion: IslandMotion, own: Part, width: int) -> Between:
+    """Return the steps of a motion, of which nothing is asked yet."""
+    return Between(
+        begin=motion.begin,
+        start=motion.start,
+        attitude=motion.attitude,
+        ends=motion.record.times,
+        states=motion.record.states,
+        attitudes=motion.record.attitudes,
+        dense=motion.record.dense,
+        charts=own.tables.charts,
+        width=width,
+        before=np.zeros(len(motion.start)),
+        times=np.zeros(0),
+        found=np.zeros((0, len(motion.start))),
+        turned=np.zeros((0, *motion.attitude.shape)),
+    )
 
 
 def _start(motion: IslandMotion, others: Sequence[Part], changes: Array, width: int) -> Array:

@@ -43,40 +43,9 @@ def outcome(
 
     best = min(fits, key=lambda each: each.objective)
     count, keys = problem.asked, problem.keys[: problem.asked]
-    spread = None if spread is None else spread[:count, :count]
-    ends = np.full((2, count), np.nan)
-    for (k, way), side in sides.items():
-        z = best.z.copy()
-        z[k] = side.end if math.isfinite(side.end) else z[k]
-        ends[(way + 1) // 2, k] = problem.values(z)[k] if math.isfinite(side.end) else side.end
-    units = [_units(problem, key) for key in keys]
-    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0)) if spread is not None else np.full(count, np.nan)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = spread / np.outer(deviation, deviation) if spread is not None else np.full((count, count), np.nan)
-    whole, wide = problem.values(best.z), np.zeros(len(best.z))
-    wide[:count] = deviation
-    estimate, linear = whole[:count], [problem.values(best.z + way * 1.96 * wide)[:count] for way in (-1.0, 1.0)]
-    profiles = _profiles(problem, best, sides)
     free = free_directions(problem, best) if spread is not None else []
-    closed = np.isfinite(ends).all(axis=0)
-    closed[[k for _, shown in free for k in shown if k < count]] = False
     variables: dict[str, Any] = {
-        "estimate": ("parameter", estimate, {"long_name": "estimate; units in the variable units"}),
-        "lower": ("parameter", ends[0], {"long_name": "lower end of the 95 % interval; infinite where open"}),
-        "upper": ("parameter", ends[1], {"long_name": "upper end of the 95 % interval; infinite where open"}),
-        "determined": ("parameter", closed, {"long_name": "closed at both ends, by the recordings"}),
-        "units": ("parameter", units, {"long_name": "units of estimate, lower and upper"}),
-        "linear_lower": ("parameter", linear[0], {"long_name": "lower end by the slopes alone"}),
-        "linear_upper": ("parameter", linear[1], {"long_name": "upper end by the slopes alone"}),
-        "least": ("parameter", problem.low[:count], {"long_name": "least value that was allowed"}),
-        "greatest": ("parameter", problem.high[:count], {"long_name": "greatest value that was allowed"}),
-        "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
-        "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
-        "profile_rise": (
-            ("parameter", "point"),
-            profiles[1],
-            {"units": "1", "long_name": "rise of minus twice the likelihood, the others fitted anew; 3.841 at 95 %"},
-        ),
+        **_estimates(problem, best, sides, spread, [k for _, shown in free for k in shown if k < count]),
         **_signals(problem, best),
         "start_objective": ("start", [each.objective for each in fits], {"units": "1"}),
         "start_estimate": (("start", "parameter"), [problem.values(each.z)[:count] for each in fits]),
@@ -100,6 +69,47 @@ def outcome(
     }
     attrs |= {"unfinished": unfinished} if unfinished else {}
     return xr.Dataset(variables, coordinates, attrs)
+
+
+def _estimates(
+    problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side], spread: Array | None, undetermined: list[int]
+) -> dict[str, Any]:
+    """Return the variables along the parameters, some of which the recordings do not determine."""
+    count, keys = problem.asked, problem.keys[: problem.asked]
+    spread = None if spread is None else spread[:count, :count]
+    ends = np.full((2, count), np.nan)
+    for (k, way), side in sides.items():
+        z = best.z.copy()
+        z[k] = side.end if math.isfinite(side.end) else z[k]
+        ends[(way + 1) // 2, k] = problem.values(z)[k] if math.isfinite(side.end) else side.end
+    units = [_units(problem, key) for key in keys]
+    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0)) if spread is not None else np.full(count, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = spread / np.outer(deviation, deviation) if spread is not None else np.full((count, count), np.nan)
+    whole, wide = problem.values(best.z), np.zeros(len(best.z))
+    wide[:count] = deviation
+    estimate, linear = whole[:count], [problem.values(best.z + way * 1.96 * wide)[:count] for way in (-1.0, 1.0)]
+    profiles = _profiles(problem, best, sides)
+    closed = np.isfinite(ends).all(axis=0)
+    closed[undetermined] = False
+    return {
+        "estimate": ("parameter", estimate, {"long_name": "estimate; units in the variable units"}),
+        "lower": ("parameter", ends[0], {"long_name": "lower end of the 95 % interval; infinite where open"}),
+        "upper": ("parameter", ends[1], {"long_name": "upper end of the 95 % interval; infinite where open"}),
+        "determined": ("parameter", closed, {"long_name": "closed at both ends, by the recordings"}),
+        "units": ("parameter", units, {"long_name": "units of estimate, lower and upper"}),
+        "linear_lower": ("parameter", linear[0], {"long_name": "lower end by the slopes alone"}),
+        "linear_upper": ("parameter", linear[1], {"long_name": "upper end by the slopes alone"}),
+        "least": ("parameter", problem.low[:count], {"long_name": "least value that was allowed"}),
+        "greatest": ("parameter", problem.high[:count], {"long_name": "greatest value that was allowed"}),
+        "correlation": (("parameter", "other"), correlation, {"units": "1", "long_name": "of the estimates"}),
+        "profile_value": (("parameter", "point"), profiles[0], {"long_name": "held value of a parameter"}),
+        "profile_rise": (
+            ("parameter", "point"),
+            profiles[1],
+            {"units": "1", "long_name": "rise of minus twice the likelihood, the others fitted anew; 3.841 at 95 %"},
+        ),
+    }
 
 
 def _pairs(best: Fit) -> list[tuple[Array, float]]:
