@@ -109,7 +109,7 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
 
 
 def _usage(error: typer.TyperException) -> str:
-    """Return what is wrong with a command line, with the options that there are where one is not."""
+    """Return the message about a wrong command line, with the options that there are where one is not."""
     option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
     text = str(error.format_message()) if hasattr(error, "format_message") else str(error)
     if context is None or not text.startswith("No such option"):

@@ -74,7 +74,7 @@ def _value(key: str, text: str) -> Any:
 
 
 def pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
-    """Return what makes the runs of a study: threads, or the workers of a Dask scheduler, while entered.
+    """Return the executor of a study's runs, open while entered: threads, or the workers of a Dask scheduler.
 
     Raises:
         InputError: If there are no workers; and, as it is entered, if the scheduler cannot be reached.

@@ -107,7 +107,7 @@ def _distribution(scenario: Scenario, finger: Finger) -> Distribution:
 
 
 def _static(finger: Finger, gravity: bool, springs: bool) -> Callable[[Array], Array] | None:
-    """Return what is added to tau^d so that the finger stays where it is: G, the torque of the springs, or both."""
+    """Return the torque added to tau^d that holds the finger where it is: G, the torque of the springs, or both."""
     if not springs or not finger.springs.present:
         return finger.rigid_body.gravity_torque if gravity else None
     if gravity:

@@ -216,7 +216,7 @@ class ClosedLoop:
         return reference, control, (command, self.force(time), self.base(time))
 
     def base(self, time: Array | float) -> Array | None:
-        """Return how palm and objects are moved at one time, shape (27 + g,), or at times (m,); None at rest."""
+        """Return the motion of palm and objects at one time, shape (27 + g,), or at times (m,); None at rest."""
         mover = self.palm or self.guides
         return None if mover is None else mover.base(time)
 

@@ -54,7 +54,7 @@ class CompensatedController(LoopController):
         return self.command_above(self.minimum, time, reference, position, velocity)
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return what the fingertip is to exert."""
+        """Return the functions of time of the wanted fingertip force."""
         return () if self.fingertip is None else (self.fingertip.wanted,)
 
     def without_memory(self) -> CompensatedController:
@@ -98,7 +98,7 @@ class CompensatedController(LoopController):
         return torque, plan
 
     def _friction_matrix(self, position: Array, desired_velocity: Array) -> Array:
-        """Return what f_hat adds to the torque by friction of joints and passive tendons, shape (..., n, t), m."""
+        """Return the slope by f_hat of the compensation of joints and passive tendons, shape (..., n, t), m."""
         routing = self.routing
         strands = undivided(routing)
         if self.tendons is not None:

@@ -27,7 +27,7 @@ class JointCompensation:
     reversal_speed: float
 
     def load_matrix(self, strand_matrix: Array, desired_velocity: Array) -> Array:
-        """Return what planned tensions add to the torque, shape (..., n, t), m: M(v) direction(v) dR/df_hat.
+        """Return the slope of the torque by planned tensions, shape (..., n, t), m: M(v) direction(v) dR/df_hat.
 
         Tensions are not negative, so that without an external force R = S, the sum of those that cross the joint.
 

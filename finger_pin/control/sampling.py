@@ -59,7 +59,7 @@ class SampledController(LoopController):
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
-        """Return what was held at the given times; an instant belongs to the tensions that arrive at it."""
+        """Return the tensions held at the given times; an instant belongs to the tensions that arrive at it."""
         index = np.floor((np.asarray(time) - self._rest) / self.period * (1.0 + 1e-12)).astype(int) - self._late
         index = np.clip(index, 0, len(self._samples) - 1)
         torques = np.array([sample.torque for sample in self._samples])
@@ -87,7 +87,7 @@ class SampledController(LoopController):
 
 
 def sampling_settings(scenario: Scenario, period: float | None) -> SamplingSettings | None:
-    """Return how the controller is sampled, or None if it is continuous.
+    """Return the settings of the controller's sampling, or None if it is continuous.
 
     Args:
         scenario: With the entries ``controller.sampling``, if any.

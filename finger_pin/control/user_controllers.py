@@ -186,7 +186,7 @@ def _numbers(value: object) -> Array:
 
 
 def choose_controller(given: Controller | Samples | None, scenario: Scenario, finger: Finger) -> LoopController:
-    """Return what a caller gives as controller, ready to be asked, or the scenario's if nothing is given.
+    """Return the controller that a caller gives, ready to be asked, or the scenario's if none is given.
 
     Raises:
         InputError: If it does not fit the finger.
@@ -201,7 +201,7 @@ def choose_controller(given: Controller | Samples | None, scenario: Scenario, fi
 
 
 def choose_reference(given: Reference | Samples | None, scenario: Scenario, routing: Routing) -> LoopReference:
-    """Return what a caller gives as reference, ready to be asked, or the scenario's if nothing is given.
+    """Return the reference that a caller gives, ready to be asked, or the scenario's if none is given.
 
     Raises:
         InputError: If it does not fit the finger.

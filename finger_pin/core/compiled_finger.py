@@ -157,7 +157,7 @@ class CompiledMechanism:
         self._motions: dict[int, tuple[Motions, NDArray[np.uint8]]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds models of its own."""
+        """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds models of its own."""
         return CompiledMechanism, (self.mechanism,)
 
     def evaluate(
@@ -233,7 +233,7 @@ class CompiledMechanism:
     def powers(
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return what the rows supply and lose, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
+        """Return the powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
         room = self.room(len(x), booked_only=True)
         self.fill(room, x, command, force, base)
         return room.booked[:, len(self.mechanism.books.stored) :], room.externals
@@ -329,7 +329,7 @@ class CompiledFinger:
 
 
 def _bases(base: Array | None, count: int, guided: int) -> Array:
-    """Return how the base moves, and what is moved along paths, shape (count, 15 + g), or no rows at rest."""
+    """Return the motions of the base and of what is moved along paths, shape (count, 15 + g), or no rows at rest."""
     if base is None:
         return np.zeros((0, 15 + guided))
     given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + guided]], axis=-1)

@@ -191,7 +191,7 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
 
 
 def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
-    """Return which coordinates the paths of every row depend on, shape (K, N)."""
+    """Return a mask of the coordinates that the paths of every row depend on, shape (K, N)."""
     found = np.zeros((count, width), dtype=bool)
     for k, begin, end in zip(paths.rows, paths.leg_start[:-1], paths.leg_start[1:], strict=True):
         for e in paths.piece[begin:end]:

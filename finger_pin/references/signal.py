@@ -176,7 +176,7 @@ class Signal:
 
 
 def _polynomial(settings: SignalSettings) -> PPoly | None:
-    """Return what the kind of a signal adds to the sinusoid, or None."""
+    """Return the polynomial that the kind of a signal adds to the sinusoid, or None."""
     if settings.times is not None:
         from scipy.interpolate import PchipInterpolator, PPoly
 

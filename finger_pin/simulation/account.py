@@ -159,7 +159,7 @@ def _works(part: _Part, times: Array, count: int) -> Array:
 
 
 def _saved(times: Array, ends: Array) -> slice:
-    """Return which of the saved times lie in steps, those at their ends among them."""
+    """Return the slice of the saved times that lie in steps, those at their ends among them."""
     first, last = np.searchsorted(times, ends[0]), np.searchsorted(times, ends[-1] * (1.0 + 1e-12), side="right")
     return slice(int(first), int(last))
 

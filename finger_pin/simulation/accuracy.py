@@ -167,7 +167,7 @@ def estimate_error(
 
 
 def _difference(scenario: Scenario, one: Array, other: Array) -> float:
-    """Return how far packed states, shape (m, size), differ: of joints or objects, whichever is more; rad or m rms."""
+    """Return the distance of packed states, shape (m, size): of joints or objects, whichever is more; rad or m rms."""
     joints = len(scenario.finger.joints)
     found = float(np.sqrt(np.mean((one - other)[:, :joints] ** 2)))
     moving = sum(each.moves for each in (scenario.environment.objects or {}).values())
@@ -188,13 +188,13 @@ def with_tighter(scenario: Scenario, factor: float) -> Scenario:
 
 
 def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
-    """Return what asks to stop after more looks than a trajectory took, or so many at most."""
+    """Return the question whether to stop: after more looks than a trajectory took, or so many at most."""
     looks, most = count(), min(_PATIENCE * (_FEW + trajectory.statistics.steps // CHUNK), most)
     return lambda: next(looks) >= most
 
 
 def left_open(result: xr.Dataset) -> float:
-    """Return which share of all energy exchanged the account leaves open at most; 0 where that is rounding.
+    """Return the largest share of all energy exchanged that the account leaves open; 0 where that is rounding.
 
     Of bodies that exchange none, such as one that flies freely, it is the share of the most that is stored.
     """
@@ -209,7 +209,7 @@ def left_open(result: xr.Dataset) -> float:
 
 
 def open_account(share: float) -> str:
-    """Return what to say if an energy account leaves more than a ten thousandth open; a share from `left_open`."""
+    """Return the warning if an energy account leaves more than a ten thousandth open; a share from `left_open`."""
     if not share > _OPEN:
         return ""
     return (
@@ -260,7 +260,7 @@ def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
 
 
 def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
-    """Return what to say if bodies have touched whose contact is too stiff for the tolerance; else empty.
+    """Return the warning if bodies have touched whose contact is too stiff for the tolerance; else empty.
 
     Args:
         result: What happened.

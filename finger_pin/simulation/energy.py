@@ -72,12 +72,12 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
 
 
 def flows(books: Books) -> tuple[Energy, ...]:
-    """Return what the powers of a mechanism are, with that of the fingertip force."""
+    """Return the entries of a mechanism's powers, with that of the fingertip force."""
     return (*books.powers, FINGERTIP)
 
 
 def stores(finger: Finger) -> tuple[Energy, ...]:
-    """Return what the stored energies of a finger are."""
+    """Return the entries of a finger's stored energies."""
     rotors = (_ROTORS,) if finger.actuators.names else ()
     objects = () if finger.surroundings is None else _OBJECTS
     return (_KINETIC, _GRAVITY, *finger.mechanism.books.stored, *rotors, *objects)

@@ -17,7 +17,7 @@ def in_notebook() -> bool:
 
 
 def notebook_bar(unit: str, total: float | None = None) -> Callable[..., None] | None:
-    """Return what shows a bar in a notebook as long as something runs; None elsewhere.
+    """Return the function that moves a bar in a notebook; None elsewhere.
 
     Args:
         unit: What is counted, such as ``s``.

@@ -124,7 +124,7 @@ def _whole(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) 
 
 
 def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
-    """Return how far the joints' friction is from what locks the finger; None where the reference is not planned.
+    """Return the margin of the joints' friction to self-locking; None where the reference is not planned.
 
     The margin is that of the paper's controller on the scenario's reference.
     """

@@ -174,7 +174,7 @@ class Setup:
         )
 
     def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
-        """Return what the compiled core steps, at the start, by default at the scenario's tolerances."""
+        """Return the compiled stepper, at the start, by default at the scenario's tolerances."""
         given, loop = settings or self.scenario.simulation, self.loop
         return build_stepper(
             loop.finger,
@@ -187,7 +187,7 @@ class Setup:
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
-        """Return why a trajectory ended early, and what to try.
+        """Return the reason why a trajectory ended early, and advice.
 
         Args:
             trajectory: One that failed.

@@ -78,6 +78,6 @@ def checked(result: xr.Dataset, interrupted: bool) -> xr.Dataset:
 
 
 def origin(scenario: Scenario) -> Mapping[str, str]:
-    """Return what a Dataset says about its origin: the scenario and the versions of packages."""
+    """Return the attributes of a Dataset about its origin: the scenario and the versions of packages."""
     used = {f"version_{name.replace('-', '_')}": version for name, version in versions().items()}
     return {"title": scenario.title or scenario.name, "scenario": to_toml(scenario), **used}

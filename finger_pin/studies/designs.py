@@ -38,7 +38,7 @@ class Design(Protocol):
         """Return the points, the last dimension varying fastest."""
 
     def describe(self) -> dict[str, Any]:
-        """Return what was asked, for a TOML file."""
+        """Return the design as a table of a TOML file."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Grid:
         return [dict(zip(self.values, point, strict=True)) for point in itertools.product(*self.values.values())]
 
     def describe(self) -> dict[str, Any]:
-        """Return what was asked, for a TOML file."""
+        """Return the design as a table of a TOML file."""
         return {"kind": "grid", "values": {key: list(axis) for key, axis in self.values.items()}}
 
 
@@ -111,7 +111,7 @@ class Listing:
         return [dict(zip(self.values, point, strict=True)) for point in zip(*self.values.values(), strict=True)]
 
     def describe(self) -> dict[str, Any]:
-        """Return what was asked, for a TOML file."""
+        """Return the design as a table of a TOML file."""
         return {"kind": "list", "values": {key: list(axis) for key, axis in self.values.items()}}
 
 
@@ -206,7 +206,7 @@ class LatinHypercube:
         return Listing(self.values).points()
 
     def describe(self) -> dict[str, Any]:
-        """Return what was asked, for a TOML file."""
+        """Return the design as a table of a TOML file."""
         ranges = {
             key: {"low": each.low, "high": each.high, "logarithmic": each.logarithmic}
             for key, each in self.ranges.items()

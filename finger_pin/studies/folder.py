@@ -193,7 +193,7 @@ class StudyFolder:
 
 
 def describe_study(starting: Starting, metrics: Sequence[Metric], design: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a study asks for, for a TOML file.
+    """Return the request of a study, for a TOML file.
 
     Warns:
         UserWarning: If what a metric depends on cannot be known, so that its runs cannot be reused.

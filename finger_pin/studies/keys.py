@@ -178,7 +178,7 @@ def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:
-    """Return what lies at a key, or None; where a star stands for all names, at the first of them."""
+    """Return the entry at a key, or None; where a star stands for all names, at the first of them."""
     name, index = split(key)
     held: Any = scenario.model_dump(mode="python")
     for part in name.split("."):

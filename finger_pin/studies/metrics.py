@@ -127,17 +127,17 @@ def losses(run: Run) -> float:
 
 
 def losses_tendons(run: Run) -> float:
-    """Return what the friction of the tendons took, J."""
+    """Return the energy lost to the friction of the tendons, J."""
     return sum(_final(run.result, each.name) for each in tendons.LOSSES)
 
 
 def losses_joints(run: Run) -> float:
-    """Return what the friction of the joints took, J."""
+    """Return the energy lost to the friction of the joints, J."""
     return sum(_final(run.result, each.name) for each in joint_friction.LOSSES)
 
 
 def slack_time(run: Run) -> float:
-    """Return how long at least one tendon, or one half of a passive one, has no tension at one of its ends, s."""
+    """Return the time during which a tendon, or one half of a passive one, has no tension at one of its ends, s."""
     delivered = [np.min(rows(run.result, "tendon_tension", "tendon"), axis=1)]
     if "spool_tension" in run.result:
         delivered.append(rows(run.result, "spool_tension", "tendon").min(axis=1))

@@ -198,7 +198,7 @@ class _Course:
 
 
 def _shares(variables: Sequence[Variable], own: Mapping[str, float]) -> Array | None:
-    """Return where in the unit cube the scenario's own design lies, or None if it does not."""
+    """Return the place of the scenario's own design in the unit cube, or None outside of it."""
     shares = []
     for variable in variables:
         first = own[variable.keys[0]]

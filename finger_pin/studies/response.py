@@ -61,7 +61,7 @@ def winding_temperature(run: Run) -> float:
 
 
 def fingertip_hysteresis(run: Run) -> float:
-    """Return how far apart the fingertip is on the way out and on the way back where its reference is the same, m.
+    """Return the distance of the fingertip between the way out and the way back at the same reference, m.
 
     Way and place are those of the fingertip of the reference along the direction in which it moves most; the ways are
     compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less that of the reference. Of a hand the

@@ -40,7 +40,7 @@ class Addresses(NamedTuple):
 
 @cache
 def addresses(law: Law | ContactLaw) -> Addresses:
-    """Return where a law's functions are, compiled; they live as long as the process."""
+    """Return the addresses of a law's functions, compiled; they live as long as the process."""
     value, slopes, account = (
         (_value, _slopes, _account) if law.arms == 1 else (_contact_value, _contact_slopes, _contact_account)
     )
@@ -50,7 +50,7 @@ def addresses(law: Law | ContactLaw) -> Addresses:
 
 
 def widest(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
-    """Return how many columns the table of rows and that of energies and powers need."""
+    """Return the numbers of columns of the table of rows and of that of energies and powers."""
     powers = max((len(law.supplies) + len(law.losses) for law in laws), default=0)
     return SIGNALS + max((len(law.signals) for law in laws), default=0), 1 + powers
 

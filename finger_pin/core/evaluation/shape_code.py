@@ -19,7 +19,7 @@ _shape: Any = None
 
 
 def shape_addresses(shape: Shape) -> tuple[int, int]:
-    """Return where a shape's value and slopes are, compiled; they live as long as the process."""
+    """Return the addresses of a shape's value and slopes, compiled; they live as long as the process."""
     return _address(shape.value), _address(shape.slopes)
 
 

@@ -54,7 +54,7 @@ register_model(Kind)(models.OpaqueModel)
 
 
 def _words(kind: Any) -> int:
-    """Return how many words a field takes; an array's are its address and its sizes."""
+    """Return the number of words of a field; an array's are its address and its sizes."""
     if isinstance(kind, Numbers):
         return 1 + kind.dimensions
     return int(kind.words) if isinstance(kind, Kind) else 1

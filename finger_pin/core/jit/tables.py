@@ -41,7 +41,7 @@ def call(unit: Unit, table: Any, kind: Kind) -> int:
 
 
 def _address(array: Any) -> int:
-    """Return where the numbers of an array lie."""
+    """Return the address of an array's numbers."""
     if array.size and array.flags.writeable:
         # Sooner than NumPy says it itself.
         return ctypes.addressof(ctypes.c_char.from_buffer(array))

@@ -70,7 +70,7 @@ class Together:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how another one is made, by `copy.deepcopy` or from a pickle: it binds copies of the steppers."""
+        """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
         return Together, (self._steppers,)
 
     def advance(self, ends: ArrayLike) -> Indices:

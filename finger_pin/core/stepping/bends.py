@@ -17,7 +17,7 @@ _NEAR, _MOST = 1e-6, 40
 
 @compiled
 def _begin(b: Any, step: int) -> Any:
-    """Return when a step begins."""
+    """Return the time at which a step begins."""
     return b.begin if step == 0 else b.ends[step - 1]
 
 

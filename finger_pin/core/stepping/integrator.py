@@ -156,7 +156,7 @@ def integrate_compiled(
 
 
 def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:
-    """Return what maps times to packed states, from the steps of all islands."""
+    """Return the function from times to packed states, from the steps of all islands."""
 
     def interpolate(at: Array) -> Array:
         found = [each.interpolate(at) for each in steps]

@@ -209,7 +209,7 @@ def _connected(first: Indices, second: Indices, count: int) -> Indices:
 
 
 def _entries(start: Indices, rows: Indices) -> tuple[Indices, Indices]:
-    """Return where the entries of some rows begin among themselves, and which they are."""
+    """Return the starts of some rows' entries among themselves, and the entries' places."""
     kept = np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(start[k], start[k + 1]) for k in rows)])
     return np.append(0, np.cumsum(np.diff(start)[rows])), kept
 

@@ -199,7 +199,7 @@ def _bends(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArra
 
 
 def _corners(ends: Array, knots: Array, others: Sequence[Array], changes: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return at which steps inputs bend or jump, one more than the row of the shifts, and how these move, s."""
+    """Return the steps at whose ends inputs bend or jump, as one more than the row of the shifts, and the shifts, s."""
     corners = np.zeros(len(ends), dtype=np.int64)
     at = np.flatnonzero(np.isin(ends, knots * _BEFORE))
     corners[at] = 1 + np.arange(len(at))

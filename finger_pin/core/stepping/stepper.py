@@ -103,11 +103,11 @@ class Stepper:
         self._free = [np.isin(tables.charts, island.coordinates) for island in islands]
 
     def _places(self, island: Island) -> NDArray[np.int64]:
-        """Return where the numbers of an island stand in the state of the whole."""
+        """Return the places of an island's numbers in the state of the whole."""
         return np.concatenate([island.coordinates, self._width + island.coordinates, 2 * self._width + island.states])
 
     def places(self, island: Island) -> NDArray[np.int64]:
-        """Return where the numbers of an island stand in a packed state."""
+        """Return the places of an island's numbers in a packed state."""
         return self._charts.packed_places(self._places(island))
 
     @property
@@ -214,7 +214,7 @@ class Stepper:
         return twin
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how another one like it is made, by `copy.deepcopy` or from a pickle: it binds islands of its own."""
+        """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds islands of its own."""
         return Stepper, self._made_of, self.moments
 
     def __setstate__(self, state: Moments) -> None:

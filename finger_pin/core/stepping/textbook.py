@@ -142,7 +142,7 @@ def integrate(
 
 
 def _trouble(solver: Any, message: str | None, last: float) -> str:
-    """Return what is wrong with a step that scipy has made from a time, s; empty for nothing."""
+    """Return the fault of a step that scipy has made from a time, s; empty for none."""
     if solver.status == "failed":
         return str(message)
     if not np.all(np.isfinite(solver.y)):
@@ -173,12 +173,12 @@ class _Steps:
         return ""
 
     def statistics(self, evaluations: int, wall_time: float) -> Statistics:
-        """Return what the steps took."""
+        """Return the statistics of the steps."""
         jacobians, factorisations = (sum(int(getattr(each, n)) for each in self.solvers) for n in ("njev", "nlu"))
         return Statistics(len(self.dense), evaluations, jacobians, factorisations, wall_time)
 
     def interpolant(self, start: Array) -> Callable[[Array], Array]:
-        """Return what maps times to states."""
+        """Return the function from times to states."""
         if not self.dense:
             return lambda at: np.tile(start, (len(at), 1))
         return _transposed(scipy.integrate.OdeSolution(self.times, self.dense))

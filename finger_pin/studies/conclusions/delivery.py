@@ -146,7 +146,7 @@ def check_delivery(scenario: Scenario) -> None:
 
 
 def crossing(values: Array, deviations: Array, level: float = BROKEN) -> float:
-    """Return where deviations first exceed a level, between values by interpolation; infinite where they do not."""
+    """Return the value where deviations first exceed a level, by interpolation; infinite where they do not."""
     above = np.flatnonzero(deviations > level)
     if not above.size:
         return float("inf")
@@ -162,7 +162,7 @@ def _with_friction(scenario: Scenario, factor: float) -> Scenario:
 
 
 def delivered_tensions(scenarios: list[Scenario], progress: Progress | None) -> tuple[Delivery, Array, Array, Array]:
-    """Return what passive tendons deliver in runs of one duration.
+    """Return the planned and delivered tensions of passive tendons in runs of one duration.
 
     Returns:
         Deviations of the m runs; time, shape (k,), s; planned and delivered tensions, shape (m, k, p), N.

@@ -99,7 +99,7 @@ def identify(
 
 
 def build_problem(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording]) -> Problem:
-    """Return what is to be minimised.
+    """Return the problem whose objective is to be minimised.
 
     Raises:
         InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
@@ -201,7 +201,7 @@ def _work(problem: Problem, settings: IdentifySettings, starts: Sequence[Array],
 
 
 def _starts(problem: Problem, count: int, seed: int) -> list[Array]:
-    """Return where to search from: the scenario's own numbers, and a Latin hypercube."""
+    """Return the starts of the search: the scenario's own numbers, and a Latin hypercube."""
     low, high = problem.box
     rng = np.random.default_rng(seed)
     further = max(count - 1, 0)

@@ -45,7 +45,7 @@ class Model(Protocol):
         """What is to be found for it alone."""
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
-        """Return what the scenario says of every output, shape (m,) each."""
+        """Return the computed values of every output, shape (m,) each."""
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
@@ -230,7 +230,7 @@ class Problem:
 
 
 def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return how many independent samples every group of signals has, and their mean square."""
+    """Return the number of independent samples of every group of signals, and their mean square."""
     count, squares = np.zeros((2, int(groups.max(initial=-1)) + 1))
     for e, w, group in zip(residuals, weights, groups, strict=True):
         count[group] += w * len(e)

@@ -61,7 +61,7 @@ class SteadyReadings:
             self._outputs.append((variable, self._place(f"outputs.{name}", label, places.get(variable, tendons))))
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
-        """Return what the scenario says of every output, shape (m,) each."""
+        """Return the computed values of every output, shape (m,) each."""
         held = self.recording.settings.at_rest
         found = steady_state(scenario.finger, self.load, self.recording.speed, self._position, held)
         by_name = {"tendon_tension": found.tension, "tendon_friction": found.friction, "motor_current": found.current}
