@@ -90,8 +90,7 @@ def select(tables: Tables, island: Island) -> Tables:
     bodies, lumps = coordinates[coordinates < size], coordinates[coordinates >= size]
     body = _renumbered(bodies, size)
     row = _renumbered(rows, len(tables.state))
-    channels = int(max(tables.channel.max(initial=0), island.channels.max(initial=0))) + 1
-    channel = _renumbered(island.channels, channels)
+    channel = _renumbered(island.channels, int(np.concatenate([tables.channel, island.channels, [0]]).max()) + 1)
     charts = np.isin(tables.charts, bodies)
     present, groups = _groups(tables, rows)
     state = tables.state[rows]
