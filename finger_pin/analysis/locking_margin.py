@@ -17,7 +17,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import expand
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.references.reference import SignalReference
+from finger_pin.references.reference import LoopReference, SignalReference
 
 #: Below this margin a simulation warns: friction then multiplies tensions about sixfold.
 CLOSE_TO_LOCKING = 1.2
@@ -47,7 +47,11 @@ class SelfLockingMargin(BriefRepr):
 
 
 def self_locking_margin(
-    scenario: ScenarioLike, samples: int = 500, most: int | None = None, servos: bool = False
+    scenario: ScenarioLike,
+    samples: int = 500,
+    most: int | None = None,
+    servos: bool = False,
+    reference: LoopReference | None = None,
 ) -> SelfLockingMargin:
     """Return the margin to self-locking along a scenario's reference.
 
@@ -63,6 +67,7 @@ def self_locking_margin(
             of many joints has hundreds, and every one costs as many eigenvalue problems as there are tendons.
         servos: Whether gears and the limits of motors count: then the finger is also locked from where the tensions
             that would move it slowly, with passive tendons as planned, are more than a motor can pull.
+        reference: Of one finger, where it is built already.
 
     Of a hand it is that of the finger that is closest, with the position and the directions of its own joints.
     """
@@ -77,7 +82,7 @@ def self_locking_margin(
     routing = tendons.routing
     # Midpoints: a reference that starts or ends at rest moves there.
     times = scenario.simulation.duration * (np.arange(samples) + 0.5) / samples
-    motion = SignalReference.from_scenario(scenario, routing).at(times)
+    motion = (reference or SignalReference.from_scenario(scenario, routing)).at(times)
     size = len(routing.joints)
     # What stands still but for rounding does not move.
     speed = np.where(np.abs(motion.velocity) > 1e-12, motion.velocity, 0.0)
@@ -138,17 +143,23 @@ def _within_reach(
     return reached
 
 
-def quick_margin(scenario: Scenario) -> float:
+def quick_margin(scenario: Scenario, reference: LoopReference | None = None) -> float:
     """Return the margin to self-locking along a scenario's reference, at a cost that is bounded.
 
     Of many combinations of directions only those that seem closest to locking are looked at.
+
+    Args:
+        scenario: The scenario.
+        reference: Its reference, where it is built already.
     """
     margin = np.inf
     # Parameters at the edge of what numbers hold have no margin: warnings of arithmetic would not help.
     with np.errstate(all="ignore"):
-        for part in scenario.parts().values():
+        parts = scenario.parts().values()
+        for part in parts:
             most = max(1, _CASES // 2 ** len(part.finger.passive_names))
-            margin = min(margin, self_locking_margin(part, most=most).margin)
+            given = reference if len(parts) == 1 else None
+            margin = min(margin, self_locking_margin(part, most=most, reference=given).margin)
     return margin
 
 

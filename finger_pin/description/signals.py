@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from finger_pin.description.validation import (
@@ -77,9 +78,10 @@ class SignalSettings(Description):
                 raise problem("values", f"must be {len(self.times)} numbers, one for each of times", self.values)
             if not 2 <= len(self.times) <= MOST_POINTS:
                 raise problem("times", f"must be 2 to {MOST_POINTS} numbers, not {len(self.times)}")
-            for index, (before, after) in enumerate(zip(self.times, self.times[1:], strict=False)):
-                if after <= before:
-                    raise problem(f"times[{index + 1}]", f"times must increase: it comes after {before:g}", after)
+            falls = np.flatnonzero(np.diff(self.times) <= 0.0)
+            if len(falls):
+                before, after = self.times[falls[0] : falls[0] + 2]
+                raise problem(f"times[{falls[0] + 1}]", f"times must increase: it comes after {before:g}", after)
         return self
 
     def faster(self, factor: float) -> Self:

@@ -6,6 +6,7 @@ its source beside the bounds, so that a schema printed from the models documents
 
 from __future__ import annotations
 
+import base64
 import difflib
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -13,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, StringConstraints, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -26,6 +27,8 @@ FullName = Annotated[str, StringConstraints(strict=True, pattern=_FULL, max_leng
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
+# What a text of many numbers begins with.
+_PACKED = "base64:"
 Numbers = float | tuple[float, ...]
 _Model = TypeVar("_Model", bound="Description")
 
@@ -105,11 +108,13 @@ def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str 
     return BeforeValidator(validate)
 
 
-def series(low: float = -math.inf, high: float = math.inf, hint: str = "") -> BeforeValidator:
-    """Return a validator for a list of finite numbers in [low, high]."""
+def series(low: float = -math.inf, high: float = math.inf, hint: str = "") -> PlainValidator:
+    """Return a validator for a list of finite numbers in [low, high], or the text that `packed` makes of one."""
     check = _checker(low, high, False, hint)
 
     def validate(value: Any) -> tuple[float, ...]:
+        if isinstance(value, str):
+            value = _unpacked(value)
         if not isinstance(value, list | tuple):
             raise problem("", "must be a list of numbers", value)
         # A million samples are not asked one by one unless something is wrong; a sum tells of what is not finite.
@@ -117,7 +122,22 @@ def series(low: float = -math.inf, high: float = math.inf, hint: str = "") -> Be
             return tuple(value)
         return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
 
-    return BeforeValidator(validate)
+    return PlainValidator(validate)
+
+
+def packed(values: Sequence[float]) -> str:
+    """Return numbers as a text that `series` reads back bit for bit: base64 of doubles, the least byte first."""
+    return _PACKED + base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode("ascii")
+
+
+def _unpacked(text: str) -> list[float]:
+    try:
+        if not text.startswith(_PACKED):
+            raise ValueError
+        found: list[float] = np.frombuffer(base64.b64decode(text[len(_PACKED) :], validate=True), "<f8").tolist()
+    except ValueError:
+        raise problem("", "must be a list of numbers", text[:40]) from None
+    return found
 
 
 def choice(*allowed: str) -> BeforeValidator:

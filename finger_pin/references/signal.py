@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
@@ -24,6 +24,7 @@ from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
+Flags = NDArray[np.bool_]
 _ORDER = 6
 # A signal that varies by less, of its size, is constant but for rounding.
 _ROUNDING = 1e-9
@@ -140,8 +141,9 @@ class Signal:
         These are knots where a signal jumps, or its rate jumps by more than a tolerance over the shorter of the pieces
         beside it; and where it has bent so much since the last of them that a longer step might not see it: the
         integral of the root of |u''| is what keeps u within a distance of its chords (de Boor, A Practical Guide to
-        Splines, chapter XII), here the root of the tolerance. So their number is that of the motion's bends, however
-        many samples there are.
+        Splines, chapter XII), here the root of the tolerance. Bends that displace u by less than the tolerance, such as
+        those of rounded samples, do not count. So their number is that of the motion's bends, however many samples
+        there are, and however coarsely they are rounded within the tolerance.
 
         Args:
             tolerance: Relative to the range of each signal.
@@ -159,20 +161,63 @@ class Signal:
         kinks = np.abs(rates) * np.minimum(beside, np.concatenate([length[:1], length]))
         jumps = np.zeros_like(kinks)
         jumps[1:-1] = np.abs(begin[1:] - end[:-1])
-        bent = sum(
-            weight * length * np.sqrt(np.abs(quintic_curvature(node * length, *self.coefficients[:-2])))
-            for node, weight in ((0.11270166537925831, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
-        )
-        turns = np.floor(np.cumsum(bent, axis=0) / np.sqrt(2.0 * size * math.sqrt(tolerance)))
         found = np.maximum(jumps, kinks) > tolerance * size
+        # A value that deviates by the tolerance, and its neighbours by as much to the other side.
+        bent = self._bent(np.concatenate([begin, end[-1:]]), found, 2.0 * tolerance * size)
+        turns = np.floor(np.cumsum(bent, axis=0) / np.sqrt(2.0 * size * math.sqrt(tolerance)))
         found[1:] |= np.diff(turns, axis=0, prepend=0.0) > 0.0
         return np.asarray(self.knots[np.any(found, axis=1)])
+
+    def _bent(self, values: Array, seen: Flags, least: Array) -> Array:
+        """Return the integral of the root of |u''| over each piece, shape (m - 1, k), of bends that are to be seen.
+
+        A bend is seen that displaces u from a chord by more than a least distance: first within each piece, then at
+        every knot between its neighbours, at every second between those, and so on. Where it is seen on a short chord
+        none is asked that is longer. What is missed displaces u by less than that on any chord.
+
+        Args:
+            values: At the knots, shape (m, k).
+            seen: Whether a knot ends a step anyway, shape (m, k).
+            least: Distance from a chord, shape (k,), in the unit of each signal.
+        """
+        length = np.diff(self.knots)[:, None]
+        order = np.arange(_ORDER - 1, 1, -1)
+        bent = np.zeros((len(length), values.shape[1]))
+        powers = zip(order, self.coefficients, strict=False)
+        pieces = sum((n * (n - 1) * np.abs(c) * length**n for n, c in powers if c.any()), bent) > 8.0 * least
+        rows = np.flatnonzero(pieces.any(axis=1))
+        span, factors = length[rows], self.coefficients[:-2, rows]
+        for node, weight in ((0.11270166537925831, 5.0), (0.5, 8.0), (0.8872983346207417, 5.0)):
+            bent[rows] += weight / 18.0 * span * np.sqrt(np.abs(quintic_curvature(node * span, *factors)))
+        bent[~pieces] = 0.0
+        seen = seen.copy()
+        seen[:-1] |= pieces
+        seen[1:] |= pieces
+        times, stride = self.knots[:, None], 1
+        while len(times) > 2:
+            before, after = times[1:-1] - times[:-2], times[2:] - times[1:-1]
+            off = np.abs(values[1:-1] - (after * values[:-2] + before * values[2:]) / (before + after))
+            new = _widened(off > least) & ~_widened(seen)[1:-1]
+            rows, columns = np.nonzero(new)
+            width = (0.5 * (before + after) / np.sqrt(before * after))[rows, 0]
+            bent[stride * (rows + 1) - 1, columns] += width * np.sqrt(2.0 * off[rows, columns])
+            seen[1:-1] |= new
+            times, values, seen, stride = times[::2], values[::2], _widened(seen)[::2], 2 * stride
+        return bent
 
     def later(self, start: float) -> Signal:
         """Return the signals with their time counted from a start, s."""
         harmonics = self.harmonics.copy()
         harmonics[:, 3] += 2.0 * math.pi * harmonics[:, 2] * start
         return replace(self, harmonics=harmonics, knots=self.knots - start)
+
+
+def _widened(marks: Flags) -> Flags:
+    """Return marks, shape (m, k), with the neighbours of all that are set."""
+    wide = marks.copy()
+    wide[1:] |= marks[:-1]
+    wide[:-1] |= marks[1:]
+    return wide
 
 
 def _polynomial(settings: SignalSettings) -> PPoly | None:
@@ -199,9 +244,16 @@ def _polynomial(settings: SignalSettings) -> PPoly | None:
 
 def _joined(columns: Sequence[PPoly | None]) -> tuple[Array, Array]:
     """Return knots, shape (m,), and coefficients, shape (6, m - 1, k), of polynomials about shared knots."""
-    knots = np.unique(np.concatenate([[], *[each.x for each in columns if each is not None]]))
-    if len(knots) == 0:
-        knots = np.array([0.0, 1.0])
+    own = [each.x for each in columns if each is not None]
+    if not own:
+        return np.array([0.0, 1.0]), np.zeros((_ORDER, 1, len(columns)))
+    if all(np.array_equal(each, own[0]) for each in own):
+        together = np.zeros((_ORDER, len(own[0]) - 1, len(columns)))
+        for index, each in enumerate(columns):
+            if each is not None:
+                together[_ORDER - len(each.c) :, :, index] = each.c
+        return own[0], together
+    knots = np.unique(np.concatenate(own))
     start, middle = knots[:-1], 0.5 * (knots[:-1] + knots[1:])
     coefficients = np.zeros((_ORDER, len(start), len(columns)))
     for column, each in enumerate(columns):

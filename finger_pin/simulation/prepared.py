@@ -81,6 +81,11 @@ class Prepared:
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
 
+    def __repr__(self) -> str:
+        """Return the scenario, what may be changed of it, and what is recorded."""
+        given = [f"{key}={value!r}" for key, value in zip(self.parameters, self.values, strict=True)]
+        return f"Prepared({', '.join([self.family.scenario.name, *given])}; records {', '.join(self.record)})"
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """The keys whose values runs are given."""

@@ -131,4 +131,4 @@ def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
     planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
     if not planned or {"controller", "reference"} & set(own.split(", ")):
         return None
-    return quick_margin(scenario) if loop.finger.routing.force_closure().holds else None
+    return quick_margin(scenario, loop.reference) if loop.finger.routing.force_closure().holds else None

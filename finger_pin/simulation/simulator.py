@@ -86,6 +86,11 @@ class Simulator:
             self._posture = numbers("position", position, self._posture.shape)
         self._begin(self._at(self._posture), 0.0)
 
+    def __repr__(self) -> str:
+        """Return the finger, the time and the posture."""
+        posture = ", ".join(f"{angle:.4g}" for angle in self.state.position)
+        return f"Simulator({self.finger.description.name} at t = {self.time:.6g} s, theta = [{posture}] rad)"
+
     def _build(self, finger: Finger) -> None:
         """Build what steps a finger; `_begin` says from where."""
         self.finger, mechanism = finger, finger.mechanism

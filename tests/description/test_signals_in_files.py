@@ -2,6 +2,7 @@
 
 import tomllib
 
+import numpy as np
 import pytest
 
 import finger_pin as fp
@@ -136,6 +137,23 @@ def test_what_is_wrong_in_a_file_of_columns_is_named_in_one_line(tmp_path, text,
     with pytest.raises(InputError) as caught:
         fp.load_scenario("fig6", {"reference.file": str(path)})
     assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_many_samples_are_read_alike_at_once_and_row_by_row_and_written_bit_for_bit(tmp_path):
+    times, angles = np.arange(10_001) / 3.0, np.random.default_rng(1).uniform(0.0, 1.0, 10_001)
+    rows = [f"{time!r}, {angle!r}" for time, angle in zip(times.tolist(), angles.tolist(), strict=True)]
+    loaded = []
+    # What is quoted is read row by row.
+    for header in ("time,medial", 'time,"medial"'):
+        path = write(tmp_path, "motion.csv", "\n".join([header, *rows]))
+        loaded.append(fp.load_scenario("fig6", {"reference.file": str(path)}))
+    medial = loaded[0].reference.joints["medial"]
+    assert loaded[0] == loaded[1] and medial.times == tuple(times) and medial.values == tuple(angles)
+    text = fp.to_toml(loaded[0])
+    assert fp.load_scenario(write(tmp_path, "again.toml", text)) == loaded[0] and len(text) < 250_000
+    cut = write(tmp_path, "cut.toml", text.replace("times = 'base64:", "times = 'base64:?"))
+    with pytest.raises(InputError, match=r"medial.times = .*: must be a list of numbers"):
+        fp.load_scenario(cut)
 
 
 def test_a_missing_file_of_columns_is_named():

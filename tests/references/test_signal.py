@@ -131,6 +131,18 @@ def test_a_step_ends_where_a_signal_jumps_or_bends_and_so_many_times_however_man
     assert np.count_nonzero(np.abs(ends[2] - 2.0) < 3e-4) > 20
 
 
+@pytest.mark.parametrize(("count", "digits"), [(2_001, 9), (20_001, 7), (200_001, 6)])
+def test_rounding_within_the_tolerance_adds_no_ends_of_steps(count, digits):
+    """Of sin t over two periods the integral of the root of |u''| is 4 sqrt(pi) Gamma(3/4) / Gamma(5/4)."""
+    times, tolerance = np.linspace(0.0, 4.0 * np.pi, count), 1e-6
+    samples = (times, np.round(np.sin(times), digits)[:, None])
+    # Chords within d of a curve of curvature c are sqrt(8 d / c) long; here a quarter of that distance counts.
+    closed = (
+        4.0 * math.sqrt(math.pi) * math.gamma(0.75) / math.gamma(1.25) / math.sqrt(2.0 * 2.0 * math.sqrt(tolerance))
+    )
+    assert len(Signal.from_samples("x", samples, "a").bends(tolerance)) == pytest.approx(closed, rel=0.02)
+
+
 def test_the_compiled_search_finds_the_piece_of_any_time_on_uneven_knots():
     random = np.random.default_rng(1)
     for power in (1, 3, 9):

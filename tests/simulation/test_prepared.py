@@ -151,3 +151,10 @@ def test_what_is_interrupted_is_the_begin_of_the_whole():
     found, whole = said.value.result, prepared.run([2.0])
     assert 0.0 < float(found.time[-1]) < 2.0
     assert np.allclose(found.joint_position, whole["joint_position"][: found.sizes["time"]], rtol=0.0, atol=1e-13)
+
+
+def test_what_is_prepared_and_what_is_stepped_print_in_one_line_what_they_are():
+    prepared = fp.prepare("fig6", ["controller.gain"], ["joint_position"])
+    assert repr(prepared) == "Prepared(fig6, controller.gain=1.0; records joint_position)"
+    simulator = fp.Simulator("ub", position=[0.0, 0.3, 0.25, 0.2])
+    assert repr(simulator) == "Simulator(ub at t = 0 s, theta = [0, 0.3, 0.25, 0.2] rad)"
