@@ -8,6 +8,7 @@ import numpy as np
 
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import call_at, compiled
+from finger_pin.core.stepping.interpolation import bend_of_stages
 from finger_pin.core.stepping.law_branches import release
 
 # Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
@@ -81,12 +82,7 @@ def defect(integration: Any, model: Any, time: float, h: float) -> None:
     for node in range(3):
         s = _NODES[node]
         for c in range(size):
-            bend = 0.0
-            for row in range(tableau.dense.shape[0] - 1, -1, -1):
-                value = 0.0
-                for j in range(last + 1):
-                    value += tableau.dense[row, j] * k[j, c]
-                bend = value + s * bend
+            bend = bend_of_stages(tableau, k, c, s)
             state[c] = (1.0 - s) * x[c] + s * (end[c] + (1.0 - s) * bend)
         call_at(model.evaluate, integration.model, time + s * h)
         for c in range(size):

@@ -102,6 +102,18 @@ def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None
 
 
 @compiled
+def bend_of_stages(tableau: Any, k: Any, c: int, share: float) -> Any:
+    """Return the bend of a state after a share of a step, as `between` has it, from the stages k, shape (s, size)."""
+    bend = 0.0
+    for row in range(tableau.dense.shape[0] - 1, -1, -1):
+        value = 0.0
+        for j in range(tableau.nodes.size):
+            value += tableau.dense[row, j] * k[j, c]
+        bend = value + share * bend
+    return bend
+
+
+@compiled
 def begin_anew(charts: Any, width: int, x: Any) -> None:
     """Let the angles of free bodies begin anew, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):

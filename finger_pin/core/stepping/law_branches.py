@@ -9,6 +9,7 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import call_at, compiled
 from finger_pin.core.stepping.error_norm import step_error
+from finger_pin.core.stepping.interpolation import bend_of_stages
 from finger_pin.core.tables import END, FIRST, KINK
 
 # A step after a kink that is rejected costs as much as two that grow.
@@ -98,13 +99,7 @@ def passed(integration: Any, model: Any, time: float, h: float, r: Any) -> Any:
     tableau, x, k, state = integration.tableau, integration.x, integration.k, model.state
     last, size = tableau.nodes.size - 1, x.size
     for c in range(size):
-        bend = 0.0
-        for row in range(tableau.dense.shape[0] - 1, -1, -1):
-            value = 0.0
-            for j in range(last + 1):
-                value += tableau.dense[row, j] * k[j, c]
-            bend = value + 0.5 * bend
-        state[c] = 0.5 * (x[c] + state[c] + 0.5 * bend)
+        state[c] = 0.5 * (x[c] + state[c] + 0.5 * bend_of_stages(tableau, k, c, 0.5))
     call_at(model.evaluate, integration.model, time + 0.5 * h)
     share = strayed(model.tables, model.work.rows, integration.kinks)
     if share < 1.0 and price(integration, model, time + 0.5 * h, h, r) <= 1.0:
