@@ -12,7 +12,6 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
 from finger_pin.core.jit import bound
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import PULLING
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import GUIDES
@@ -62,7 +61,7 @@ class CompiledFingers:
 
     def _differences(self, finger: CompiledFinger) -> tuple[bool, bool]:
         pair, joints = (finger, self._first), len(finger.finger.routing.joints)
-        rows = [[table for table in each.finger.mechanism.rows if table.group in PULLING] for each in pair]
+        rows = [[table for table in each.finger.mechanism.rows if table.group in each.finger.pulling] for each in pair]
         alike = all(np.array_equal(own.arm, other.arm) for own, other in zip(*rows, strict=True))
         tables = [each.mechanism.tables for each in (finger, self._mover)]
         bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]

@@ -111,11 +111,6 @@ class Actuators:
         )
 
     @property
-    def pulled(self) -> Array:
-        """One where an actuated tendon is pulled by an elastic one, shape (a, k)."""
-        return np.eye(self.routing.actuated)[:, self.tendons]
-
-    @property
     def channels(self) -> NDArray[np.int64]:
         """The input of every motor, that of its first tendon: a tension, or a voltage in position drive; shape (m,)."""
         return self.tendons[np.argmax(self.spools != 0.0, axis=0)] if self.names else np.zeros(0, dtype=np.int64)
@@ -151,13 +146,15 @@ class Actuators:
         """Which of the tendons hold a part of their tension, shape (h,)."""
         return np.flatnonzero(self.hysteresis)
 
-    def wired(self, weights: Array) -> dict[str, Array]:
+    def _wired(self, weights: Array) -> dict[str, Array]:
         """Return how later rows see the elastic tendons' tensions, by table, from weights of shape (..., k)."""
         held = {"tendon_hysteresis": weights[..., self.held]} if self.held.size else {}
         return {"elastic_tendons": weights, **held}
 
     def tendon_rows(self, width: int) -> list[Rows]:
         """Return the tables of elastic tendons, for coordinates (theta, p, theta_m), and of what they hold."""
+        if not self.names:
+            return []
         arm = np.zeros((len(self.tendons), width))
         arm[:, : len(self.routing.joints)] = self.routing.coupling[self.tendons]
         arm[:, width - len(self.names) :] = -self.spools
@@ -170,6 +167,7 @@ class Actuators:
             offset=-self.slack,
             stored=_STRETCH,
             powers=(_DAMPING,),
+            pulls=tuple(self.routing.tendons[index] for index in self.tendons),
         )
         held = self.held
         if not held.size:
@@ -184,11 +182,14 @@ class Actuators:
             loads={"elastic_tendons": np.eye(len(arm))[held]},
             stored=_STRETCH,
             powers=(_DAMPING,),
+            pulls=tuple(elastic.pulls[k] for k in held),
         )
         return [elastic, hysteresis]
 
     def rotor_rows(self, width: int) -> list[Rows]:
         """Return the tables of motors and gearboxes."""
+        if not self.names:
+            return []
         count = len(self.names)
         turns = np.eye(count, width, width - count)
         one_way = bool(np.any(self.gearbox[-2:]))
@@ -208,8 +209,8 @@ class Actuators:
                 self.names,
                 self.gearbox,
                 turns,
-                inputs=self.wired(self.spools.T) if one_way else {},
-                loads={"motors": np.eye(count), **self.wired(-self.external_weight[:, None] * self.spools.T)},
+                inputs=self._wired(self.spools.T) if one_way else {},
+                loads={"motors": np.eye(count), **self._wired(-self.external_weight[:, None] * self.spools.T)},
                 stored=Energy("gearboxes", "gear bristles"),
                 powers=(Energy("gearbox_coulomb", "gears sliding"), Energy("gearbox_viscous", "gears viscous")),
             ),

@@ -27,15 +27,12 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
-from finger_pin.mechanism.rows import Rows, RowSignals, combined, further_states
+from finger_pin.mechanism.rows import Rows, RowSignals, combined, further_states, pulled
 from finger_pin.mechanism.state import Layout
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
-
-#: Tables of rows that are tendons.
-PULLING = ("passive_halves", "driven_tendons", "elastic_tendons", "tendon_hysteresis")
 
 
 class Finger:
@@ -54,6 +51,7 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
+        pulled: How drives pull the actuated tendons, by table, shape (a, k).
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         surroundings: Objects and contacts; None without any.
     """
@@ -103,9 +101,11 @@ class Finger:
         width = len(joints) + self.routing.passive + len(motors)
         of_tree = tree_rows(description, self.paths, width) if self.paths else ()
         self.further = (*self.springs.hysteresis_rows(joints, width), *of_tree, *rows)
+        drives = [*self.actuators.tendon_rows(width), *(table for table in rows if table.pulls)]
+        self.pulled = pulled(drives, self.routing.tendons[: self.routing.actuated])
         mechanism = Mechanism(
             self.rigid_body,
-            self._tables(width),
+            self._tables(drives, width),
             (*self.routing.passive_names, *motors),
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
             # Also where a tendon's input goes nowhere: the second one of a spool has none.
@@ -120,26 +120,28 @@ class Finger:
         self.mechanism = mechanism if around is None else around.around(mechanism)
         self.layout = self._laid_out()
 
-    def _tables(self, width: int) -> list[Rows]:
+    def _tables(self, drives: Sequence[Rows], width: int) -> list[Rows]:
         """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
-        joints, pulling = self.routing.joints, self.tendons.rows(self.actuators)
+        joints, actuated = self.routing.joints, self.routing.actuated
+        pulling = self.tendons.rows(drives, len(self.actuators.names))
         if self.paths:
             pulling = [along_paths(self.description, self.paths, table) for table in pulling]
         return [
             *pulling,
-            self.joint_friction.rows(joints, self.actuators, width),
+            self.joint_friction.rows(joints, self.pulled, actuated, width),
             self.stroke_limiter.rows(joints, width),
             self.springs.rows(joints, width),
-            *(self.actuators.rotor_rows(width) if self.actuators.names else []),
-            *self.further,
+            *self.actuators.rotor_rows(width),
+            *(table for table in self.further if not table.pulls),
         ]
 
     def _laid_out(self) -> Layout:
         tendons, motors, around = self.routing.tendons, self.actuators, self.surroundings
         ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
         held = tuple(tendons[motors.tendons[k]] for k in motors.held)
-        states, passive = further_states(self.further), self.routing.passive
-        layout = Layout(self.routing.joints, tendons, passive, states, ringing, motors.names, held=held)
+        driving, states = (further_states([t for t in self.further if bool(t.pulls) == own]) for own in (True, False))
+        joints, passive = self.routing.joints, self.routing.passive
+        layout = Layout(joints, tendons, passive, states, ringing, motors.names, held=held, drives=driving)
         if around is None:
             return layout
         return replace(layout, objects=tuple(around.free), world=around.world, contacts=around.contacts.names)
@@ -246,13 +248,18 @@ class Finger:
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        bodies, pulled = int(self.mechanism.body.model.nv), self.actuators.wired(self.actuators.pulled)
+        bodies, pulled = int(self.mechanism.body.model.nv), self.pulled
         torque = self.tendon_torque(x, found.rows)
         return FingerSignals.of(found, self.layout.unpack(x), inputs, force, torque, bodies, pulled)
 
+    @property
+    def pulling(self) -> tuple[str, ...]:
+        """The tables of rows that are tendons."""
+        return "passive_halves", "driven_tendons", *self.pulled
+
     def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
         """Return H_c2^T f at packed states, shape (..., n), N m, (11), of what the tendons' rows do."""
-        pulling = [rows[group] for group in PULLING if group in rows]
+        pulling = [rows[group] for group in self.pulling]
         torque = self._pulled_torque(x, pulling[0])
         for each in pulling[1:]:
             torque = torque + self._pulled_torque(x, each)
@@ -271,7 +278,7 @@ class Finger:
         joints = len(self.routing.joints)
         if not pulling.rows.routed:
             return combined(pulling.force, pulling.rows.arm)[..., :joints]
-        places = [self.routing.tendons.index(name) for name in pulling.rows.names]
+        places = [self.routing.tendons.index(name) for name in pulling.rows.pulls or pulling.rows.names]
         coupling = self.coupling_at(x[..., :joints])[..., places, :]
         return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])
 

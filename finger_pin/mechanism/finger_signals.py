@@ -136,15 +136,15 @@ class FingerSignals:
             force: F, N.
             torque: H_c2^T f, shape (..., n), N m.
             bodies: Number of velocities of the rigid body, before those of passive tendons.
-            pulled: Which tendons the motors' spools pull, by table, as `Actuators.wired` of `Actuators.pulled`.
+            pulled: How drives pull the tendons, by table, as of `rows.pulled`.
         """
         joints, passive_tendons = torque.shape[-1], state.passive_position.shape[-1]
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
         delivered, motors = driven.force, None
+        for table, weights in pulled.items():
+            delivered = delivered + combined(found.rows[table].force, weights.T)
         if "motors" in found.rows:
             motor, gears = (found.rows[name] for name in ("motors", "gearboxes"))
-            for table, weights in pulled.items():
-                delivered = delivered + combined(found.rows[table].force, weights.T)
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
 
         def both(of: Callable[[RowSignals], Array]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,6 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.laws.bristle import PIN_FRICTION
-from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.rows import Rows
 
@@ -61,19 +61,19 @@ class JointFriction:
             **bristles(law, size),
         )
 
-    def rows(self, names: tuple[str, ...], actuators: Actuators, width: int) -> Rows:
+    def rows(self, names: tuple[str, ...], drives: Mapping[str, Array], actuated: int, width: int) -> Rows:
         """Return the table of the joints' friction.
 
         Args:
             names: Of the joints.
-            actuators: Whose elastic tendons pull; what they and driven tendons exert adds up.
+            drives: As of `pulled`; what they and driven tendons exert adds up.
+            actuated: Number of driven tendons.
             width: Number of coordinates.
         """
-        size, actuated = len(names), actuators.routing.actuated
+        size = len(names)
         # Strands beyond the actuated ones are halves of passive tendons.
         loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
-        if actuators.names:
-            loads |= actuators.wired(self.loads[:, :actuated] @ actuators.pulled)
+        loads |= {group: self.loads[:, :actuated] @ weights for group, weights in drives.items()}
         return Rows(
             group="joint_friction",
             law=PIN_FRICTION,

@@ -47,6 +47,8 @@ class Rows:
         powers: The law's powers, supplies first, or their names; by default the group's name and the law's. Tables that
             give the same name share an entry of the account.
         unit: Of the rows' length, ``m`` or ``rad``; SI by default.
+        pulls: For drives, the names of the tendons that they pull, one for each row: its force is a tension at the
+            canal's entrance, its arm the tendon's. What several exert on one tendon adds up.
     """
 
     group: str
@@ -67,6 +69,7 @@ class Rows:
     stored: Energy = None  # type: ignore[assignment]
     powers: tuple[Energy, ...] = ()
     unit: str = ""
+    pulls: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Fill in what was left out, and check the sizes."""
@@ -89,6 +92,8 @@ class Rows:
         object.__setattr__(self, "paths", tuple(self.paths) or ((),) * count)
         if len(self.paths) != count:
             raise InputError(f"rows.{self.group}.paths", f"must be {count}, not {len(self.paths)}")
+        if self.pulls and len(self.pulls) != count:
+            raise InputError(f"rows.{self.group}.pulls", f"must be {count} tendons, not {len(self.pulls)}")
         object.__setattr__(self, "stored", energy(self.stored or self.group))
         object.__setattr__(self, "powers", self._booked())
 
@@ -169,6 +174,24 @@ def combined(force: Array, weights: Array) -> Array:
     Of one state they have the same bits as of many, which a product of matrices does not promise.
     """
     return np.asarray(np.einsum("...k,kn->...n", force, weights))
+
+
+def pulled(tables: Sequence[Rows], tendons: Sequence[str]) -> dict[str, Array]:
+    """Return the weights with which the rows of drives pull t tendons, by table, shape (t, k).
+
+    Raises:
+        InputError: If there is no such tendon.
+    """
+    for table in tables:
+        for name in table.pulls:
+            if name not in tendons:
+                allowed = f"no such tendon with a source of its own; there are {', '.join(tendons)}"
+                raise InputError(f"rows.{table.group}.pulls", allowed, name)
+    return {
+        table.group: np.array([np.equal(name, table.pulls) for name in tendons], dtype=float).reshape(-1, table.count)
+        for table in tables
+        if table.pulls
+    }
 
 
 def further_states(rows: Sequence[Rows]) -> tuple[tuple[str, float], ...]:

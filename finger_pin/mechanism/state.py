@@ -5,7 +5,8 @@
 
 n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
 m motors, h tendons on spools with hysteresis, c contacts with bristles bent by z: 19 numbers for the paper's finger,
-which has neither motors nor contacts. Where objects stand in the world around a palm that moves, the six joints of the
+which has neither motors nor contacts. States of drives of one's own follow F^s of spools, those of other rows of
+one's own follow all. Where objects stand in the world around a palm that moves, the six joints of the
 world that it sees follow o and o'.
 """
 
@@ -42,6 +43,7 @@ class State:
         world_velocity: Its rate, rad/s and m/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
         elastic_stiction: F^s that tendons on spools hold, shape (..., h), N.
+        drives: States of drives of one's own, shape (..., d); they follow F^s of spools.
     """
 
     position: Array
@@ -60,6 +62,7 @@ class State:
     world_velocity: Array | None = None
     contact_bend: Array | None = None
     elastic_stiction: Array | None = None
+    drives: Array | None = None
 
     @property
     def q(self) -> Array:
@@ -87,6 +90,7 @@ class Layout:
         world: Names of the joints of the world that a palm sees.
         contacts: Names of the contacts.
         held: Names of the tendons on spools with hysteresis.
+        drives: Name and scale of every state of drives of one's own.
     """
 
     joints: tuple[str, ...]
@@ -99,6 +103,7 @@ class Layout:
     world: tuple[str, ...] = ()
     contacts: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
+    drives: tuple[tuple[str, float], ...] = ()
 
     @cached_property
     def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
@@ -125,6 +130,7 @@ class Layout:
             "motor_velocity": (self.motors, 10.0),
             "contact_bend": (bends, 1e-5),
             "elastic_stiction": (self.held, 1.0),
+            "drives": (tuple(name for name, _ in self.drives), 1.0),
             "tendon_stiction": (self.tendons, 1.0),
             "joint_stiction": (self.joints, 1e-2),
             "gearbox_stiction": (self.motors, 1e-2),
@@ -154,8 +160,9 @@ class Layout:
     @property
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
+        prefixes = dict.fromkeys(("position", "velocity"), "joint_")
         return tuple(
-            name if kind == "further" else f"{'joint_' if kind in ('position', 'velocity') else ''}{kind}[{name}]"
+            name if kind in ("further", "drives") else f"{prefixes.get(kind, '')}{kind}[{name}]"
             for kind, (names, _) in self._blocks.items()
             for name in names
         )
@@ -187,7 +194,8 @@ class Layout:
         in the other.
         """
         scales = np.repeat([scale for _, scale in self._blocks.values()], self.sizes)
-        scales[self._parts["further"]] = [scale for _, scale in self.further]
+        for kind, states in (("further", self.further), ("drives", self.drives)):
+            scales[self._parts[kind]] = [scale for _, scale in states]
         if self.ringing:
             passive = self._parts["passive_velocity"]
             scales[passive] = np.maximum(scales[passive], 1e-5 * np.array(self.ringing))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +12,9 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
-from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.joint_friction import bristles
-from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.rows import Rows, pulled
 
 #: What ideal sources of force supply.
 SOURCES = Energy("actuators", "actuators")
@@ -87,15 +87,17 @@ class Tendons:
         proximal, distal = self.stretch(position, np.zeros((*position.shape[:-1], self.routing.passive)))
         return 0.5 * (proximal - distal)
 
-    def rows(self, actuators: Actuators | None = None) -> list[Rows]:
+    def rows(self, drives: Sequence[Rows] = (), motors: int = 0) -> list[Rows]:
         """Return the tables of the tendons, for coordinates (theta, p, theta_m).
 
-        Halves of passive tendons (12), elastic tendons where there are motors, and driven and passive tendons
-        (14), (16).
+        Halves of passive tendons (12), drives, and driven and passive tendons (14), (16).
+
+        Args:
+            drives: What pulls tendons in place of ideal sources.
+            motors: Number of motors.
         """
         routing, joints = self.routing, len(self.routing.joints)
         actuated, passive = routing.actuated, routing.passive
-        motors = 0 if actuators is None else len(actuators.names)
         width = joints + passive + motors
         # p of the halves: what draws the mass back loosens the proximal half and stretches the distal one.
         halves = np.zeros((2 * passive, width))
@@ -108,8 +110,8 @@ class Tendons:
         shared = (getattr(self, name) for name in PASSIVE_FRICTION.parameters[2:])
         friction = np.array([self.surface, self.stiction_ratio, *shared])
         names = routing.passive_names
-        wired = {} if actuators is None or not motors else actuators.wired(actuators.pulled)
-        elastic = wired["elastic_tendons"].any(axis=1) if wired else np.zeros(actuated, dtype=bool)
+        wired = pulled(drives, routing.tendons[:actuated])
+        taken = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         return [
             Rows(
                 group="passive_halves",
@@ -119,14 +121,14 @@ class Tendons:
                 arm=halves,
                 stored=Energy("passive_tendon", "passive tendons"),
             ),
-            *(actuators.tendon_rows(width) if actuators is not None and motors else []),
+            *drives,
             Rows(
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
                 names=routing.tendons[:actuated],
-                parameters=np.vstack([friction[:, :actuated], elastic]),
+                parameters=np.vstack([friction[:, :actuated], taken]),
                 arm=driven[:actuated],
-                channels=np.where(elastic, -1, np.arange(actuated)),
+                channels=np.where(taken, -1, np.arange(actuated)),
                 inputs=wired,
                 bends=bends[:actuated],
                 curvature_offset=routing.curvature_offset[:actuated],

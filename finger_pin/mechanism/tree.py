@@ -87,12 +87,12 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
 def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
     """Return a table of tendons with those along paths of a tree: drawn in, a tendon gets shorter."""
     assert description.tree is not None
-    if table.group not in ("driven_tendons", "elastic_tendons", "tendon_hysteresis"):
+    if table.group != "driven_tendons" and not table.pulls:
         return table
     arm, offset, paths = table.arm.copy(), table.offset.copy(), list(table.paths)
     rest = np.array([joint.reference for joint in description.tree.joints.values()])
     lengths = dict(zip(routes.routes, routes.length(rest), strict=True))
-    for k, name in enumerate(table.names):
+    for k, name in enumerate(table.pulls or table.names):
         along = description.tendons[name].along
         if along is not None:
             route = routes.routes[along].times(-1.0)

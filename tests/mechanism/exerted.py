@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-import finger_pin as fp
 from finger_pin.laws.law import Row
 
 
@@ -58,6 +57,6 @@ def pin_forces(joints, velocity, stiction, strands, actuated=4):
     """Return what the friction of joints does under tensions of the strands, without forces at the tip."""
     names = tuple(f"joint{j}" for j in range(velocity.shape[-1]))
     earlier = {"driven_tendons": strands[..., :actuated], "passive_halves": strands[..., actuated:]}
-    table = joints.rows(names, fp.Finger("ub").actuators, len(names))
+    table = joints.rows(names, {}, actuated, len(names))
     still, states = np.zeros_like(velocity), {table.group: stiction}
     return exert([table], still, velocity, states, np.zeros(0), earlier)[table.group]

@@ -35,7 +35,7 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     np.testing.assert_array_equal(layout.pack(state), x)
     n, t, p, m = len(layout.joints), len(layout.tendons), layout.passive, len(layout.motors)
     f, w, c = len(layout.objects), len(layout.world), len(layout.contacts)
-    sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, w, w, 2 * c, len(layout.held))
+    sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, w, w, 2 * c, len(layout.held), 0)
     for name, size in zip(State.__annotations__, sizes, strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 

@@ -1,0 +1,79 @@
+"""A drive that stands in this file alone: a source of tension that follows its command late, f^a' = (u - f^a) / T."""
+
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.core.compiled_finger import CompiledFinger
+
+LAG, PULLED, TENSION = 0.02, ("T3", "T4"), np.array([1.0, 1.0, 4.4, 3.1])  # s, N
+
+
+def value(row, p):
+    return row.state, (row.command - row.state) / p[0]
+
+
+def slopes(row, p, signals):
+    return (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0 / p[0], 0.0, 1.0 / p[0], 0.0)
+
+
+def account(row, p, force, rate, signals):
+    return 0.0 * force, force * row.speed
+
+
+MUSCLE = fp.Law("muscle", ("lag",), value, slopes, account, supplies=("pressure",), scale=1.0)
+
+
+def with_muscles(finger):
+    """The same finger with muscles in place of two ideal sources."""
+    places = [finger.routing.tendons.index(name) for name in PULLED]
+    arm = np.zeros((2, finger.mechanism.coordinates))
+    arm[:, : len(finger.routing.joints)] = finger.coupling[places]
+    rows = fp.Rows("muscles", MUSCLE, PULLED, np.full((1, 2), LAG), arm, channels=np.array(places), pulls=PULLED)
+    return fp.Finger(finger.description, rows=[rows])
+
+
+@pytest.fixture(scope="module")
+def driven(finger):
+    return with_muscles(finger)
+
+
+def test_a_tendon_under_a_drive_does_what_it_does_under_an_ideal_source_of_that_tension(driven, finger):
+    """At any state: friction in canals and joints, torque and acceleration, by both evaluators."""
+    rng, parts = np.random.default_rng(4), finger.layout.unpack
+    x = np.array([finger.rest_state(q) for q in rng.uniform(0.1, 0.8, (20, 4)) * [0.1, 1.0, 1.0, 1.0]])
+    x += 0.05 * rng.normal(size=x.shape) * finger.layout.scales()
+    acting = np.column_stack([np.tile(TENSION[:2], (20, 1)), rng.uniform(1.0, 5.0, (20, 2))])
+    expected = finger.evaluate(x, acting)
+    state = driven.layout.unpack(np.zeros((20, driven.layout.size)))
+    for name in vars(parts(x)):
+        getattr(state, name)[...] = acting[:, 2:] if name == "drives" else getattr(parts(x), name)
+    packed = driven.layout.pack(state)
+    for found in (driven.evaluate(packed, TENSION), CompiledFinger(driven).evaluate(packed, TENSION)):
+        np.testing.assert_allclose(found.tendons.strands, expected.tendons.strands, rtol=1e-12)
+        np.testing.assert_allclose(found.tendons.entering, expected.tendons.entering, rtol=1e-12)
+        np.testing.assert_allclose(found.joints.reaction, expected.joints.reaction, rtol=1e-12)
+        np.testing.assert_allclose(found.tendon_torque, expected.tendon_torque, rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(found.acceleration, expected.acceleration, rtol=1e-9)
+
+
+def test_a_run_records_it_and_its_energy_and_it_answers_a_step_as_its_equation_does(driven):
+    """f^a = u (1 - exp(-t / T)), whatever the finger does meanwhile; its power is f^a times the tendon's velocity."""
+    times = np.array([0.0, 0.1])
+    overrides = {"simulation.duration": 0.1, "simulation.rtol": 1e-7, "simulation.atol_scale": 1e-7}
+    scenario = fp.load_scenario("fig6", overrides)
+    result = fp.simulate(scenario, finger=driven, controller=(times, np.tile(TENSION, (2, 1))))
+    expected = TENSION[2:] * (1.0 - np.exp(-result.time.values[:, None] / LAG))
+    np.testing.assert_allclose(result.muscles_force, expected, atol=1e-5)
+    assert list(result.muscles.values) == list(PULLED)
+    power = np.sum(expected * result.tendon_velocity.sel(tendon=list(PULLED)).values, axis=1)
+    np.testing.assert_allclose(result.power_muscles_pressure, power, atol=1e-4 * np.abs(power).max())
+    assert result.power_muscles_pressure.account == "supplied" and abs(result.energy_residual).max() < 1e-6
+    delivered, friction = (result[f"tendon_{name}"].sel(tendon=list(PULLED)) for name in ("tension", "friction"))
+    np.testing.assert_allclose(delivered, np.maximum(0.0, expected - friction.values), atol=1e-5)
+
+
+def test_a_drive_of_a_tendon_that_is_not_there_is_refused(finger):
+    rows = fp.Rows("muscles", MUSCLE, ("T9",), np.full((1, 1), LAG), np.zeros((1, 5)), pulls=("T9",))
+    with pytest.raises(fp.InputError, match=r"rows.muscles.pulls = .T9.: no such tendon.*T1, T2, T3, T4"):
+        fp.Finger(finger.description, rows=[rows])
