@@ -11,7 +11,7 @@ from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Distribution, Plan, PseudoInverse
 from finger_pin.control.joint_compensation import JointCompensation
-from finger_pin.control.measurement import MeasuringController, Sensors
+from finger_pin.control.measurement import Instant, Sensor
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
@@ -19,12 +19,12 @@ from finger_pin.control.torque import TorqueLaw
 __all__ = [
     "CompensatedController",
     "Distribution",
+    "Instant",
     "JointCompensation",
-    "MeasuringController",
     "PassiveTensionLoop",
     "Plan",
     "PseudoInverse",
-    "Sensors",
+    "Sensor",
     "TendonFeedforward",
     "TorqueLaw",
     "build_controller",

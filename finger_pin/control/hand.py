@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -52,10 +52,11 @@ class HandController(LoopController):
                 shortfall[..., joints] = own.shortfall
         return ControlSignals(torque, tension, shortfall if limited else None)
 
-    def sense(self, tension: Array, elapsed: float) -> None:
-        """Pass delivered tensions, shape (t,), N, on to all, with the time since the last ones, s."""
-        for controller, (_, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
-            controller.sense(tension[tendons], elapsed)
+    def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
+        """Pass on what sensors read of each finger, with the time since the last readings, s."""
+        for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
+            of = {"tendon_tension": tendons, "joint_position": joints, "joint_velocity": joints}
+            controller.sense({name: readings[name][places] for name, places in of.items()}, elapsed)
 
     def signals(self) -> tuple[Signal, ...]:
         """Return what any of them follows."""

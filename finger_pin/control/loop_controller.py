@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Self
 
 from finger_pin.core.control import Control
@@ -12,6 +12,7 @@ from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.references.signal import Signal
 
 if TYPE_CHECKING:
+    from finger_pin.control.measurement import Sensor
     from finger_pin.control.proportional import ControlSignals
     from finger_pin.mechanism.finger import Finger
 
@@ -23,12 +24,14 @@ class LoopController(ABC):
     remember what it was asked.
 
     Attributes:
-        measures: Whether it listens to tension sensors, by `sense`; then it has to be sampled.
+        measures: Whether it listens to sensors, by `sense`; then it has to be sampled.
+        sensors: Those of its own, besides encoders and tension sensors.
         problem: What has gone wrong inside, or empty; the motion ends there.
         problem_time: When, s.
     """
 
     measures = False
+    sensors: Sequence[Sensor] = ()
     problem = ""
     problem_time = float("-inf")
 
@@ -38,8 +41,12 @@ class LoopController(ABC):
     ) -> ControlSignals:
         """Return the commands for shapes (..., n)."""
 
-    def sense(self, tension: Array, elapsed: float) -> None:  # noqa: B027 - most do not listen
-        """Take delivered tensions, shape (t,), N, and the time since the last ones, s."""
+    def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:  # noqa: B027 - most do not listen
+        """Take what sensors read, by their names, ``tendon_tension`` among them, and the time since the last, s."""
+
+    def measured(self, name: str, times: Array) -> Array:
+        """Return what a sensor has read last at times (m,), shape (m,) or (m, k); of one that is sampled."""
+        raise LookupError(name)
 
     def as_control(self, reference: LoopReference, finger: Finger) -> Control | None:
         """Return it as arrays for the compiled core, with a reference; None of what is Python."""

@@ -1,70 +1,143 @@
-"""What a controller measures: angles in steps, velocities from them, tensions with noise."""
+"""What a sampled controller measures: sensors, read in order, sample by sample, and recorded."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from finger_pin.control.proportional import ControlSignals
 from finger_pin.description.routing import Array
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.state import State
-from finger_pin.references.reference import ReferenceSignals
 
-
-class MeasuringController(ABC):
-    """A controller that also listens to tension sensors; it needs sampled execution."""
-
-    @abstractmethod
-    def sense(self, tension: Array, elapsed: float) -> None:
-        """Take delivered tensions, shape (t,), N, T5's at its distal end, and the time since the last ones, s."""
-
-    @abstractmethod
-    def command(
-        self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
-    ) -> ControlSignals:
-        """Return the commands for shapes (..., n)."""
+if TYPE_CHECKING:
+    from finger_pin.control.closed_loop import ClosedLoop
+    from finger_pin.mechanism.finger_signals import FingerSignals
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredMotion:
-    """Measured angles and velocities, shape (n,), rad and rad/s."""
+class Instant:
+    """What a finger does at a sample, under the tensions that act until then.
 
-    position: Array
-    velocity: Array
-
-
-class Sensors:
-    """Encoders and tension sensors, read in order, sample by sample.
-
-    An encoder of a resolution reads the nearest multiple of it, and velocities are then differences of its readings
-    over the period, zero at the first sample. Without one, angles and velocities are exact. The noise of the tension
-    sensors is normal, independent from sample to sample, and the same for the same seed.
+    Attributes:
+        loop: The finger under control.
+        time: s.
+        x: The packed state, shape (size,).
+        tension: Of the actuated tendons, zero before the first sample, shape (a,), N.
     """
 
-    def __init__(self, period: float, encoder_resolution: float = 0.0, tension_noise: float = 0.0, seed: int = 0):
-        """Set up sensors.
+    loop: ClosedLoop
+    time: float
+    x: Array
+    tension: Array
 
-        Args:
-            period: From sample to sample, s.
-            encoder_resolution: rad; 0 for exact angles and velocities.
-            tension_noise: Standard deviation, N.
-            seed: Of the noise.
-        """
-        self._period, self._resolution, self._noise = period, encoder_resolution, tension_noise
-        self._random = np.random.default_rng(seed)
+    @cached_property
+    def state(self) -> State:
+        """The state by name."""
+        return self.loop.finger.layout.unpack(self.x)
+
+    @cached_property
+    def signals(self) -> FingerSignals:
+        """Everything that the finger does; of motors in position drive without their voltages."""
+        loop = self.loop
+        return loop.dynamics.evaluate(self.x, self.tension, loop.force(self.time), loop.base(self.time))
+
+
+class Sensor(ABC):
+    """A sensor of a sampled controller: what it reads is recorded, and told to a controller that listens.
+
+    A controller of one's own names its own in ``sensors``. One object belongs to one simulation: it may remember.
+
+    Attributes:
+        name: In a result it follows ``measured_``.
+        units: Of what it reads.
+        dimension: Of its values, ``joint`` and ``tendon`` among others; empty for one number.
+        labels: Names along a dimension of its own.
+    """
+
+    name: ClassVar[str]
+    units: ClassVar[str] = "1"
+    dimension: ClassVar[str] = ""
+    labels: tuple[str, ...] = ()
+
+    @abstractmethod
+    def read(self, now: Instant) -> ArrayLike:
+        """Return its values: one number, or shape (k,)."""
+
+
+def readings(sensors: Sequence[Sensor], now: Instant) -> dict[str, Array]:
+    """Return what sensors read, by their names.
+
+    Raises:
+        InputError: If two have the same name, or one reads another number of values than it has names for.
+    """
+    routing, found = now.loop.finger.routing, {}
+    for sensor in sensors:
+        names = sensor.labels or {"joint": routing.joints, "tendon": routing.tendons}.get(sensor.dimension, ())
+        shape = (len(names),) if sensor.dimension else ()
+        values = np.asarray(sensor.read(now), dtype=float)
+        if sensor.name in found:
+            raise InputError("controller.sensors", "there is another one of this name", sensor.name)
+        if values.shape != shape:
+            allowed = f"{sensor.name} must read values of shape {shape}, not {values.shape}"
+            raise InputError("controller.sensors", allowed)
+        found[sensor.name] = values
+    return found
+
+
+class JointEncoder(Sensor):
+    """Encoders of the joints, which read the nearest multiple of a resolution; exact without one."""
+
+    name, units, dimension = "joint_position", "rad", "joint"
+
+    def __init__(self, resolution: float = 0.0) -> None:
+        """Take a resolution, rad."""
+        self._resolution = resolution
+
+    def read(self, now: Instant) -> Array:
+        """Return theta, shape (n,)."""
+        exact = now.state.position
+        return np.round(exact / self._resolution) * self._resolution if self._resolution else exact
+
+
+class JointSpeed(Sensor):
+    """Differences of encoders' readings over the period, zero at the first sample; exact without a resolution."""
+
+    name, units, dimension = "joint_velocity", "rad/s", "joint"
+
+    def __init__(self, period: float, resolution: float = 0.0) -> None:
+        """Take the period, s, and the encoders' resolution, rad."""
+        self._period, self._encoder = period, JointEncoder(resolution) if resolution else None
         self._last: Array | None = None
 
-    def motion(self, state: State) -> MeasuredMotion:
-        """Read the encoders."""
-        if self._resolution == 0.0:
-            return MeasuredMotion(state.position, state.velocity)
-        position = np.round(state.position / self._resolution) * self._resolution
+    def read(self, now: Instant) -> Array:
+        """Return theta', shape (n,)."""
+        if self._encoder is None:
+            return now.state.velocity
+        position = self._encoder.read(now)
         velocity = np.zeros_like(position) if self._last is None else (position - self._last) / self._period
         self._last = position
-        return MeasuredMotion(position, velocity)
+        return velocity
 
-    def tension(self, delivered: Array) -> Array:
-        """Read the tension sensors, shape (t,), N."""
+
+class TensionSensor(Sensor):
+    """Sensors of the delivered tensions, of passive tendons at the distal end.
+
+    Their noise is normal, independent from sample to sample, and the same for the same seed.
+    """
+
+    name, units, dimension = "tendon_tension", "N", "tendon"
+
+    def __init__(self, noise: float = 0.0, seed: int = 0) -> None:
+        """Take the standard deviation of the noise, N, and its seed."""
+        self._noise, self._random = noise, np.random.default_rng(seed)
+
+    def read(self, now: Instant) -> Array:
+        """Return f, shape (t,)."""
+        delivered = now.loop.finger.routing.tendon_tension(now.signals.tendons.strands)
         return delivered + self._noise * self._random.standard_normal(len(delivered))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from finger_pin.control.compensated import CompensatedController
@@ -44,10 +46,10 @@ class PassiveTensionLoop(LoopController):
         self.correction = np.zeros(len(self.wish))
         self._sum = np.zeros(len(self.wish))
 
-    def sense(self, tension: Array, elapsed: float) -> None:
+    def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
         """Take measured tensions, shape (t,), N, of which the passive ones count, and the time since the last, s."""
         actuated = self.controller.routing.actuated
-        error = self.wish - tension[actuated:]
+        error = self.wish - readings["tendon_tension"][actuated:]
         # Below its own f0 the desired tension has no effect; an integral that went there would take time to come back.
         lowest = np.clip(self.controller.minimum[actuated:] - self.wish, -self.limit, 0.0)
         self._sum = np.clip(self._sum + self.integral * elapsed * error, lowest, self.limit)

@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.measurement import Sensors
+from finger_pin.control.measurement import Instant, JointEncoder, JointSpeed, Sensor, TensionSensor, readings
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.controller import SamplingSettings
@@ -30,6 +30,7 @@ class SampledController(LoopController):
     Attributes:
         period: Sampling period, s.
         instant: When it is to act next, s: at a sample, or when tensions arrive.
+        sensors: What is read at every sample, in this order.
     """
 
     def __init__(self, loop: ClosedLoop, settings: SamplingSettings) -> None:
@@ -37,8 +38,12 @@ class SampledController(LoopController):
         self.period = settings.period
         self.instant = 0.0
         self._loop = loop
-        self._sensors = Sensors(settings.period, settings.encoder_resolution, settings.tension_noise, settings.seed)
+        resolution, listens = settings.encoder_resolution, loop.controller.measures
+        tension = [TensionSensor(settings.tension_noise, settings.seed)] if listens else []
+        encoders = JointEncoder(resolution), JointSpeed(settings.period, resolution)
+        self.sensors: tuple[Sensor, ...] = (*encoders, *tension, *loop.controller.sensors)
         self._samples: list[ControlSignals] = []
+        self._readings: list[dict[str, Array]] = []
         whole = math.floor(settings.delay / settings.period + _COINCIDENT)
         rest = settings.delay - whole * settings.period
         self._late = whole
@@ -68,6 +73,12 @@ class SampledController(LoopController):
         shortfall = np.array(missing)[index] if len(missing) == len(self._samples) else None
         return ControlSignals(torques[index], tensions[index], shortfall)
 
+    def measured(self, name: str, times: Array) -> Array:
+        """Return what a sensor has read last at times (m,), shape (m,) or (m, k)."""
+        found = np.array([each[name] for each in self._readings])
+        held: Array = found[np.minimum(np.floor(times / self.period * (1.0 + 1e-12)).astype(int), len(found) - 1)]
+        return held
+
     def _arrival(self, sample: int) -> float:
         return (sample + self._late) * self.period + self._rest
 
@@ -76,14 +87,14 @@ class SampledController(LoopController):
 
     def _sample(self, time: float, x: Array) -> ControlSignals:
         loop, controller = self._loop, self._loop.controller
-        state = loop.finger.layout.unpack(x.copy())
-        motion = self._sensors.motion(state)
+        acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
+        now = Instant(loop, time, x.copy(), acting)
+        found = readings(self.sensors, now)
+        self._readings.append(found)
         if controller.measures:
-            acting = self._tension() if self._samples else np.zeros(loop.finger.routing.actuated)
-            strands = loop.dynamics.evaluate(x, acting, loop.force(time)).tendons.strands
-            delivered = loop.finger.routing.tendon_tension(strands)
-            controller.sense(self._sensors.tension(delivered), self.period if self._samples else 0.0)
-        return controller.command(time, loop.reference.at(time), motion.position, motion.velocity)
+            controller.sense(found, self.period if self._samples else 0.0)
+        position, velocity = (found[each.name] for each in (JointEncoder, JointSpeed))
+        return controller.command(time, loop.reference.at(time), position, velocity)
 
 
 def sampling_settings(scenario: Scenario, period: float | None) -> SamplingSettings | None:

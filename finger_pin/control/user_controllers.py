@@ -6,14 +6,13 @@ refused at the first call. One that comes later ends the simulation there, and w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.measurement import MeasuringController
 from finger_pin.control.open_loop import OpenLoopTensions
 from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.description.routing import Array, Routing
@@ -107,7 +106,8 @@ class OwnController(LoopController):
             )
             raise InputError("controller", allowed, type(controller).__name__)
         self.controller, self.problem, self.problem_time = controller, "", -np.inf
-        self.measures = isinstance(controller, MeasuringController)
+        self.measures = callable(getattr(controller, "sense", None))
+        self.sensors = tuple(getattr(controller, "sensors", ()))
         self._routing, self._start, self._asked = routing, start, False
 
     def command(
@@ -130,10 +130,9 @@ class OwnController(LoopController):
             np.array(missing) if len(missing) == len(found) else None,
         )
 
-    def sense(self, tension: Array, elapsed: float) -> None:
-        """Pass on what the sensors say, if it listens."""
-        if isinstance(self.controller, MeasuringController):
-            self.controller.sense(tension, elapsed)
+    def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
+        """Pass on what the sensors read; it listens."""
+        self.controller.sense(readings, elapsed)  # type: ignore[attr-defined]
 
     def _one(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:
         first, self._asked = not self._asked, True

@@ -88,8 +88,8 @@ class Setup:
         if loop.finger.surroundings is not None:
             loop.finger.surroundings.check(loop.finger.layout.unpack(loop.initial_state()))
         sampling = sampling_settings(scenario, control_period)
-        if sampling is None and loop.controller.measures:
-            raise InputError("control_period", "is missing: a controller that reads tension sensors is sampled")
+        if sampling is None and (loop.controller.measures or loop.controller.sensors):
+            raise InputError("control_period", "is missing: a controller that reads sensors is sampled")
         positioned = bool(np.any(loop.finger.actuators.holds))
         if positioned and method not in TABLEAUS:
             raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)

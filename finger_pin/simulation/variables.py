@@ -104,7 +104,7 @@ def variables(loop: ClosedLoop) -> dict[str, Variable]:
         ),
         SHORTFALL: Variable(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
-    table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _more(loop)
+    table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
     for name, each in table.items():
         if frame := _frame(name, each):
             table[name] = each._replace(frame=frame)
@@ -215,6 +215,23 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Variable]:
     }
 
 
+def _measured(loop: ClosedLoop) -> dict[str, Variable]:
+    """Return what sensors of a sampled controller read, each held until the next sample."""
+
+    def held(of: Motions, name: str) -> Array:
+        return of.loop.controller.measured(name, of.times)
+
+    return {
+        f"measured_{each.name}": Variable(
+            ("time", each.dimension) if each.dimension else _TIME,
+            partial(held, name=each.name),
+            each.units,
+            f"{each.name.replace('_', ' ')} as the controller measures it",
+        )
+        for each in loop.controller.sensors
+    }
+
+
 def _of_further(tables: tuple[Rows, ...]) -> dict[str, Variable]:
     """Return what rows of a user's own see and show, by table."""
 
@@ -282,6 +299,7 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
         "axis": ("axis", ["x", "y", "z"], {"long_name": "axis of the base frame"}),
     }
     found |= {table.group: list(table.names) for table in finger.further} | contact_coordinates(finger)
+    found |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         found["finger"] = list(scenario.hand.fingers)
     if routing.passive > 1:

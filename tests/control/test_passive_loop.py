@@ -18,7 +18,7 @@ def loop(**settings):
 
 
 def measured(tension):
-    return np.array([1.0, 1.0, 4.0, 3.0, tension])
+    return {"tendon_tension": np.array([1.0, 1.0, 4.0, 3.0, tension])}
 
 
 def planned(controller):
@@ -92,7 +92,8 @@ def test_it_serves_a_loop_of_one_s_own():
     for step in range(1000):
         command = controller.command(1e-3 * step, reference, state.position, state.velocity)
         state = sim.step(command.tension[:4], 1e-3)
-        controller.sense(finger.routing.tendon_tension(sim.signals().tendons.strands), 1e-3)
+        delivered = finger.routing.tendon_tension(sim.signals().tendons.strands)
+        controller.sense({"tendon_tension": delivered}, 1e-3)
     tension = finger.routing.tendon_tension(sim.signals().tendons.strands)
     assert tension[4] == pytest.approx(4.0, rel=0.02)
 

@@ -1,26 +1,26 @@
 """Sampled execution against sequences worked out by hand: delay, encoders, tension sensors."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.control import MeasuringController, Sensors
+from finger_pin.control.measurement import JointEncoder, JointSpeed, TensionSensor
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.state import State
 
 
-class Listening(MeasuringController):
+class Listening:
     """Commands the number of the sample on T1, and keeps all that it is told."""
 
     def __init__(self):
         """Begin with nothing heard."""
         self.position, self.velocity, self.tension, self.elapsed, self.times = [], [], [], [], []
 
-    def sense(self, tension, elapsed):
-        self.tension.append(tension)
+    def sense(self, readings, elapsed):
+        self.tension.append(readings["tendon_tension"])
         self.elapsed.append(elapsed)
 
     def command(self, time, reference, position, velocity):
@@ -55,15 +55,13 @@ def test_the_finger_feels_the_tensions_when_they_act():
 
 
 def test_encoders_read_the_nearest_step_and_velocities_are_differences_by_hand():
-    sensors = Sensors(period=0.5, encoder_resolution=0.1)
-    velocity, found = np.full(2, 7.0), []
+    sensors, found = (JointEncoder(0.1), JointSpeed(0.5, 0.1)), []
     for angles in ([0.0, 0.24], [0.26, 0.26], [0.24, -0.06], [0.24, -0.04]):
-        state = State(np.array(angles), velocity, *np.zeros((4, 1)))
-        found.append(sensors.motion(state))
-    np.testing.assert_allclose([each.position for each in found], [[0, 0.2], [0.3, 0.3], [0.2, -0.1], [0.2, 0]])
-    np.testing.assert_allclose(
-        [each.velocity for each in found], [[0, 0], [0.6, 0.2], [-0.2, -0.8], [0.0, 0.2]], atol=1e-12
-    )
+        now = SimpleNamespace(state=SimpleNamespace(position=np.array(angles), velocity=np.full(2, 7.0)))
+        found.append([each.read(now) for each in sensors])
+    position, velocity = np.swapaxes(found, 0, 1)
+    np.testing.assert_allclose(position, [[0, 0.2], [0.3, 0.3], [0.2, -0.1], [0.2, 0]])
+    np.testing.assert_allclose(velocity, [[0, 0], [0.6, 0.2], [-0.2, -0.8], [0.0, 0.2]], atol=1e-12)
 
 
 def test_without_a_resolution_angles_and_velocities_are_exact():
@@ -96,10 +94,13 @@ def test_a_tension_sensor_reads_what_is_delivered_under_the_tensions_that_act():
 def test_noise_is_reproducible_by_its_seed_and_has_the_standard_deviation_and_no_memory():
     """For n normal numbers the mean scatters by s / sqrt(n), s by s / sqrt(2 n), correlations by 1 / sqrt(n)."""
     count, deviation = 20000, 0.3
+    finger = SimpleNamespace(routing=SimpleNamespace(tendon_tension=lambda strands: strands))
+    signals = SimpleNamespace(tendons=SimpleNamespace(strands=np.arange(5.0)))
+    now = SimpleNamespace(loop=SimpleNamespace(finger=finger), signals=signals)
 
     def readings(seed):
-        sensors = Sensors(1e-3, tension_noise=deviation, seed=seed)
-        return np.array([sensors.tension(np.arange(5.0)) for _ in range(count)])
+        sensor = TensionSensor(deviation, seed)
+        return np.array([sensor.read(now) for _ in range(count)])
 
     first = readings(3)
     np.testing.assert_array_equal(first, readings(3))
