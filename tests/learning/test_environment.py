@@ -219,6 +219,15 @@ def test_goals_of_joints_are_reached_whatever_slack_is_known():
     assert 0.05 < np.abs(found["slack"][:3] - goal).max() < 0.4
 
 
+def test_an_episode_of_servos_goes_as_if_it_were_the_first():
+    environment = Environment(fp.load_scenario("servo_position", COARSE), reward=nothing, action="joint_position")
+    seen = []
+    for _ in range(2):
+        environment.reset(seed=0)
+        seen.append([environment.step([0.1, 0.8, 0.9])[0] for _ in range(3)])
+    np.testing.assert_array_equal(*seen)
+
+
 def test_an_episode_is_a_result():
     environment = Environment(FIG6, reward=nothing)
     environment.reset(seed=0)

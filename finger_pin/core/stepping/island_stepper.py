@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NoReturn
@@ -176,6 +177,8 @@ class Part:
         if time is not None:
             # Steps are counted from here on, for those that creep.
             self.memory[[core.TIME, core.WINDOW_START, core.WINDOW_END]] = time, 0.0, 0.0
+            if self.drives is not None:
+                self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
     def with_loads(self, loaded: bool) -> Part:
         """Return the same part that minds forces at the tips, or not."""
