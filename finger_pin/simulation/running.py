@@ -85,7 +85,8 @@ def run(
     def recorded(found: Trajectory) -> xr.Dataset:
         return record(scenario, Motions(loop, found, scenario.sample_times()), setup.method, text=text)
 
-    first = setup.integrate(watch, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)
+    watched = progress is not None or observe is not None
+    first = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)
     margin = _margin(scenario, loop, own)
     close = locking_advice(math.inf if margin is None else margin)
     if close:

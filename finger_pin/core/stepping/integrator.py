@@ -126,8 +126,9 @@ def integrate_compiled(
         chunks = -1 if together and not alone else 1
         statuses = in_threads(partial(_Recorder.advance, end=end, chunks=chunks), recorders)
         for recorder, status in zip(recorders, statuses, strict=True):
-            places = stepper.places(recorder.part.island)
-            reason = reason or failure(recorder.part, status, [names[at] for at in places])
+            if status > core.FULL and not reason:
+                places = stepper.places(recorder.part.island)
+                reason = failure(recorder.part, status, [names[at] for at in places])
             if not reason and recorder.full and recorder.part.time < duration:
                 reason = f"after {recorder.taken} steps the trajectory has reached the most that is kept in memory"
         if watch is not None:
