@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-import finger_pin as fp
 from finger_pin.core.evaluation.law_code import addresses
 from finger_pin.core.jit import Unit, compiled, compiled_loosely, functions
 from finger_pin.laws.law import Law
@@ -155,8 +154,13 @@ def test_a_full_disk_is_named_and_costs_nothing_else(folder):
 
 
 def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
-    code = "import finger_pin as fp; fp.simulate(fp.load_scenario('fig6', {'simulation.duration': 0.01}))"
-    fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.01}))
+    """With servos, whose laws read loads as NumPy's `load` is called, with objects, and several fingers."""
+    code = (
+        "import finger_pin as fp\n"
+        "for name in ('fig6', 'servo', 'press', 'hand'):\n"
+        "    fp.simulate(fp.load_scenario(name, {'simulation.duration': 0.002}))"
+    )
+    exec(code)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("", "")
 

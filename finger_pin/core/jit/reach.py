@@ -5,6 +5,7 @@ Code on disk holds as long as this is the same. Comments, docstrings and line nu
 
 from __future__ import annotations
 
+import dis
 import hashlib
 import sys
 from collections.abc import Iterator
@@ -64,26 +65,30 @@ def _text(code: CodeType, doc: str | None) -> str:
     return f"{code.co_code.hex()} {code.co_names} {code.co_varnames} {code.co_freevars} {constants}"
 
 
-def _names(code: CodeType) -> Iterator[str]:
-    yield from code.co_names
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _names(each)
-
-
 def _values(function: FunctionType) -> Iterator[tuple[str, Any]]:
     """Give the globals, the attributes of modules, the closure and the defaults that a function may read."""
-    names, known = list(_names(function.__code__)), function.__globals__
-    for name in names:
-        value = known.get(name)
-        if isinstance(value, ModuleType):
-            yield name, value.__name__
-            yield from ((each, vars(value)[each]) for each in names if each in vars(value))
-        elif name in known:
-            yield name, value
+    yield from _globals(function.__code__, function.__globals__)
     cells = function.__closure__ or ()
     yield from ((str(index), cell.cell_contents) for index, cell in enumerate(cells))
     yield "defaults", function.__defaults__
+
+
+def _globals(code: CodeType, known: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Give the globals that code reads, of modules what it takes from them."""
+    module = None
+    for step in dis.get_instructions(code):
+        if step.opname == "LOAD_GLOBAL" and step.argval in known:
+            value = known[step.argval]
+        elif step.opname in ("LOAD_ATTR", "LOAD_METHOD") and module is not None:
+            value = getattr(module, step.argval)
+        else:
+            module = None
+            continue
+        module = value if isinstance(value, ModuleType) else None
+        yield step.argval, value if module is None else module.__name__
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _globals(each, known)
 
 
 def _described(value: Any) -> str:
