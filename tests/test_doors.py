@@ -4,43 +4,174 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.simulation.energy import entries
+from finger_pin.studies.fingerprint import finger_digest
 
 SHORT = {"simulation.duration": 0.005}
 
 
-def lengths(scenario):
-    runs = fp.sweep(scenario, {"simulation.rtol": [1e-5]}, metrics=["tension_peak"])
+COULOMB = "finger.tendon_friction.coulomb"
+
+
+def swept(given, **more):
+    runs = fp.sweep(given, {"simulation.duration": [0.005]}, metrics=["tension_peak"], **more)
     return float(runs.tension_peak.squeeze())
 
 
+def optimised(given, **more):
+    effort = fp.studies.optimising.Effort(4, 1)
+    found = fp.optimise(given, ["controller.gain=1:1.1"], constraints=[], effort=effort, **more)
+    return float(found.tension_peak[0])
+
+
+def proposed(given, **more):
+    numbers = {COULOMB: (0.01, 1.0)}
+    return float(fp.propose(given, {"as it is": {}}, numbers, {"tendon_tension.T1": 0.05}, **more).deviation.squeeze())
+
+
+#: Every door that takes a scenario, with what comes out.
 DOORS = {
     "simulate": lambda given: fp.simulate(given).joint_position.values,
     "prepare": lambda given: fp.prepare(given).run()["joint_position"],
     "simulate_many": lambda given: fp.simulate_many([given]).joint_position.values,
     "check_convergence": lambda given: fp.check_convergence(given).difference,
-    "sweep": lengths,
+    "sweep": swept,
+    "optimise": optimised,
+    "propose": proposed,
     "self_locking_margin": lambda given: fp.analysis.self_locking_margin(given, samples=5).margin,
+    "linearise": lambda given: fp.linearise(given, fp.Finger("ub").rest_state(POSTURE), [1.0, 1.0, 4.0, 3.0]).A.values,
+    "build_controller": lambda given: fp.control.build_controller(given).gain,
+    "Run": lambda given: fp.studies.METRICS["tension_peak"].measure(fp.studies.Run(given)),
     "load_scenario": lambda given: fp.simulate(fp.load_scenario(given, {"controller.gain": 0.7})).joint_position.values,
+}
+#: Every door that takes a scenario and a finger in place of its own, with the largest tension.
+WITH_FINGER = {
+    "simulate": lambda given, finger: peak(fp.simulate(given, finger=finger)),
+    "prepare": lambda given, finger: peak(fp.prepare(given, finger=finger).simulate()),
+    "simulate_many": lambda given, finger: peak(fp.simulate_many([given], finger=finger)),
+    "sweep": lambda given, finger: swept(given, finger=finger),
+    "optimise": lambda given, finger: optimised(given, finger=finger),
+}
+POSTURE = np.array([0.0, 0.3, 0.4, 0.3])
+#: Every door that takes a finger.
+FINGERS = {
+    "Simulator": lambda given: fp.Simulator(given, position=POSTURE).step([1.0, 1.0, 4.0, 3.0], 1e-3).position,
+    "closure_over_range": lambda given: fp.analysis.closure_over_range(given, samples=8).holds,
+    "critical_friction": lambda given: fp.analysis.critical_friction(given).coefficient,
+    "equilibrium": lambda given: fp.analysis.equilibrium(given, [1.0, 1.0, 4.0, 3.0]).position,
+    "force_polytope": lambda given: fp.analysis.force_polytope(given, POSTURE, 20.0).offsets,
+    "gear_shares": fp.analysis.gear_shares,
+    "inverse_kinematics": lambda given: fp.analysis.inverse_kinematics(given, [0.08, 0.0, 0.04]).position,
+    "steady_state": lambda given: fp.analysis.steady_state(given, np.ones((1, 4)), np.array([0.01])).tension,
+    "tension_limits": lambda given: np.array(fp.analysis.tension_limits(given)),
+    "radii": lambda given: [each.range.low for each in fp.studies.radii(given)],
+    "simulate": lambda given: peak(fp.simulate(fp.load_scenario("fig6", SHORT), finger=given)),
+    "posture_page": lambda given: page_of(given),
 }
 
 
+def page_of(given):
+    from finger_pin.views.viewer.animation import posture_page
+
+    return posture_page(given, fp.analysis.force_polytope("ub", POSTURE, 20.0))
+
+
+def peak(result):
+    """Return the largest tension at either end of any tendon."""
+    return float(
+        max(result.tendon_tension.max(), result.tendon_command[..., :4].max(), result.passive_tension_proximal.max())
+    )
+
+
+def same(one, other):
+    if isinstance(one, str):
+        assert one == other
+    else:
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """A scenario and a finger, each in a file."""
+    folder = tmp_path_factory.mktemp("doors")
+    (folder / "short.toml").write_text('extends = "fig6"\n[simulation]\nduration = 0.005\n')
+    (folder / "ub.toml").write_text(fp.to_toml(fp.load_finger("ub")))
+    return folder / "short.toml", folder / "ub.toml"
+
+
 @pytest.mark.parametrize("door", DOORS.values(), ids=DOORS.keys())
-def test_a_scenario_and_the_path_of_its_file_do_the_same(door, tmp_path):
-    path = tmp_path / "short.toml"
-    path.write_text('extends = "fig6"\n[simulation]\nduration = 0.005\n')
-    np.testing.assert_array_equal(door(fp.load_scenario("fig6", SHORT)), door(str(path)))
+def test_a_scenario_and_the_path_of_its_file_do_the_same(door, files):
+    same(door(fp.load_scenario("fig6", SHORT)), door(str(files[0])))
 
 
-def test_a_finger_of_ones_own_is_taken_where_simulate_takes_one():
-    scenario, heavy = fp.load_scenario("fig6", SHORT), fp.load_finger("ub", {"finger.joints.medial.link.mass": 0.2})
-    finger = fp.Finger(heavy)
-    expected = fp.simulate(scenario, finger=finger).joint_position.values
-    assert np.any(expected != fp.simulate(scenario).joint_position.values)
-    np.testing.assert_array_equal(fp.prepare(scenario, finger=finger).run()["joint_position"], expected)
-    many = fp.simulate_many([scenario, scenario], finger=finger)
-    np.testing.assert_array_equal(many.joint_position.values, [expected, expected])
-    first = fp.simulate(scenario, finger=finger)
-    assert fp.check_convergence(scenario, first, finger=finger).converged
+@pytest.mark.parametrize("door", FINGERS.values(), ids=FINGERS.keys())
+def test_a_finger_its_description_its_name_and_the_path_of_its_file_do_the_same(door, files):
+    expected = door(fp.Finger("ub"))
+    for given in (fp.load_finger("ub"), "ub", files[1], str(files[1])):
+        same(door(given), expected)
+
+
+@pytest.mark.parametrize(
+    "hand", ["ub_hand", fp.load_hand("ub_hand"), fp.Hand("ub_hand")], ids=["name", "description", "hand"]
+)
+def test_a_hand_is_taken_where_a_finger_is(hand):
+    joints = fp.Finger(fp.load_hand("ub_hand")).routing.joints
+    assert fp.Simulator(hand).finger.routing.joints == joints
+    assert fp.analysis.closure_over_range(hand, samples=8).holds
+
+
+def test_files_of_other_programs_are_written_of_a_name(files):
+    assert fp.to_urdf("ub") == fp.to_urdf(files[1]) == fp.to_urdf(fp.load_finger("ub"))
+    assert fp.to_mjcf("ub_hand") == fp.to_mjcf(fp.load_hand("ub_hand"))
+
+
+@pytest.fixture(scope="module")
+def heavy():
+    return fp.Finger(fp.load_finger("ub", {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3}))
+
+
+@pytest.mark.parametrize("door", WITH_FINGER.values(), ids=WITH_FINGER.keys())
+def test_a_finger_of_ones_own_replaces_the_scenarios(door, heavy):
+    scenario = fp.load_scenario("fig6", SHORT)
+    expected = peak(fp.simulate(scenario, finger=heavy))
+    assert expected != peak(fp.simulate(scenario))
+    assert door(scenario, heavy) == door(scenario, heavy.description) == expected
+
+
+def test_what_would_be_learned_is_that_of_a_finger_of_ones_own(heavy):
+    scenario = fp.load_scenario("fig6", SHORT)
+    described = fp.load_scenario("fig6", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
+    assert proposed(scenario, finger=heavy) == pytest.approx(proposed(described), rel=0.05)
+    assert proposed(scenario, finger=heavy) != proposed(scenario)
+
+
+def test_convergence_is_that_of_a_finger_of_ones_own(heavy):
+    scenario = fp.load_scenario("fig6", SHORT)
+    assert fp.check_convergence(scenario, fp.simulate(scenario, finger=heavy), finger=heavy).converged
+
+
+def test_a_sweep_over_keys_of_a_finger_changes_one_of_ones_own(tmp_path, heavy):
+    """It keeps what is not swept; and its folder does not take the runs of another finger for its own."""
+
+    def swept(finger, output):
+        points = {COULOMB: [0.1, 0.3]}
+        return fp.sweep("fig6", points, metrics=["losses"], overrides=SHORT, finger=finger, output=output).losses
+
+    scenario = fp.load_scenario("fig6", SHORT)
+    own, expected = swept(heavy, tmp_path), fp.simulate(scenario, finger=heavy)
+    assert float(own[1]) == sum(float(each[-1]) for each in entries(expected, "lost").values())
+    assert float(own[0]) not in (float(own[1]), float(swept(None, None)[0]))
+    with pytest.raises(fp.InputError, match="holds another study"):
+        swept(None, tmp_path)
+
+
+def test_runs_with_a_law_of_ones_own_are_kept_under_a_digest_of_it():
+    law = fp.Law("none", ("k",), lambda row, p: (0.0 * row.length, 0.0), lambda row, p, s: ((0,) * 7, (0,) * 6), abs)
+    fingers = [
+        fp.Finger("ub", rows=[fp.Rows("none", law, ("a",), [[number]], np.zeros((1, 5)))]) for number in (1.0, 2.0, 1.0)
+    ]
+    first, other, again = map(finger_digest, fingers)
+    assert first == again != other and first != finger_digest(fp.Finger("ub"))
 
 
 def test_values_at_keys_of_a_finger_change_one_of_ones_own():
@@ -48,11 +179,6 @@ def test_values_at_keys_of_a_finger_change_one_of_ones_own():
     own = fp.prepare("fig6", ["finger.tendon_friction.coulomb"], finger=fp.Finger("ub"))
     for values in (None, [0.2]):
         np.testing.assert_array_equal(own.run(values)["tendon_tension"], plain.run(values)["tendon_tension"])
-
-
-@pytest.mark.parametrize("kind", [fp.Simulator, fp.Finger, fp.analysis.closure_over_range])
-def test_a_finger_may_be_given_by_its_name(kind):
-    assert kind("ub") is not None
 
 
 def test_the_state_has_pinocchios_short_names():

@@ -19,12 +19,14 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.family import Family
+from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, as_finger
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +47,7 @@ _Map = Callable[[Finger, Array, Array], Array]
 
 
 def linearise(
-    finger_or_scenario: Finger | ScenarioLike,
+    finger_or_scenario: Finger | FingerDescription | HandDescription | ScenarioLike,
     state: ArrayLike,
     inputs: ArrayLike,
     dt: float | None = None,
@@ -56,7 +58,8 @@ def linearise(
         lin = fp.linearise("fig6", x, tensions, dt=1e-3)
 
     Args:
-        finger_or_scenario: The finger, or a scenario with one (and objects), or what `load_scenario` takes.
+        finger_or_scenario: The finger or its description; or a scenario with one (and objects), its name, or the path
+            of its file.
         state: Packed state x, shape (n,), as of `Finger.rest_state`.
         inputs: u, shape (m,): tensions of the actuated tendons, N; of a motor in position drive its voltage, V.
         dt: Without it f is differentiated; with it, s, the map x -> x(dt) with the inputs held.
@@ -71,8 +74,11 @@ def linearise(
         InputError: If state or inputs have a wrong size, free objects are among the coordinates, ``dt`` is not
             positive, or parameters are asked of a finger without a scenario or are not single numbers.
     """
-    scenario = None if isinstance(finger_or_scenario, Finger) else load_scenario(finger_or_scenario)
-    finger = finger_or_scenario if isinstance(finger_or_scenario, Finger) else _built(load_scenario(finger_or_scenario))
+    if isinstance(finger_or_scenario, Finger | FingerDescription | HandDescription):
+        scenario, finger = None, as_finger(finger_or_scenario)
+    else:
+        scenario = load_scenario(finger_or_scenario)
+        finger = _built(scenario)
     if finger.layout.objects:
         raise InputError(
             "scenario.environment.objects", "a free object has no linear coordinates", finger.layout.objects

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
-from finger_pin.mechanism.finger import FingerLike, as_finger
+from finger_pin.mechanism.finger import FingerLike, as_finger, description_of
 
 
 def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float, ...]:
@@ -47,12 +46,13 @@ def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float,
     return tuple(limits.tolist())
 
 
-def gear_shares(description: FingerDescription) -> Array:
+def gear_shares(finger: FingerLike) -> Array:
     """Return the shares of a large command that reach the spool, while a tendon is drawn in and while it is let out.
 
     Shape (2, a); 1 for an ideal source, and in position drive, where gears change no tension. Where no load turns the
     gears, m x >= 1, a tendon that is let out keeps whatever it has: infinity.
     """
+    description = description_of(finger)
     names = description.actuated_names
     shares = np.ones((2, len(names)))
     for actuator in description.actuators.values():

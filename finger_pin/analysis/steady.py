@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.analysis.printing import BriefRepr
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.laws.bristle import friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import loss_share, stribeck_share
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.finger import FingerLike, description_of
 from finger_pin.mechanism.tendons import Tendons
 
 
@@ -32,17 +32,18 @@ class SteadyState(BriefRepr):
 
 
 def steady_state(
-    description: FingerDescription, command: Array, speed: Array, position: Array | None = None, at_rest: bool = False
+    finger: FingerLike, command: Array, speed: Array, position: Array | None = None, at_rest: bool = False
 ) -> SteadyState:
     """Return the steady states of a finger's actuated tendons.
 
     Args:
-        description: The finger.
+        finger: Its description, its name, or the path of its file.
         command: f^a at the entrances of the canals, shape (m, a), N.
         speed: v, shape (m,), m/s, of all of them; positive as they are drawn in.
         position: theta, shape (m, n), rad, for the curvature of the paths; zero by default.
         at_rest: Whether they rest after having slid so: bristles keep what they hold, viscous friction is gone.
     """
+    description = description_of(finger)
     tendons = Tendons.from_description(description)
     actuators = Actuators.from_description(description, tendons.routing)
     actuated, v = tendons.routing.actuated, np.asarray(speed, dtype=float)[:, None]

@@ -22,6 +22,7 @@ from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.routed import RoutedController
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
@@ -31,7 +32,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.signal import Signal
 
 
-def build_controller(scenario: Scenario, finger: Finger | None = None) -> LoopController:
+def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> LoopController:
     """Return the controller that a scenario describes.
 
     Tensions in open loop, or the paper's, unless an entry asks for more; then a `CompensatedController`, inside a
@@ -40,12 +41,13 @@ def build_controller(scenario: Scenario, finger: Finger | None = None) -> LoopCo
     hand every finger has its own.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, its name, or the path of a file.
         finger: Its finger, if it is built already.
 
     Raises:
         InputError: If the joint friction that it is to compensate is believed to lock the finger.
     """
+    scenario = load_scenario(scenario)
     routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)
     parts = scenario.parts()
     if len(parts) > 1:

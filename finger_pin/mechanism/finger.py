@@ -14,6 +14,7 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
+from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
@@ -52,6 +53,7 @@ class Finger:
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
         pulled: How drives pull the actuated tendons, by table, shape (a, k).
+        made_of: The rigid body, the rows and the objects that it was given.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         surroundings: Objects and contacts; None without any.
     """
@@ -78,7 +80,7 @@ class Finger:
                 size, or an object the name of a joint.
         """
         self.description = description = describe(description)
-        self._made_with = rigid_body, rows, objects
+        self.made_of = rigid_body, tuple(rows), objects
         self.paths: Routes | None = None
         if description.tree is None:
             self.rigid_body = rigid_body or build_rigid_body(description)
@@ -186,10 +188,14 @@ class Finger:
 
     def changed(self, description: FingerDescription) -> Finger:
         """Return the finger that another description makes, with the rigid body, rows and objects that were given."""
-        rigid_body, rows, objects = self._made_with
+        rigid_body, rows, objects = self.made_of
         finger = Finger(description, rigid_body, rows, objects)
         finger.visuals = self.visuals
         return finger
+
+    def fitted(self, known: Scenario, other: Scenario) -> Finger:
+        """Return this finger where two scenarios describe theirs alike, else it with the numbers of the other one."""
+        return self if known.finger == other.finger else self.changed(other.finger)
 
     @property
     def coupling(self) -> Array:
@@ -312,6 +318,23 @@ Hand = Finger
 FingerLike: TypeAlias = Finger | DescriptionLike
 
 
-def as_finger(finger: FingerLike) -> Finger:
-    """Return a finger that is given in any way."""
-    return finger if isinstance(finger, Finger) else Finger(finger)
+def as_finger(finger: FingerLike, objects: Mapping[str, Object] | None = None) -> Finger:
+    """Return a finger that is given in any way, with objects around it where it is not built yet."""
+    return finger if isinstance(finger, Finger) else Finger(finger, objects=objects)
+
+
+def description_of(finger: FingerLike) -> FingerDescription:
+    """Return the description of a finger that is given in any way; none is built."""
+    return finger.description if isinstance(finger, Finger) else describe(finger)
+
+
+def own_finger(finger: FingerLike | None, scenario: Scenario) -> Finger | None:
+    """Return the finger that replaces the one of a scenario; None where none is given."""
+    return None if finger is None else as_finger(finger, scenario.environment.objects)
+
+
+def described_by(scenario: Scenario, finger: Finger | None) -> Scenario:
+    """Return a scenario with the description of the finger that replaces its own; of a hand it stays as it is."""
+    if finger is None or scenario.hand is not None:
+        return scenario
+    return scenario.model_copy(update={"finger": finger.description})

@@ -18,7 +18,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, own_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.initial_state import own_parts
@@ -129,7 +129,7 @@ def check_convergence(
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
     fingertip_force: Samples | None = None,
-    finger: Finger | None = None,
+    finger: FingerLike | None = None,
     initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -163,6 +163,7 @@ def check_convergence(
         raise InputError("limit", "must be above 0 and finite", limit)
     if result is not None and result.attrs["scenario"] != to_toml(scenario):
         raise InputError("result", "is of another scenario")
+    finger = own_finger(finger, scenario)
     own = own_parts(controller, reference, fingertip_force, initial, finger)
     if result is not None and result.attrs.get("own", "") != own:
         raise InputError("result", f"had {result.attrs.get('own') or 'nothing'} of its own: give the same here")

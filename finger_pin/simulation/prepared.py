@@ -18,7 +18,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import Motions
@@ -42,7 +42,7 @@ def prepare(
     parameters: Sequence[str] = (),
     record: Sequence[str] = RECORDED,
     *,
-    finger: Finger | None = None,
+    finger: FingerLike | None = None,
 ) -> Prepared:
     """Prepare a scenario for many runs with other numbers.
 
@@ -60,7 +60,9 @@ def prepare(
     Raises:
         InputError: If there is no such key or variable.
     """
-    return Prepared(Family(load_scenario(scenario), tuple(parameters)), tuple(record), finger)
+    described = load_scenario(scenario)
+    own = own_finger(finger, described)
+    return Prepared(Family(described_by(described, own), tuple(parameters)), tuple(record), own)
 
 
 class Prepared:

@@ -13,7 +13,7 @@ from finger_pin.control.proportional import Controller
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, own_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
@@ -30,7 +30,7 @@ def simulate(
     controller: Controller | Samples | None = None,
     reference: Reference | Samples | None = None,
     fingertip_force: Samples | None = None,
-    finger: Finger | None = None,
+    finger: FingerLike | None = None,
     initial: ArrayLike | xr.Dataset | None = None,
     control_period: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -86,11 +86,12 @@ def simulate(
         MicroDampingWarning: If micro-damping is more than viscous friction covers, so that friction can drive motion.
     """
     scenario = load_scenario(scenario)
-    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, finger)
+    given = own_finger(finger, scenario)
+    loop = ClosedLoop.from_scenario(scenario, controller, reference, fingertip_force, given)
     if initial is not None:
         loop = replace(loop, start=packed_state(initial, loop.finger))
         if loop.palm is not None and loop.start is not None:
             loop.palm.put(loop.finger, loop.start)
-    own = own_parts(controller, reference, fingertip_force, initial, finger)
+    own = own_parts(controller, reference, fingertip_force, initial, given)
     progress = progress or notebook_bar("s", scenario.simulation.duration)
     return interruptible(lambda asked: run(scenario, loop, own, control_period, progress, observe, asked), stop)

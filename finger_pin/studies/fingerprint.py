@@ -1,4 +1,4 @@
-"""What a run depends on besides its scenario: the package's source, other packages, and the code of metrics."""
+"""What a run depends on besides its scenario: the package's source, other packages, metrics, a finger of one's own."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from types import BuiltinFunctionType, CodeType, EllipsisType, FunctionType, Met
 from typing import Any
 
 import numpy as np
+
+from finger_pin.mechanism.finger import Finger
 
 #: Packages whose versions results depend on, and say.
 PACKAGES = ("finger-pin", "numba", "numpy", "pin", "scipy", "xarray")
@@ -61,6 +63,18 @@ def code_digest(function: Any) -> str:
     except (ValueError, RecursionError) as error:
         raise UnknownDependency(str(error)) from None
     return digest.hexdigest()[:16]
+
+
+def finger_digest(finger: Finger) -> str:
+    """Return a digest of a finger that a caller has built: description, rigid body, rows and their laws, objects.
+
+    Raises:
+        UnknownDependency: If a law depends on something that has no digest.
+    """
+    body, rows, objects = finger.made_of
+    model = None if body is None else body.model.saveToString()
+    described = {name: each.model_dump_json() for name, each in (objects or {}).items()}
+    return code_digest((finger.description.model_dump_json(), model, tuple(rows), described))
 
 
 def _parts(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Iterator[str]:

@@ -15,6 +15,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
 
 #: What a key may be given: a number, or a name such as that of a method, or yes or no.
 Value = float | str | bool
@@ -30,20 +31,29 @@ class Starting:
         given: What `load_scenario` takes.
         overrides: Entries that hold at all points.
         scenario: What the two make.
+        finger: Replaces the finger that it describes; a point's values at keys of a finger change it.
     """
 
     given: ScenarioLike
     overrides: Mapping[str, Any]
     scenario: Scenario
+    finger: Finger | None = None
 
     @classmethod
-    def load(cls, given: ScenarioLike, overrides: Mapping[str, Any] | None = None) -> Starting:
+    def load(
+        cls, given: ScenarioLike, overrides: Mapping[str, Any] | None = None, finger: FingerLike | None = None
+    ) -> Starting:
         """Load a scenario.
 
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        return cls(given, dict(overrides or {}), load_scenario(given, overrides))
+        scenario = load_scenario(given, overrides)
+        own = own_finger(finger, scenario)
+        if own is None:
+            return cls(given, dict(overrides or {}), scenario)
+        described = described_by(scenario, own)
+        return cls(described, {}, described, own)
 
     def at(self, point: Point) -> Scenario:
         """Return the scenario with other numbers or names at some keys.
@@ -64,6 +74,10 @@ class Starting:
                 changed[name] = [*self._list(key, name, index, changed)]
                 changed[name][index] = value
         return load_scenario(self.given, changed)
+
+    def finger_at(self, scenario: Scenario) -> Finger | None:
+        """Return the finger that replaces the one of a point's scenario; None where nothing does."""
+        return None if self.finger is None else self.finger.fitted(self.scenario, scenario)
 
     def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
         """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.

@@ -17,7 +17,7 @@ from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, own_finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import prepare, refuse_unknown
@@ -32,7 +32,7 @@ _PER_RUN = ("solver_steps", "solver_evaluations", "solver_wall_time", "end_time"
 def simulate_many(
     scenarios: Iterable[ScenarioLike],
     *,
-    finger: Finger | None = None,
+    finger: FingerLike | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     variables: Sequence[str] | None = None,
@@ -68,6 +68,7 @@ def simulate_many(
     runs = [load_scenario(each) for each in scenarios]
     if not runs:
         raise InputError("scenarios", "at least one is needed")
+    finger = own_finger(finger, runs[0])
     _check_alike(runs)
     _check_kept(runs, variables or (), finger)
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))

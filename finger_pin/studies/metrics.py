@@ -16,13 +16,14 @@ import xarray as xr
 
 from finger_pin.analysis import force_polytope, self_locking_margin
 from finger_pin.core.stepping.textbook import Stop
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism import joint_friction, tendons
 from finger_pin.mechanism.books import LOST
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, described_by
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.simulate import simulate
@@ -43,19 +44,25 @@ class Run:
     """A scenario and its simulation, which is done when a metric first asks for it.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; of a finger of one's own it has the description.
     """
 
-    def __init__(self, scenario: Scenario, stop: Stop | None = None) -> None:
-        """Keep a scenario, and what its simulation asks whether it is to stop."""
-        self.scenario, self._stop = scenario, stop
+    def __init__(self, scenario: ScenarioLike, stop: Stop | None = None, finger: Finger | None = None) -> None:
+        """Keep a scenario, what its simulation asks whether it is to stop, and a finger that replaces its own."""
+        self.scenario, self._stop, self._finger = described_by(load_scenario(scenario), finger), stop, finger
+
+    def parts(self) -> dict[str, tuple[Scenario, Finger]]:
+        """Return scenario and finger of every finger of a hand, or of the only one, by name."""
+        parts = self.scenario.parts()
+        own = self._finger if len(parts) == 1 else None
+        return {name: (part, own or Finger(part.finger)) for name, part in parts.items()}
 
     @cached_property
     def result(self) -> xr.Dataset:
         """What `simulate` returns."""
         # Studies look at many designs, and at the margin by its metric; they have a bar of their own.
         with quiet():
-            return simulate(self.scenario, progress=lambda time: None, stop=self._stop)
+            return simulate(self.scenario, finger=self._finger, progress=lambda time: None, stop=self._stop)
 
 
 @dataclass(frozen=True)
@@ -169,11 +176,10 @@ def fingertip_force(run: Run) -> float:
     It is the radius of the largest ball around zero in the polytope of forces, without friction, at the mean posture
     of the reference, with tensions up to `FORCE_TENSION`; of a hand that of its weakest finger.
     """
-    return min(_fingertip_force(part) for part in run.scenario.parts().values())
+    return min(_fingertip_force(*part) for part in run.parts().values())
 
 
-def _fingertip_force(scenario: Scenario) -> float:
-    finger = Finger(scenario.finger)
+def _fingertip_force(scenario: Scenario, finger: Finger) -> float:
     times = scenario.simulation.duration * (np.arange(500) + 0.5) / 500
     posture = np.mean(SignalReference.from_scenario(scenario, finger.routing).at(times).position, axis=0)
     offsets = force_polytope(finger, posture, FORCE_TENSION).offsets

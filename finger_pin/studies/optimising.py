@@ -17,6 +17,7 @@ from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
+from finger_pin.mechanism.finger import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
@@ -77,6 +78,7 @@ def optimise(
     constraints: Iterable[str | Constraint] = DEFAULT_CONSTRAINTS,
     effort: Effort | None = None,
     overrides: Mapping[str, Any] | None = None,
+    finger: FingerLike | None = None,
     output: str | Path | None = None,
     executor: Executor | None = None,
     restart: bool = False,
@@ -98,6 +100,7 @@ def optimise(
         constraints: Bounds on metrics, such as ``self_locking_margin>=1.5``.
         effort: How long to search.
         overrides: Entries of the scenario that hold for all designs.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
         output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv`` and ``front``, which has every
             design of the front as a scenario; by default nothing is kept.
         executor: Where runs are done: any of `concurrent.futures`, by default one thread for each core.
@@ -119,7 +122,7 @@ def optimise(
     """
     effort = effort or Effort()
     goals = Goals.of(minimise, maximise, constraints)
-    starting = Starting.load(scenario, overrides)
+    starting = Starting.load(scenario, overrides, finger)
     given = radii(starting.scenario.finger) if over is None else over
     variables = [parse_variable(each) if isinstance(each, str) else each for each in given]
     check_variables(variables, starting)

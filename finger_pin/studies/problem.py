@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.description.parameters import FingerDescription, Tendon
+from finger_pin.description.parameters import Tendon
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import FingerLike, description_of
 from finger_pin.studies.designs import Range
 from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric, choose
@@ -67,17 +68,18 @@ def parse_variable(text: str) -> Variable:
     return Variable(tuple(keys), tuple(signs), found)
 
 
-def radii(finger: FingerDescription) -> list[Variable]:
+def radii(finger: FingerLike) -> list[Variable]:
     """Return the winding radii of a finger as variables: from `LEAST_RADIUS` to half the width of the joint's link.
 
     Radii of zero stay so, and so do signs. Tendons that cross the same joints at radii alike but for their signs are
     mirror images, and stay so.
     """
+    description = description_of(finger)
     variables: dict[Any, list[tuple[str, float]]] = {}
     widths = {}
-    for name, tendon in finger.tendons.items():
+    for name, tendon in description.tendons.items():
         for joint, crossing in tendon.crossings.items():
-            link = finger.joints[joint].link
+            link = description.joints[joint].link
             if crossing.radius and link is not None and 0.5 * link.width > LEAST_RADIUS:
                 widths[joint] = 0.5 * link.width
                 key = f"finger.tendons.{name}.crossings.{joint}.radius"

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
@@ -67,11 +66,10 @@ def fingertip_hysteresis(run: Run) -> float:
     compared in `HYSTERESIS_BINS` parts of its travel by the mean of the tip less that of the reference. Of a hand the
     largest of its fingers; 0 where the reference does not move to and fro.
     """
-    return max(_hysteresis(run.result, name, part) for name, part in run.scenario.parts().items())
+    return max(_hysteresis(run.result, name, finger) for name, (_, finger) in run.parts().items())
 
 
-def _hysteresis(result: xr.Dataset, name: str, scenario: Scenario) -> float:
-    finger = Finger(scenario.finger)
+def _hysteresis(result: xr.Dataset, name: str, finger: Finger) -> float:
     hand = any("." in str(each) for each in result["joint"].values)
     joints = [f"{name}.{joint}" if hand else joint for joint in finger.routing.joints]
     wanted, tip = (

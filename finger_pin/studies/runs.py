@@ -18,8 +18,9 @@ from typing import Any, Protocol, Self
 from finger_pin.description.loading import to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.studies.executing import Crew, Lost
-from finger_pin.studies.fingerprint import UnknownDependency, code_digest, source_digest, versions
+from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest, versions
 from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric, Run
 
@@ -74,6 +75,7 @@ class Task:
         key: Digest of everything that determines it.
         point: What was varied.
         scenario: At this point.
+        finger: Replaces the one that it describes; None for none.
         metrics: To be measured.
         source: Digest of the package that asks.
     """
@@ -81,6 +83,7 @@ class Task:
     key: str
     point: Point
     scenario: Scenario
+    finger: Finger | None
     metrics: tuple[Metric, ...]
     source: str
 
@@ -136,6 +139,8 @@ def evaluate(
     """
     asked_to_stop = stop or (lambda: False)
     measured = [_identity(metric) for metric in metrics]
+    if starting.finger is not None:
+        measured.append([_known(finger_digest, starting.finger)])
     plans = [_plan(starting, point, metrics, measured) for point in takewhile(lambda _: not asked_to_stop(), points)]
     found = {key: r for key, r in archive.records.items() if not (retry_failed and r.status == FAILED)}
     records = {each.key: found[each.key] for each in plans if each.key in found}
@@ -180,7 +185,7 @@ def execute(task: Task, stop: Stop) -> Record:
         own = f"{versions()['finger-pin']}, source {source_digest()}"
         raise VersionError(f"a worker has another finger_pin ({own}), not that of source {task.source}")
     begin = time.perf_counter()
-    run = Run(task.scenario, stop)
+    run = Run(task.scenario, stop, task.finger)
     try:
         values = {metric.name: float(metric.measure(run)) for metric in task.metrics}
     except Exception as error:
@@ -192,11 +197,15 @@ def execute(task: Task, stop: Stop) -> Record:
 
 def _identity(metric: Metric) -> list[str]:
     """Return what distinguishes a metric from others; from all others, if what its code depends on cannot be known."""
+    return [metric.name, metric.unit, metric.long_name, _known(code_digest, metric.measure)]
+
+
+def _known(digest: Callable[[Any], str], thing: Any) -> str:
+    """Return a digest of a thing; one that comes only once where it has none."""
     try:
-        code = code_digest(metric.measure)
+        return digest(thing)
     except UnknownDependency:
-        code = uuid.uuid4().hex
-    return [metric.name, metric.unit, metric.long_name, code]
+        return uuid.uuid4().hex
 
 
 def _plan(starting: Starting, point: Point, metrics: tuple[Metric, ...], measured: list[list[str]]) -> Task | Record:
@@ -206,7 +215,8 @@ def _plan(starting: Starting, point: Point, metrics: tuple[Metric, ...], measure
     except InputError as error:
         key = _digest(to_toml(starting.scenario), dict(point), measured)
         return Record(key, dict(point), FAILED, str(error), {}, 0.0)
-    return Task(_digest(to_toml(scenario), measured), dict(point), scenario, metrics, source_digest())
+    finger = starting.finger_at(scenario)
+    return Task(_digest(to_toml(scenario), measured), dict(point), scenario, finger, metrics, source_digest())
 
 
 def _digest(*parts: Any) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import xarray as xr
 
 from finger_pin.description.loading import ScenarioLike
+from finger_pin.mechanism.finger import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
@@ -30,6 +31,7 @@ def sweep(
     *,
     metrics: Iterable[str | Metric] = DEFAULT_METRICS,
     overrides: Mapping[str, Any] | None = None,
+    finger: FingerLike | None = None,
     output: str | Path | None = None,
     executor: Executor | None = None,
     restart: bool = False,
@@ -52,6 +54,7 @@ def sweep(
             ``environment.fingertip_force[2]`` means one number of a list.
         metrics: Names of `METRICS`, or metrics of one's own.
         overrides: Entries of the scenario that hold at all points.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
         output: Folder for ``study.toml``, ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
         executor: Where runs are done: any of `concurrent.futures`, by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
@@ -73,7 +76,7 @@ def sweep(
     """
     design = Grid(over) if isinstance(over, Mapping) else over
     chosen = choose(metrics)
-    starting = Starting.load(scenario, overrides)
+    starting = Starting.load(scenario, overrides, finger)
     for key, values in design.values.items():
         starting.check(key, values, alone=len(design.values) == 1)
     with ExitStack() as stack:

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from finger_pin.description.hand import HandDescription
+from finger_pin.description.loading import DescriptionLike
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -62,7 +63,7 @@ _MASSLESS = """
 
 
 def to_mjcf(
-    description: FingerDescription | HandDescription | Scenario,
+    description: DescriptionLike | Scenario,
     *,
     posture: Sequence[float] | None = None,
     timestep: float | None = None,
@@ -77,7 +78,7 @@ def to_mjcf(
     are named as in the URDF. Numbers are written so that reading them gives the same floats.
 
     Args:
-        description: The finger or hand, or the scenario that has it.
+        description: The finger or hand, its name, the path of its file, or the scenario that has it.
         posture: theta of the keyframe ``start``, shape (n,), rad, with the lumped masses where both halves are
             stretched alike; all joints at zero by default.
         timestep: Of MuJoCo, s; by default a step that the lumped masses are stable with.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from functools import lru_cache, partial
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.hand import HandDescription
+from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.scenario import Scenario
@@ -30,7 +32,7 @@ VELOCITY_LIMIT = 20.0
 _RESERVED = (TIP_FRAME, f"{TIP_FRAME}_fixed", "universe")
 
 
-def to_urdf(description: FingerDescription | HandDescription | Scenario, drawn: bool = True) -> str:
+def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
     """Return the URDF of a finger as text: Table I, inertias, joint ranges and shapes.
 
     Links are named ``base``, ``<joint>_link`` and ``fingertip``. A link's frame is its joint's: the axis is z
@@ -38,7 +40,7 @@ def to_urdf(description: FingerDescription | HandDescription | Scenario, drawn: 
     same floats.
 
     Args:
-        description: The finger, or the scenario that has it; not a hand of several.
+        description: The finger, its name, the path of its file, or the scenario that has it; not a hand of several.
         drawn: With shapes, and indented. Its motion needs neither.
 
     Raises:
@@ -72,7 +74,7 @@ def to_urdf(description: FingerDescription | HandDescription | Scenario, drawn: 
     return ET.tostring(robot, encoding="unicode") + "\n"
 
 
-def exported(described: FingerDescription | HandDescription | Scenario) -> FingerDescription:
+def exported(described: DescriptionLike | Scenario) -> FingerDescription:
     """Return the finger, or a hand's fingers together, of what is to be written as a file of another program.
 
     Raises:
@@ -80,8 +82,8 @@ def exported(described: FingerDescription | HandDescription | Scenario) -> Finge
     """
     if isinstance(described, Scenario):
         described = described.finger
-    if isinstance(described, HandDescription):
-        described = described.joined()
+    if isinstance(described, HandDescription | str | Path):
+        described = describe(described)
     if not isinstance(described, FingerDescription):
         allowed = "must be a finger, hand or scenario, as fp.load_finger(name), or finger.description"
         raise InputError("description", allowed, type(described).__name__)

@@ -10,6 +10,7 @@ import numpy as np
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import FingerLike
 from finger_pin.simulation.prepared import prepare
 from finger_pin.simulation.run_arrays import RunArrays
 
@@ -24,6 +25,7 @@ def propose(
     outputs: Mapping[str, float],
     *,
     overrides: Mapping[str, Any] | None = None,
+    finger: FingerLike | None = None,
     known: Mapping[str, float] | None = None,
     rate: float = 100.0,
 ) -> xr.Dataset:
@@ -38,6 +40,7 @@ def propose(
         parameters: By dotted key, the least and the greatest value; sure to that much without any motion.
         outputs: What would be measured, by variable.label, and its noise, SI, rms.
         overrides: Entries of all of them, such as what is known by now.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`.
         known: By key, standard deviations that earlier recordings have left, in units of the parameter.
         rate: Of independent samples, Hz: of a model at 1 kHz only some are.
 
@@ -60,7 +63,7 @@ def propose(
     found: dict[str, tuple[float, Array]] = {}
     for name, changed in candidates.items():
         entries = {**(overrides or {}), "simulation.sample_rate": rate, **changed}
-        run = prepare(load_scenario(scenario, entries), keys, variables).run(sensitivities=True)
+        run = prepare(load_scenario(scenario, entries), keys, variables, finger=finger).run(sensitivities=True)
         information = np.diag(1.0 / before**2)
         for output, noise in outputs.items():
             slopes = _slopes(run, output)

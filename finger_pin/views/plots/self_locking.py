@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.analysis import SelfLockingMap, critical_friction
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import grid, heading, legend, plain, sheet, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
@@ -19,15 +18,16 @@ _MILLI = 1e3
 
 
 @styled
-def plot_critical_friction(finger: Finger | FingerDescription, *, width: Width = None, titles: bool = True) -> Figure:
+def plot_critical_friction(finger: FingerLike, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw the critical coefficients of a finger: of every joint alone, and of all joints together.
 
     Args:
-        finger: A finger with force closure, or the description of one.
+        finger: A finger with force closure, its description, its name, or the path of its file.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    description = finger.description if isinstance(finger, Finger) else finger
+    finger = as_finger(finger)
+    description = finger.description
     entries = {name: critical_friction(finger, joints=[name]) for name in description.joints}
     entries["all joints"] = critical_friction(finger)
     figure, (part,) = sheet([(7.5, 0.9 + 0.42 * len(entries))], width, titles)

@@ -12,9 +12,8 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from finger_pin.description.hand import one_finger
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import FingerLike, as_finger
 from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.reach import fingertip_surface, flexion_section
 from finger_pin.views.plots.space import AXES, space
@@ -25,18 +24,17 @@ _ISOLINES = 7
 
 
 @styled
-def plot_workspace(finger: Finger | FingerDescription, *, width: Width = None, titles: bool = True) -> Figure:
+def plot_workspace(finger: FingerLike, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 2: where the fingertip can go when the passive tendons do not stretch, equation (4).
 
     Left the surface in space, right the section in the flexion plane with the finger at three poses; mm, base frame.
 
     Args:
-        finger: A finger, or the description of one.
+        finger: A finger, its description, its name, or the path of its file.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
-    if isinstance(finger, FingerDescription):
-        finger = Finger(finger)
+    finger = as_finger(finger)
     one_finger(finger.description)
     surface, section = fingertip_surface(finger), flexion_section(finger)
     figure, (left, right) = sheet([(5.5, 5.2), (5.5, 5.2)], width, titles)

@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.description.embedded import described
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
@@ -88,11 +87,11 @@ def animation_page(
     return render({**header, "chunks": [chunk]})
 
 
-def posture_page(finger: Finger | FingerDescription, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
+def posture_page(finger: FingerLike, forces: ForcePolytope, strands: ArrayLike | None = None) -> str:
     """Return the page of a finger at rest in the posture of its fingertip forces.
 
     Args:
-        finger: The finger, or its description.
+        finger: The finger, its description, its name, or the path of its file.
         forces: Its forces.
         strands: Tensions to show, shape (s,), N; none by default.
     """

@@ -14,9 +14,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike, description_of
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, is_mesh, link_names, root_command, solid_commands
@@ -64,20 +63,19 @@ class Ghost:
         return np.concatenate([self.poses.translation.reshape(-1, 3), self.scene.tips(self.poses).reshape(-1, 3)])
 
 
-def shown(finger: Finger | FingerDescription) -> TendonGeometry | TreeGeometry:
-    """Return the geometry of a finger or hand, or of the description of one.
+def shown(finger: FingerLike) -> TendonGeometry | TreeGeometry:
+    """Return the geometry of a finger or hand that is given in any way.
 
     Raises:
         InputError: If a joint of a description carries no link.
     """
-    description = finger if isinstance(finger, FingerDescription) else finger.description
+    own = finger if isinstance(finger, Finger) else None
+    description = description_of(finger)
     if description.tree is not None:
         return TreeGeometry(description)
-    if isinstance(finger, FingerDescription):
-        return TendonGeometry(finger, resolution=_RESOLUTION)
-    foreign = finger.visuals is not None
-    body = finger.rigid_body if foreign else None
-    return TendonGeometry(finger.description, resolution=_RESOLUTION, body=body, solids=finger.visuals)
+    visuals = None if own is None else own.visuals
+    body = None if own is None or visuals is None else own.rigid_body
+    return TendonGeometry(description, resolution=_RESOLUTION, body=body, solids=visuals)
 
 
 class Scene:
@@ -90,7 +88,7 @@ class Scene:
         tendons: Of every tendon its name, the index of the strand that every point of it shows, and its knots.
     """
 
-    def __init__(self, finger: Finger | FingerDescription) -> None:
+    def __init__(self, finger: FingerLike) -> None:
         """Prepare solids and tendons.
 
         Raises:

@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.control.closed_loop import LoopSignals
-from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger import Finger, FingerLike
 from finger_pin.simulation.notebook import in_notebook
 from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
@@ -109,7 +108,7 @@ def view(
 
 
 def view_forces(
-    finger: Finger | FingerDescription,
+    finger: FingerLike,
     forces: ForcePolytope,
     *,
     tension: ArrayLike | None = None,
@@ -119,7 +118,7 @@ def view_forces(
     """Show the forces that a fingertip can exert: a translucent body at the tip of the finger at rest.
 
     Args:
-        finger: The finger, or its description.
+        finger: The finger, its description, its name, or the path of its file.
         forces: What `force_polytope` returned.
         tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
@@ -155,7 +154,7 @@ class LiveView(Viewing):
 
     def __init__(
         self,
-        finger: Finger | FingerDescription,
+        finger: FingerLike,
         *,
         title: str = "",
         open_browser: bool | None = None,
@@ -164,7 +163,7 @@ class LiveView(Viewing):
         """Serve the page and print its address; frames come with `update`.
 
         Args:
-            finger: The finger, or its description.
+            finger: The finger, its description, its name, or the path of its file.
             title: Shown above the legend; the finger's title when left out.
             open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
             rate: Most frames per second of real time.
