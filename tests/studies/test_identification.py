@@ -6,6 +6,7 @@ import pytest
 import finger_pin as fp
 from finger_pin.commands.application import run
 from finger_pin.description.units import in_si
+from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.studies.identification.ledger import NAME
 from finger_pin.views.report import summarize_identification, write_report
 
@@ -201,6 +202,17 @@ def test_a_recorded_motion_gives_the_friction_that_it_was_made_with(more):
     np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
     np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
     assert result.parameter.size == 2 and result.signal.size == 2
+
+
+def test_a_finger_of_ones_own_is_identified_with_the_rows_that_it_has():
+    """Half of the drum's spring is a row of its own: the motion is the same, and so is the friction found in it."""
+    truth, half = {COULOMB: 0.15, DRAG: 0.5}, {"finger.joints.drum.spring.stiffness": 0.1}
+    spring = fp.Rows("drum_spring", JOINT_SPRING, ("drum",), [[0.1], [0.0], [0.0]], np.ones((1, 1)))
+    finger = fp.Finger(fp.load_scenario("canal", half).finger, rows=[spring])
+    data = {"pull": ramp(np.random.default_rng(4), *truth.values())}
+    result = fp.identify("canal", parameters=BOUNDS, recordings={"pull": MOTION}, data=data, starts=1, finger=finger)
+    np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
+    np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
 
 
 def test_estimates_from_motions_scatter_about_the_truth_as_their_intervals_say():

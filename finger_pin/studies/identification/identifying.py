@@ -15,6 +15,8 @@ from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
+from finger_pin.studies.fingerprint import finger_digest
 from finger_pin.studies.identification.comparing import Comparison, compare_laws
 from finger_pin.studies.identification.estimate import Fit, fit
 from finger_pin.studies.identification.intervals import Side, covariance, profile
@@ -40,6 +42,7 @@ def identify(
     recordings: Mapping[str, Mapping[str, Any]] | None = None,
     compare: Mapping[str, Mapping[str, Any]] | None = None,
     data: Data | None = None,
+    finger: FingerLike | None = None,
     overrides: Mapping[str, Any] | None = None,
     output: str | Path | None = None,
     starts: int = 3,
@@ -62,6 +65,8 @@ def identify(
         recordings: By name, entries as in a file.
         compare: By name, other laws: keys with a number that is held, or with bounds.
         data: By name of a recording, columns by name, in place of its file.
+        finger: Replaces the finger that the scenario describes, as for `fp.simulate`; in steady readings its numbers
+            count.
         overrides: Values by dotted key, as for `load_scenario`.
         output: Folder for ``identification.nc``, ``identified.toml`` and ``identification.html``; work that is done is
             kept there too, so that the same call goes on where another was stopped.
@@ -86,10 +91,12 @@ def identify(
     given = {"parameters": parameters, "recordings": recordings, "compare": compare}
     entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in given.items() if table}
     scenario, settings = load_bench(bench, overrides, entries)
+    own = own_finger(finger, scenario)
+    scenario = described_by(scenario, own)
     taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
-    problem = build_problem(scenario, settings, taken)
+    problem = build_problem(scenario, settings, taken, own)
     problem.stop = stop or (lambda: False)
-    asked = digest(scenario, settings, taken, (starts, seed, loss))
+    asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Ledger(None if output is None else Path(output), asked, restart) as ledger:
         result = _work(problem, settings, _starts(problem, starts, seed), _Work(problem, ledger, loss, progress))
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
@@ -98,7 +105,9 @@ def identify(
     return result
 
 
-def build_problem(scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording]) -> Problem:
+def build_problem(
+    scenario: Scenario, settings: IdentifySettings, taken: Sequence[Recording], finger: Finger | None = None
+) -> Problem:
     """Return the problem whose objective is to be minimised.
 
     Raises:
@@ -112,7 +121,7 @@ def build_problem(scenario: Scenario, settings: IdentifySettings, taken: Sequenc
             parts = [np.arange(len(recording.speed))]
         else:
             parts = list(windows(recording))
-            models += [RecordedMotion(recording, scenario, rows, k) for k, rows in enumerate(parts)]
+            models += [RecordedMotion(recording, scenario, rows, k, finger) for k, rows in enumerate(parts)]
         signals += [
             _signal(recording, name, values, rows) for rows in parts for name, values in recording.outputs.items()
         ]

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.stepper import in_threads
 from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.motions import Motions
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
@@ -48,8 +50,15 @@ class RecordedMotion:
         own: Numbers of its own that are to be found: where its joints start.
     """
 
-    def __init__(self, recording: Recording, scenario: Scenario, rows: NDArray[np.intp], window: int = 0) -> None:
-        """Put the inputs into the scenario.
+    def __init__(
+        self,
+        recording: Recording,
+        scenario: Scenario,
+        rows: NDArray[np.intp],
+        window: int = 0,
+        finger: Finger | None = None,
+    ) -> None:
+        """Put the inputs into the scenario; a finger may replace the one that it describes.
 
         Raises:
             InputError: If an input names nothing that the scenario has, or a start cannot be reached.
@@ -66,6 +75,7 @@ class RecordedMotion:
         table["simulation"]["start_time"] = scenario.simulation.start_time + first
         self._put_start(table, scenario, window)
         self.scenario = read_scenario(table)
+        self._finger = finger
         self._last: tuple[Any, list[Array], tuple[Setup, Trajectory] | None] | None = None
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
@@ -93,7 +103,7 @@ class RecordedMotion:
         feeling = [
             k for k, (scenario, own) in enumerate(there) if self._with_start(scenario, own) != motion[0].scenario
         ]
-        others = {k: Setup.of(self._with_start(*there[k])) for k in feeling}
+        others = {k: self._setup(*there[k]) for k in feeling}
         near = dict(zip(feeling, nearby(*motion, list(others.values()), changes[feeling]), strict=True))
         ranges = [float(np.ptp(each)) for each in computed]
 
@@ -128,12 +138,18 @@ class RecordedMotion:
         settings = scenario.simulation.model_copy(update={"initial": moved})
         return scenario.model_copy(update={"simulation": settings})
 
+    def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
+        moved = self._with_start(scenario, own)
+        if self._finger is None:
+            return Setup.of(moved)
+        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=self._finger.fitted(self.scenario, moved)))
+
     def _made(
         self, scenario: Scenario, own: Mapping[str, float]
     ) -> tuple[list[Array], tuple[Setup, Trajectory] | None]:
         """Return the outputs, not numbers if the motion fails, and the motion."""
         try:
-            setup = Setup.of(self._with_start(scenario, own))
+            setup = self._setup(scenario, own)
             trajectory = setup.integrate()
             failed = bool(trajectory.failure)
         except IntegrationError:
