@@ -7,13 +7,13 @@ from typing import Protocol
 
 import numpy as np
 
+from finger_pin.control.compiled import Bindings
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.moved_objects import Guides
 from finger_pin.control.palm import PalmPath
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
-from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
@@ -160,9 +160,9 @@ class ClosedLoop:
             return self.palm.put(self.finger, x)
         return x if self.guides is None else self.guides.place(self.finger, x)
 
-    def compiled(self) -> ClosedLoop:
-        """Return the same loop, whose finger is evaluated by the compiled core."""
-        return replace(self, dynamics=CompiledFinger(self.finger))
+    def compiled(self, bindings: Bindings | None = None) -> ClosedLoop:
+        """Return the same loop, whose finger is evaluated by the compiled core, by what has served others if given."""
+        return replace(self, dynamics=(bindings or Bindings()).evaluating(self.finger))
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.control import Control, held_control
 from finger_pin.core.evaluation import time_functions as signal_core
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -17,29 +19,52 @@ if TYPE_CHECKING:
     from finger_pin.control.closed_loop import ClosedLoop
 
 
-def build_stepper(
-    finger: Finger,
-    control: Control,
-    x: Array,
-    force: Array | None = None,
-    *,
-    method: str,
-    rtol: float,
-    atol_scale: float,
-) -> Stepper:
-    """Return what steps a finger under inputs, from a packed state on.
+@dataclass(eq=False)
+class Bindings:
+    """What is bound to compiled code for one finger after the other; it stays where they differ in numbers alone.
 
-    Args:
-        finger: The finger.
-        control: Its inputs.
-        x: Packed state, shape (size,).
-        force: At the tips, shape (3,) or (t, 3), N, base frame.
-        method: One of `TABLEAUS`.
-        rtol: Relative tolerance.
-        atol_scale: Absolute tolerance over the scale of each kind of state.
+    Of each finger the work is done when the next one comes.
+
+    Attributes:
+        dynamics: What evaluates the finger.
+        stepper: What steps it.
     """
-    atol = atol_scale * finger.layout.scales()
-    return Stepper(finger.mechanism, control, x, TABLEAUS[method](), rtol, atol, force)
+
+    dynamics: CompiledFinger | None = None
+    stepper: Stepper | None = None
+
+    def evaluating(self, finger: Finger) -> CompiledFinger:
+        """Return what evaluates a finger."""
+        if self.dynamics is None or not self.dynamics.renew(finger):
+            self.dynamics = CompiledFinger(finger)
+        return self.dynamics
+
+    def stepping(
+        self,
+        finger: Finger,
+        control: Control,
+        x: Array,
+        force: Array | None = None,
+        *,
+        method: str,
+        rtol: float,
+        atol_scale: float,
+    ) -> Stepper:
+        """Return what steps a finger under inputs, from a packed state on.
+
+        Args:
+            finger: The finger.
+            control: Its inputs.
+            x: Packed state, shape (size,).
+            force: At the tips, shape (3,) or (t, 3), N, base frame.
+            method: One of `TABLEAUS`.
+            rtol: Relative tolerance.
+            atol_scale: Absolute tolerance over the scale of each kind of state.
+        """
+        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force
+        if self.stepper is None or not self.stepper.renew(*given):
+            self.stepper = Stepper(*given)
+        return self.stepper
 
 
 def compiled_control(loop: ClosedLoop) -> Control | None:

@@ -2,138 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from finger_pin.core.control import held_control
+from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, rows_of
 from finger_pin.core.evaluation.charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
-from finger_pin.core.evaluation.signals import MOTIONS, STATES, Motions, States, evaluate_many, motion_many
-from finger_pin.core.jit import bound, call
-from finger_pin.core.model import BoundModel
-from finger_pin.core.stepping.stepper import in_threads
-from finger_pin.core.tables import Tables, build_tables
-from finger_pin.core.work import build_work
+from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
+from finger_pin.core.jit import bound, fits, indices
+from finger_pin.core.tables import build_tables
 from finger_pin.description.routing import Array
 from finger_pin.laws.contact import CONTACT
-from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.evaluation import Evaluation, Touching
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
-from finger_pin.mechanism.mechanism import GUIDES, Mechanism
+from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import RowSignals
-
-# Fewer states than this are not worth a second thread.
-_FEW = 1000
-
-
-class Room(NamedTuple):
-    """What `evaluate_many` fills for m states, beside the packed states, shape (m, size).
-
-    The rows are those of more states, these from the ``first`` on: compiled code takes them whole.
-    """
-
-    packed: Array
-    rates: Array
-    rows: Array
-    first: int
-    torques: Array
-    externals: Array
-    booked: Array
-    touches: Array
-
-    def part(self, at: slice) -> Room:
-        """Return the room of some of the states, the same memory."""
-        first = self.first + at.indices(len(self.packed))[0]
-        own = (self.packed, self.rates, self.torques, self.externals, self.booked, self.touches)
-        packed, rates, torques, externals, booked, touches = (values[at] for values in own)
-        return Room(packed, rates, self.rows, first, torques, externals, booked, touches)
-
-
-class Models:
-    """Models of the same tables under inputs that are given: memory for threads, and with or without forces at tips."""
-
-    def __init__(
-        self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool, books: int
-    ) -> None:
-        """Keep what they are made of.
-
-        Args:
-            tables: Of a mechanism or an island.
-            laws: Of their groups of rows.
-            channels: Number of inputs.
-            moved: Whether the base moves.
-            books: Number of energies and powers that are booked.
-        """
-        self.tables, self.books = tables, books
-        self._laws, self._channels, self._moved = laws, channels, moved
-        self._known: dict[tuple[bool, int], BoundModel] = {}
-
-    def model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
-        """Return a thread's model that minds forces at the tips or not.
-
-        Each has memory of its own: without loads, nothing writes where loads have left their torques.
-        """
-        if (loaded, thread) not in self._known:
-            tables = self.tables
-            own = tables._replace(loaded=loaded, tip_force=tables.tip_force.copy(), bodies=tables.bodies.copy())
-            work = build_work(own, self._laws, self._channels)
-            control = held_control(self._channels, len(work.torque))
-            self._known[loaded, thread] = BoundModel(own, control, work, self._moved)
-        return self._known[loaded, thread]
-
-
-def book_many(
-    models: Models, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
-) -> tuple[Array, Array]:
-    """Return energies and powers at states of the core, shape (m, books), and J^T F, shape (m, N).
-
-    Args:
-        models: Of the mechanism or island.
-        states: Shape (m, size), of the core.
-        attitudes: Of free bodies, shape (m, f, 4).
-        commands: Inputs, shape (m, u).
-        forces: At the tips, shape (m, t, 3), N.
-        base: How the base moves, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
-    """
-    count, work = len(states), models.model().model.work
-    room = Room(
-        packed=states,
-        rates=np.zeros((0, states.shape[1])),
-        rows=np.zeros((len(work.rows), 0, work.rows.shape[1])),
-        first=0,
-        torques=np.zeros((count, len(work.torque))),
-        externals=np.zeros((count, len(work.torque))),
-        booked=np.zeros((count, models.books)),
-        touches=np.zeros((0, models.tables.touching // CONTACT.arms, 9)),
-    )
-    _fill(models, room, states, attitudes, commands, np.ascontiguousarray(forces), base)
-    return room.booked, room.externals
-
-
-def _fill(
-    models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
-) -> None:
-    bases = _bases(base, len(states), int(models.tables.guided.max(initial=-1)) + 1)
-    loaded, count = bool(np.any(forces)), len(states)
-
-    def fill(model: BoundModel, part: slice) -> None:
-        own = room.part(part)
-        filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
-        given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part], own.touches)
-        call(evaluate_many, States(model.address, *given), STATES)
-
-    if count < _FEW:
-        fill(models.model(loaded), slice(None))
-    else:
-        half = count // 2
-        pair = (models.model(loaded), models.model(loaded, 1))
-        in_threads(lambda each: fill(*each), list(zip(pair, (slice(half), slice(half, None)), strict=True)))
 
 
 class CompiledMechanism:
@@ -155,6 +43,19 @@ class CompiledMechanism:
         count = len(books.stored) + len(books.powers)
         self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved, count)
         self._motions: dict[int, tuple[Motions, NDArray[np.uint8]]] = {}
+
+    def renew(self, mechanism: Mechanism) -> bool:
+        """Take the numbers of another mechanism in place, if only numbers differ; return whether."""
+        if mechanism is self.mechanism:
+            return True
+        own, tables = self.mechanism, build_tables(mechanism)
+        if (own.moved, own.channels) != (mechanism.moved, mechanism.channels) or not fits(self.tables, tables):
+            return False
+        if indices(tables) != indices(self.tables):
+            return False
+        self.mechanism, self.tables, self.charts = mechanism, tables, Charts.of(mechanism)
+        self.models.renew(tables)
+        return True
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds models of its own."""
@@ -245,14 +146,14 @@ class CompiledMechanism:
         mechanism.split(np.asarray(x))
         room.packed[:] = x
         count, tips = len(room.packed), len(tables.tip_body)
-        commands = _rows(command, (count, mechanism.channels))
+        commands = rows_of(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
         forces = np.zeros((count, tips, 3))
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
         states, attitudes = self.charts.to_core(room.packed)
-        _fill(self.models, room, states, attitudes, commands, forces, base)
+        fill(self.models, room, states, attitudes, commands, forces, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return tips and energies of the bodies at positions and velocities of the joints, shape (n,) or (m, n).
@@ -261,7 +162,7 @@ class CompiledMechanism:
         """
         count, alone = len(np.atleast_2d(position)), np.ndim(position) == 1
         # A few postures after the other are asked for in loops: what is bound once serves them all.
-        kept = count < _FEW and base is None
+        kept = count < FEW and base is None
         found = self._motions.get(count) if kept else None
         motions, block = found or self._bound_motions(count, base)
         if kept:
@@ -278,7 +179,7 @@ class CompiledMechanism:
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
         motions = Motions(
-            self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, _bases(base, count, 0)
+            self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, path_motions(base, count, 0)
         )
         return motions, bound(motions, MOTIONS)
 
@@ -295,6 +196,15 @@ class CompiledFinger:
         """Read a finger."""
         self.finger = finger
         self.mechanism = CompiledMechanism(finger.mechanism)
+
+    def renew(self, finger: Finger) -> bool:
+        """Take the numbers of another finger in place, if only numbers differ; return whether."""
+        if not self.mechanism.renew(finger.mechanism):
+            return False
+        if finger.rigid_body is not self.finger.rigid_body:
+            vars(self).pop("_alone", None)
+        self.finger = finger
+        return True
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -326,16 +236,3 @@ class CompiledFinger:
         if self.finger.surroundings is None:
             return self.mechanism
         return CompiledMechanism(Mechanism(self.finger.rigid_body, [], moved=self.finger.mechanism.moved))
-
-
-def _bases(base: Array | None, count: int, guided: int) -> Array:
-    """Return the motions of the base and of what is moved along paths, shape (count, 15 + g), or no rows at rest."""
-    if base is None:
-        return np.zeros((0, 15 + guided))
-    given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + guided]], axis=-1)
-    return _rows(given, (count, 15 + guided))
-
-
-def _rows(values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return a copy of one kind alone, of which the core has one compilation: writable, contiguous, of floats."""
-    return np.array(np.broadcast_to(values, shape), dtype=float, order="C")

@@ -15,9 +15,9 @@ from finger_pin.core.evaluation import blocks, condensation, contacts, dynamics,
 from finger_pin.core.evaluation.inputs import move_base
 from finger_pin.core.evaluation.linearisation import Linear, build_linear
 from finger_pin.core.evaluation.rigid_body import base_power, bias_rate, move
-from finger_pin.core.jit import Kind, Unit, Vector, bound, bound_at
+from finger_pin.core.jit import Kind, Unit, Vector, bound, bound_at, refill
 from finger_pin.core.tables import Tables
-from finger_pin.core.work import Work
+from finger_pin.core.work import Work, take_numbers
 
 
 class Model(NamedTuple):
@@ -87,6 +87,14 @@ class BoundModel:
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
         self._block = bound(self.model, MODEL)
         self.address = int(self._block.ctypes.data)
+
+    def renew(self, tables: Tables, control: Control) -> None:
+        """Take the numbers of other tables and another control, which fit, into the arrays that are bound."""
+        own = self.model
+        refill(own.tables, tables)
+        refill(own.control, control)
+        take_numbers(own.work, tables)
+        linearisation.take_numbers(own.linear, tables)
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be copied or pickled: a copy's address would be that of this one.

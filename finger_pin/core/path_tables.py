@@ -268,9 +268,8 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         travel=np.zeros(width),
         control=np.zeros((width, 5)),
         looks=np.zeros((LOOKS, 6)),
-        # Of what stands on the base they stay.
-        frame=paths.rotation.copy(),
-        origin=paths.origin.copy(),
+        frame=np.zeros((pieces, 3, 3)),
+        origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 6)),
         wrench=np.zeros((pieces, COLUMNS, WRENCH)),
         push=np.zeros((pieces, 3)),

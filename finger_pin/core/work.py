@@ -76,15 +76,13 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
     width = size + len(tables.lumps)
     tips = len(tables.tip_body)
     columns, powers = widest(laws)
-    base = np.zeros(6)
-    base[3:] = -tables.gravity
-    return Work(
+    work = Work(
         rotation=np.zeros((size, 3, 3)),
         origin=np.zeros((size, 3)),
         centre=np.zeros(3),
         base_velocity=np.zeros(6),
         base_power=np.zeros(1),
-        base_acceleration=base,
+        base_acceleration=np.zeros(6),
         base_rate=np.zeros((2, 6)),
         spatial=np.zeros((SPATIAL_LAYERS, size, 6)),
         inertia=np.zeros((size, 10)),
@@ -95,8 +93,8 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         rows=np.zeros((columns, count)),
         slopes=np.zeros((SLOPES, count)),
         powers=np.zeros((powers, count)),
-        arm=tables.arm.copy(),
-        gradient=tables.measure.copy(),
+        arm=np.zeros(len(tables.arm)),
+        gradient=np.zeros(len(tables.arm)),
         pull=np.zeros((count, 3)),
         lever=np.zeros((count, 3)),
         tip=np.zeros((tips, 3)),
@@ -111,3 +109,12 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
         guide_rate=np.zeros(int(tables.guided.max(initial=-1)) + 1),
         paths=build_path_work(tables.paths, count, width),
     )
+    take_numbers(work, tables)
+    return work
+
+
+def take_numbers(work: Work, tables: Tables) -> None:
+    """Copy from tables what an evaluation finds in its memory: what no path and no moving body changes."""
+    work.base_acceleration[3:] = -tables.gravity
+    work.arm[:], work.gradient[:] = tables.arm, tables.measure
+    work.paths.frame[:], work.paths.origin[:] = tables.paths.rotation, tables.paths.origin

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_stepper, sampled_control
+from finger_pin.control.compiled import Bindings, sampled_control
 from finger_pin.core.stepping.batch import RESTING
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -63,8 +63,9 @@ class World:
         self.sensors: dict[str, Sensor] = {}
         self._nominal: tuple[Finger, PassiveCoupling] | None = None
         self.reason, self._step, self._now = "", 0, 0.0
+        self._bindings = Bindings()
         self._build(family.scenario, origin)
-        self.stepper = self._stepper_at(self.origin.initial_state())
+        self.stepper = self._stepper_at(self.origin.initial_state(), self._bindings)
 
     @classmethod
     def of(cls, scenario: Scenario | str | Path, task: Task) -> World:
@@ -98,7 +99,7 @@ class World:
 
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
         """Build what moves, under inputs that are held."""
-        self._scenario, self.origin = scenario, origin or ClosedLoop.from_scenario(scenario).compiled()
+        self._scenario, self.origin = scenario, origin or ClosedLoop.from_scenario(scenario).compiled(self._bindings)
         finger, family = self.origin.finger, self._family.scenario
         # Drives know what the scenario says, not what was drawn.
         self._nominal = self._nominal or (finger, family.coupling(finger.routing))
@@ -110,10 +111,10 @@ class World:
         driven = self.action if self.action.compiled is not None else None
         return replace(self.origin, controller=self.action, drives=driven)
 
-    def _stepper_at(self, x: Array) -> Stepper:
+    def _stepper_at(self, x: Array, bindings: Bindings | None = None) -> Stepper:
         """Return a stepper that starts from a state, with the loops of the action if there are any."""
         loop, settings = self.origin, self._scenario.simulation
-        stepper = build_stepper(
+        stepper = (bindings or Bindings()).stepping(
             loop.finger,
             sampled_control(loop),
             x,
@@ -148,7 +149,7 @@ class World:
             self._build(self._family.at([self.drawn[key] for key in self._randomisation.keys]))
         self._begun = self._start()
         if self.rebuilt:
-            self.stepper = self._stepper_at(self._begun)
+            self.stepper = self._stepper_at(self._begun, self._bindings)
         else:
             self.stepper.restart(self._begun, time=0.0)
         task = self.task

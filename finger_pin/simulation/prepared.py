@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import Bindings
 from finger_pin.core.stepping.stepper import TABLEAUS, in_threads
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.family import Family
@@ -82,6 +83,8 @@ class Prepared:
         self._finger = loop.finger
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
+        # As many as there were runs at once.
+        self._bindings: list[Bindings] = []
 
     def __repr__(self) -> str:
         """Return the scenario, what may be changed of it, and what is recorded."""
@@ -144,6 +147,8 @@ class Prepared:
         scenario = self.scenario(values)
         setup, trajectory, found = self._made(scenario, initial, stop)
         if not sensitivities:
+            if setup.bindings:
+                self._bindings.append(setup.bindings)
             return found
         if not trajectory.islands:
             # It will be repeated on its steps: the derivative of what was computed, errors and all.
@@ -161,8 +166,10 @@ class Prepared:
         runs = in_threads(lambda pair: self._recorded(*pair), list(zip(others, near, strict=True)))
         return add_slopes(found, numbers, runs, changes)
 
-    def _setup(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None) -> Setup:
-        setup = Setup.of(scenario, self._loop(scenario, initial))
+    def _setup(
+        self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, bindings: Bindings | None = None
+    ) -> Setup:
+        setup = Setup.of(scenario, self._loop(scenario, initial), bindings=bindings)
         if setup.loop.finger is not self._finger:
             refuse_unknown("record", self.record, variables(setup.loop))
         return setup
@@ -176,8 +183,9 @@ class Prepared:
     def _made(
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
     ) -> tuple[Setup, Trajectory, RunArrays]:
-        """Make a run."""
-        setup = self._setup(scenario, initial)
+        """Make a run, with bindings of an earlier one if any are free."""
+        bindings = self._bindings.pop() if self._bindings else Bindings()
+        setup = self._setup(scenario, initial, bindings)
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
             motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)

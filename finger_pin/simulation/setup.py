@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.control.compiled import build_stepper, compiled_control, sampled_control
+from finger_pin.control.compiled import Bindings, compiled_control, sampled_control
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
@@ -20,16 +20,9 @@ from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario, SimulationSettings
-from finger_pin.exceptions import (
-    InputError,
-)
-from finger_pin.simulation.accuracy import (
-    CHUNK,
-)
+from finger_pin.exceptions import InputError
+from finger_pin.simulation.accuracy import CHUNK
 from finger_pin.simulation.initial_state import check_motors
-
-if TYPE_CHECKING:
-    pass
 
 #: What to try where an integrator cannot go on.
 ADVICE = "a smaller simulation.rtol, another simulation.method, or softer contacts and tendons"
@@ -55,6 +48,7 @@ class Setup:
         method: The integrator; not the scenario's where its controller is Python and acts continuously.
         answers: The controller itself, where the loop samples it.
         sampled: What samples it, if anything does.
+        bindings: What serves this run as it has served others; None for what is bound for each integration.
     """
 
     scenario: Scenario
@@ -62,10 +56,16 @@ class Setup:
     method: str
     answers: LoopController
     sampled: SampledController | None
+    bindings: Bindings | None = None
 
     @classmethod
     def of(
-        cls, scenario: Scenario, loop: ClosedLoop | None = None, own: str = "", control_period: float | None = None
+        cls,
+        scenario: Scenario,
+        loop: ClosedLoop | None = None,
+        own: str = "",
+        control_period: float | None = None,
+        bindings: Bindings | None = None,
     ) -> Setup:
         """Make a scenario ready.
 
@@ -74,6 +74,7 @@ class Setup:
             loop: Its loop, where something in it is a user's own.
             own: What that is, as `own_parts` says.
             control_period: As for `simulate`.
+            bindings: What has served other runs, and serves this one where it differs in numbers alone.
 
         Raises:
             InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
@@ -100,7 +101,7 @@ class Setup:
                 )
             method = _CONTINUOUS
         if scenario.simulation.method not in METHODS_IN_NUMPY:
-            loop = loop.compiled()
+            loop = loop.compiled(bindings)
         answers = loop.controller
         sampled = None if sampling is None else SampledController(loop, sampling)
         if positioned:
@@ -112,7 +113,7 @@ class Setup:
         elif own:
             # A wrong answer of a user's own controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())
-        return cls(scenario, loop, method, answers, sampled)
+        return cls(scenario, loop, method, answers, sampled, bindings)
 
     def integrate(
         self,
@@ -176,7 +177,7 @@ class Setup:
     def stepper(self, settings: SimulationSettings | None = None) -> Stepper:
         """Return the compiled stepper, at the start, by default at the scenario's tolerances."""
         given, loop = settings or self.scenario.simulation, self.loop
-        return build_stepper(
+        return (self.bindings or Bindings()).stepping(
             loop.finger,
             compiled_control(loop) or sampled_control(loop),
             loop.initial_state(),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.control.compiled import build_stepper, core_signal
+from finger_pin.control.compiled import Bindings, core_signal
 from finger_pin.control.moved_objects import Guides
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -79,6 +79,7 @@ class Simulator:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
         self._settings: dict[str, Any] = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}
         self._family: Family | None = None
+        self._bindings = Bindings()
         self._build(as_finger(finger))
         limiter = self.finger.stroke_limiter
         self._posture = 0.5 * (limiter.lower + limiter.upper)
@@ -98,9 +99,9 @@ class Simulator:
         if self._guides is not None:
             control = control._replace(guide=core_signal(self._guides.signal))
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))
-        self._stepper = build_stepper(finger, control, rest, **self._settings)
+        self._stepper = self._bindings.stepping(finger, control, rest, **self._settings)
         self._fresh = self._stepper.moments
-        self._compiled = CompiledFinger(finger)
+        self._compiled = self._bindings.evaluating(finger)
         # Which of the inputs are tensions.
         self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
 
@@ -255,9 +256,9 @@ class Simulator:
         """Return an independent simulator in the same condition: both go on bit by bit alike."""
         twin = object.__new__(type(self))
         twin.__dict__ |= self.__dict__
-        twin._compiled = CompiledFinger(self.finger)
-        twin._stepper = self._stepper.copy()
-        twin._told = self._told.copy()
+        twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
+        twin._bindings = Bindings(twin._compiled, twin._stepper)
+        twin._told = self._told.copy(twin._stepper)
         return twin
 
     # Simulators that share what is stepped would step each other.

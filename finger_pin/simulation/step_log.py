@@ -55,10 +55,10 @@ class Told:
         self._numbers.append(end)
         self._numbers.frombytes(inputs.tobytes() + force.tobytes())
 
-    def copy(self) -> Told:
-        """Return the same steps, to go on from independently."""
+    def copy(self, stepper: Stepper) -> Told:
+        """Return the same steps of another stepper, made alike, to go on from independently."""
         twin = copy.copy(self)
-        twin._numbers = self._numbers[:]
+        twin._stepper, twin._numbers = stepper, self._numbers[:]
         return twin
 
     def result(self, finger: Finger, settings: dict[str, Any], reference: Reference | Samples | None) -> xr.Dataset:

@@ -1,5 +1,7 @@
 """Mechanisms that nobody would build: random trees, lumps and rows of all laws, wired at random; all of order one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 from law_cases import every_law, random_parameters
@@ -121,6 +123,47 @@ def random_mechanism(rng, free=False):
             )
         )
     return Mechanism(body, tables, lumps, rng.uniform(0.5, 2.0, len(lumps)))
+
+
+def with_other_numbers(mechanism, rng):
+    """The same mechanism, wired alike, with other inertias, places, parameters, arms, weights and paths."""
+    model = mechanism.body.model.copy()
+    model.gravity.linear[:] = rng.normal(size=3)
+    for joint in range(1, model.njoints):
+        model.inertias[joint] = random_inertia(rng)
+        model.jointPlacements[joint] = random_placement(rng)
+    for tip in mechanism.body.tips:
+        model.frames[tip].placement = random_placement(rng)
+    body = RigidBody(model, [model.frames[tip].name for tip in mechanism.body.tips])
+    moved: dict[int, Piece] = {}
+
+    def elsewhere(leg):
+        piece = leg.piece
+        if id(piece) not in moved:
+            ends = tuple(Place(end.joint, end.point + 0.1 * rng.normal(size=3)) for end in piece.ends)
+            moved[id(piece)] = replace(piece, ends=ends, frame=random_placement(rng))
+        return replace(leg, piece=moved[id(piece)])
+
+    def scaled(matrix):
+        return matrix * rng.uniform(0.5, 1.5, np.shape(matrix))
+
+    def other(table):
+        contact = table.law is CONTACT
+        return replace(
+            table,
+            parameters=1.1 * table.parameters if contact else random_parameters(table.law, rng, table.count),
+            arm=scaled(table.arm),
+            measure=scaled(table.measure),
+            offset=scaled(table.offset),
+            inputs={group: scaled(weights) for group, weights in table.inputs.items()},
+            loads={group: scaled(weights) for group, weights in table.loads.items()},
+            bends=scaled(table.bends),
+            curvature_offset=scaled(table.curvature_offset),
+            paths=tuple(tuple(map(elsewhere, legs)) for legs in table.paths),
+        )
+
+    inertia = rng.uniform(0.5, 2.0, len(mechanism.lumps))
+    return Mechanism(body, [other(table) for table in mechanism.rows], mechanism.lumps, inertia, mechanism.channels)
 
 
 def random_states(mechanism, rng, count):

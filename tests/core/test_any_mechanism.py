@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from core_cases import Bound, relative
-from random_mechanisms import kinds_of, random_mechanism, random_states
+from random_mechanisms import kinds_of, random_mechanism, random_states, with_other_numbers
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -70,6 +70,56 @@ def test_a_mechanism_with_a_free_body_evaluates_alike(seed):
     force = rng.normal(size=(len(mechanism.body.tips), 3))
     compiled = CompiledMechanism(mechanism)
     assert_same(compiled.evaluate(x, command, force), mechanism.evaluate(x, command, force), mechanism)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_numbers_changed_in_place_are_evaluated_as_the_readable_model_built_anew(seed):
+    rng = np.random.default_rng(200 + seed)
+    mechanism = random_mechanism(rng, free=seed > 5)
+    x, command = random_states(mechanism, rng, 10), rng.uniform(-0.5, 3.0, mechanism.channels)
+    compiled, force = CompiledMechanism(mechanism), rng.normal(size=(len(mechanism.body.tips), 3))
+    before = [compiled.evaluate(x, command, each).rate for each in (force, None)]
+    changed = with_other_numbers(mechanism, rng)
+    assert compiled.renew(changed)
+    for each, old in zip((force, None), before, strict=True):
+        found = compiled.evaluate(x, command, each)
+        assert_same(found, changed.evaluate(x, command, each), changed)
+        assert relative(found.rate, old) > 1e-3
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_numbers_changed_in_place_are_stepped_bit_for_bit_as_a_mechanism_built_anew(seed):
+    """Whatever was stepped before, at which tolerance, under which forces and inputs."""
+    rng = np.random.default_rng(200 + seed)
+    mechanism = random_mechanism(rng, free=seed > 5)
+    x, force = random_states(mechanism, rng, 2), rng.normal(size=(len(mechanism.body.tips), 3))
+    control = held_control(mechanism.channels, mechanism.coordinates)
+    method, atol = TABLEAUS["Rodas5P"](), np.full(mechanism.size, 1e-4)
+    stepper = Stepper(mechanism, control, x[0], method, 1e-4, 0.1 * atol, force if seed % 2 else None)
+    stepper.hold(rng.uniform(0.0, 3.0, mechanism.channels))
+    stepper.advance(0.02)
+    changed = with_other_numbers(mechanism, rng)
+    for again in (changed, changed, mechanism):
+        given = again, control, x[1], method, 1e-4, atol, None if seed % 2 else force
+        assert stepper.renew(*given)
+        fresh = Stepper(*given)
+        for each in (stepper, fresh):
+            each.hold(np.ones(mechanism.channels))
+            assert each.advance(0.02) == 0
+        assert np.array_equal(stepper.x, fresh.x) and stepper.estimated_error == fresh.estimated_error
+        assert all(np.array_equal(*each) for each in zip(stepper.moments[0][3], fresh.moments[0][3], strict=True))
+
+
+def test_another_wiring_is_not_taken_in_place():
+    rng = np.random.default_rng(30)
+    mechanism = random_mechanism(rng)
+    compiled, control = CompiledMechanism(mechanism), held_control(mechanism.channels, mechanism.coordinates)
+    x, rows = random_states(mechanism, rng, 1)[0], list(mechanism.rows)
+    stepper = Stepper(mechanism, control, x, TABLEAUS["Rodas4"](), 1e-4, np.full(len(x), 1e-4))
+    rows[0] = replace(rows[0], arm=np.where(rows[0].arm == 0.0, 0.1, rows[0].arm))
+    other = Mechanism(mechanism.body, rows, mechanism.lumps, mechanism.inertia)
+    assert not compiled.renew(other)
+    assert not stepper.renew(other, control, x, TABLEAUS["Rodas4"](), 1e-4, np.full(len(x), 1e-4))
 
 
 def jacobian(mechanism, x, command, force):

@@ -79,18 +79,15 @@ def build_linear(tables: Tables, control: Control) -> Linear:
     count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
     states = int(tables.state.max(initial=-1)) + 1
     wide = 2 * width + states + 1
-    mass = np.zeros((width, width))
-    lumped = np.arange(len(tables.parents), width)
-    mass[lumped, lumped] = tables.lumps
-    return Linear(
-        mass=mass,
+    linear = Linear(
+        mass=np.zeros((width, width)),
         by_position=np.zeros((width, width)),
         by_velocity=np.zeros((width, width)),
         bias_rate=np.zeros(width),
-        arm=tables.arm.copy(),
-        measure=tables.measure.copy(),
+        arm=np.zeros(len(tables.arm)),
+        measure=np.zeros(len(tables.arm)),
         turning=np.zeros(len(tables.arm)),
-        bend=tables.bend.copy(),
+        bend=np.zeros(len(tables.bend)),
         load_slope=np.zeros(count),
         load_by_position=np.zeros((count, width)),
         load_by_time=np.zeros(count),
@@ -107,6 +104,15 @@ def build_linear(tables: Tables, control: Control) -> Linear:
         right=np.zeros(wide),
         blocks=build_blocks(tables, control),
     )
+    take_numbers(linear, tables)
+    return linear
+
+
+def take_numbers(linear: Linear, tables: Tables) -> None:
+    """Copy from tables what a linearisation finds in its memory: what no posture changes."""
+    lumped = np.arange(len(tables.parents), len(linear.mass))
+    linear.mass[lumped, lumped] = tables.lumps
+    linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend
 
 
 @compiled

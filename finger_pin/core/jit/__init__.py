@@ -8,7 +8,7 @@ names below.
 from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, numbers, put
 from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely
 from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
-from finger_pin.core.jit.tables import bound, bound_at, call
+from finger_pin.core.jit.tables import bound, bound_at, call, copied, fits, indices, refill
 
 __all__ = [
     "IndexTable",
@@ -29,6 +29,10 @@ __all__ = [
     "call_value",
     "compiled",
     "compiled_loosely",
+    "copied",
+    "fits",
+    "indices",
     "numbers",
     "put",
+    "refill",
 ]

@@ -8,7 +8,7 @@ numbers is what compiling quickly depends on.
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import types
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from finger_pin.core.jit.functions import Unit
 from finger_pin.core.jit.kinds import Kind, Numbers
 
+_Table = TypeVar("_Table", bound=tuple[Any, ...])
 _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
@@ -38,6 +39,51 @@ def call(unit: Unit, table: Any, kind: Kind) -> int:
     """Call a unit with a table."""
     block = bound(table, kind)
     return unit(block.ctypes.data)
+
+
+def copied(table: _Table) -> _Table:
+    """Return a table with arrays of its own."""
+    return type(table)(*map(_copied, table))
+
+
+def indices(table: tuple[Any, ...]) -> bytes:
+    """Return all arrays of integers of a table, one after the other."""
+    found = []
+    for value in table:
+        if isinstance(value, tuple):
+            found.append(indices(value))
+        elif isinstance(value, np.ndarray) and value.dtype == np.int64:
+            found.append(value.tobytes())
+    return b"".join(found)
+
+
+def fits(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Return whether the numbers of another table have room in the arrays of one, and all else is the same."""
+    for own, new in zip(table, other, strict=True):
+        if own is new:
+            continue
+        if isinstance(own, np.ndarray):
+            if own.shape != new.shape:
+                return False
+        elif not (fits(own, new) if isinstance(own, tuple) else own == new):
+            return False
+    return True
+
+
+def refill(table: tuple[Any, ...], other: tuple[Any, ...]) -> None:
+    """Copy the numbers of another table, which `fits`, into the arrays of one: a block that holds it holds them."""
+    for own, new in zip(table, other, strict=True):
+        if isinstance(own, np.ndarray):
+            if own is not new:
+                own[...] = new
+        elif isinstance(own, tuple):
+            refill(own, new)
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    return copied(value) if isinstance(value, tuple) else value
 
 
 def _address(array: Any) -> int:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from finger_pin.core.compiled_finger import Models, book_many
+from finger_pin.core.bound_models import Models, book_many
 from finger_pin.core.jit import call
 from finger_pin.core.stepping.interpolation import BETWEEN, COMMANDS, Between, Commands, command_many, interpolate_many
 from finger_pin.core.stepping.island_stepper import Part, Record

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger_pin.core.control import Control
 from finger_pin.core.evaluation.charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
-from finger_pin.core.jit import Unit, bound
+from finger_pin.core.jit import Unit, bound, copied, fits
 from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.broad_phase import wake_all
@@ -180,6 +180,17 @@ class Part:
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
+    def fits(self, tables: Tables, control: Control) -> bool:
+        """Return whether other tables and another control have room where these are bound."""
+        return fits(self.tables, tables._replace(loaded=self.tables.loaded)) and fits(self.control, control)
+
+    def renew(self, tables: Tables, control: Control, x: Array, attitude: Array, atol: Array) -> None:
+        """Begin anew at time zero with other numbers, which fit, as a new part of them would."""
+        self.model.renew(tables, control)
+        self.atol[:], self.memory[:], self._bound.drift[:] = atol, 0.0, 0.0
+        self.drives, self.knots = None, Part.knots
+        self.restart(x, attitude, 0.0)
+
     def with_loads(self, loaded: bool) -> Part:
         """Return the same part that minds forces at the tips, or not."""
         bound = self._bound
@@ -230,17 +241,16 @@ class Part:
     def copy(self) -> Part:
         """Return an independent part that goes on bit by bit alike."""
         bound = self._bound
-        tables = self.tables._replace(tip_force=self.tables.tip_force.copy(), bodies=self.tables.bodies.copy())
         return Part(
             self.island,
             self.laws,
-            tables,
-            self.control._replace(tension=self.control.tension.copy()),
+            copied(self.tables),
+            copied(self.control),
             bound.x.copy(),
             bound.attitude.copy(),
             bound.tableau,
             bound.rtol,
-            bound.atol,
+            bound.atol.copy(),
             bound.memory.copy(),
         )
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core.control import PLANNED, Control
 from finger_pin.core.evaluation.time_functions import Signal
+from finger_pin.core.jit import indices
 from finger_pin.core.path_tables import select_paths
 from finger_pin.core.tables import Tables
 
@@ -50,8 +51,7 @@ def find_islands(tables: Tables, control: Control, touching: bool = True) -> lis
         owners = np.repeat(np.arange(count), np.diff(start))
         links.append((row_at + owners, row_at + tables.terms[start[0] : start[-1]]))
     if planned:
-        reads = (control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0))
-        tensions, read = np.nonzero(reads)
+        tensions, read = np.nonzero(_reads(control))
         links.append((loop_at + control.loop[tensions], read))
         loop_of = np.full(channels, -1)
         driven = control.channel >= 0
@@ -81,6 +81,17 @@ def find_islands(tables: Tables, control: Control, touching: bool = True) -> lis
             )
         )
     return found
+
+
+def wiring(tables: Tables, control: Control) -> bytes:
+    """Return what islands and all memory follow from, besides sizes: whatever is wired alike differs in numbers."""
+    wires = (control.loop, control.channel, _reads(control))
+    return b"".join([indices(tables), *(each.tobytes() for each in wires)])
+
+
+def _reads(control: Control) -> NDArray[np.bool_]:
+    """Return which coordinates every planned tension depends on, shape (T, N)."""
+    return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
 
 
 def select(tables: Tables, island: Island) -> Tables:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from finger_pin.core.control import HELD, Control
 from finger_pin.core.evaluation.charts import Charts
+from finger_pin.core.jit import copied
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
-from finger_pin.core.stepping.islands import Island, find_islands, select, select_control
+from finger_pin.core.stepping.islands import Island, find_islands, select, select_control, wiring
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
 from finger_pin.description.routing import Array
@@ -66,41 +67,69 @@ class Stepper:
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
         """
-        self.mechanism, self._charts = mechanism, Charts.of(mechanism)
-        self._made_of = (mechanism, control, x, tableau, rtol, atol, force, time)
-        tables = build_tables(mechanism)
-        tables.tip_force[:] = 0.0 if force is None else force
-        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
-        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
-        laws = [table.law for table in mechanism.rows]
-        self._width = mechanism.coordinates
-        islands = find_islands(tables, control)
-        self.parts: list[Part] = []
-        for island in islands:
-            whole = len(islands) == 1
-            own = tables if whole else select(tables, island)
-            inputs = control if whole else select_control(control, island)
-            # An island that nothing pushes computes as it does alone.
-            own = own._replace(loaded=bool(len(inputs.force.harmonics) or np.any(own.tip_force)))
+        tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
+        self._charts, self._width, self._wiring = Charts.of(mechanism), mechanism.coordinates, wiring(tables, control)
+        self._islands = find_islands(tables, control)
+        self._free = [np.isin(tables.charts, island.coordinates) for island in self._islands]
+        self._made_of, self._tables = (mechanism, control, x, tableau, rtol, atol, force, time), self._selected(tables)
+        self.mechanism, self.parts = mechanism, list[Part]()
+        for island, (own, inputs, start, attitude, tolerances) in zip(self._islands, self._begun(), strict=True):
             memory = np.zeros(core.MEMORY_SIZE)
             memory[[core.TIME, core.STEP]] = time, FIRST_STEP
-            at = self._places(island)
-            free = np.isin(tables.charts, island.coordinates)
-            self.parts.append(
-                Part(
-                    island,
-                    laws if whole else [laws[g] for g in _groups_of(tables, island)],
-                    own,
-                    inputs,
-                    start[at].copy(),
-                    attitude[free].copy(),
-                    tableau,
-                    float(rtol),
-                    tolerances[at].copy(),
-                    memory,
-                )
-            )
-        self._free = [np.isin(tables.charts, island.coordinates) for island in islands]
+            followed = laws if len(self._islands) == 1 else [laws[g] for g in _groups_of(tables, island)]
+            given = copied(own), copied(inputs), start, attitude, tableau, float(rtol), tolerances, memory
+            self.parts.append(Part(island, followed, *given))
+
+    def renew(
+        self,
+        mechanism: Mechanism,
+        control: Control,
+        x: Array,
+        tableau: Tableau,
+        rtol: float,
+        atol: Array,
+        force: Array | None = None,
+    ) -> bool:
+        """Begin anew at time zero, bit by bit as a new stepper that is given the same, if only numbers differ.
+
+        Returns:
+            Whether it did. Where more differs than numbers, nothing has changed.
+        """
+        before, tables = (self._made_of, self._tables), build_tables(mechanism)
+        if before[0][3] is not tableau or before[0][4] != rtol or wiring(tables, control) != self._wiring:
+            return False
+        self._made_of = (mechanism, control, x, tableau, rtol, atol, force, 0.0)
+        if mechanism is not self.mechanism:
+            self._tables = self._selected(tables)
+        begun = [*self._begun()]
+        if not all(part.fits(*each[:2]) for part, each in zip(self.parts, begun, strict=True)):
+            self._made_of, self._tables = before
+            return False
+        self.mechanism = mechanism
+        for index, each in enumerate(begun):
+            if each[0].loaded != self.parts[index].tables.loaded:
+                self.parts[index] = self.parts[index].with_loads(each[0].loaded)
+            self.parts[index].renew(*each)
+        return True
+
+    def _selected(self, tables: Tables) -> list[Tables]:
+        """Return the tables of every island."""
+        return [tables] if len(self._islands) == 1 else [select(tables, island) for island in self._islands]
+
+    def _begun(self) -> Iterator[tuple[Tables, Control, Array, Array, Array]]:
+        """Yield of every island its tables, inputs, state, quaternions and absolute tolerances at the start."""
+        mechanism, control, x, _, _, atol, force, _ = self._made_of
+        forces = np.zeros((len(mechanism.body.tips), 3))
+        forces[:] = 0.0 if force is None else force
+        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
+        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
+        whole = len(self._islands) == 1
+        for tables, island, free in zip(self._tables, self._islands, self._free, strict=True):
+            inputs, pushed = (control, forces) if whole else (select_control(control, island), forces[island.tips])
+            # An island that nothing pushes computes as it does alone.
+            loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
+            own, at = tables._replace(tip_force=pushed, loaded=loaded), self._places(island)
+            yield own, inputs, start[at], attitude[free], tolerances[at]
 
     def _places(self, island: Island) -> NDArray[np.int64]:
         """Return the places of an island's numbers in the state of the whole."""

@@ -1,0 +1,148 @@
+"""Models of a mechanism under inputs that are given, and what they compute of many states at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger_pin.core.control import held_control
+from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
+from finger_pin.core.jit import call, copied
+from finger_pin.core.model import BoundModel
+from finger_pin.core.stepping.stepper import in_threads
+from finger_pin.core.tables import Tables
+from finger_pin.core.work import build_work
+from finger_pin.description.routing import Array
+from finger_pin.laws.contact import CONTACT
+from finger_pin.laws.law import ContactLaw, Law
+from finger_pin.mechanism.mechanism import GUIDES
+
+#: Fewer states than this are not worth a second thread.
+FEW = 1000
+
+
+class Room(NamedTuple):
+    """What `evaluate_many` fills for m states, beside the packed states, shape (m, size).
+
+    The rows are those of more states, these from the ``first`` on: compiled code takes them whole.
+    """
+
+    packed: Array
+    rates: Array
+    rows: Array
+    first: int
+    torques: Array
+    externals: Array
+    booked: Array
+    touches: Array
+
+    def part(self, at: slice) -> Room:
+        """Return the room of some of the states, the same memory."""
+        first = self.first + at.indices(len(self.packed))[0]
+        own = (self.packed, self.rates, self.torques, self.externals, self.booked, self.touches)
+        packed, rates, torques, externals, booked, touches = (values[at] for values in own)
+        return Room(packed, rates, self.rows, first, torques, externals, booked, touches)
+
+
+class Models:
+    """Models of the same tables under inputs that are given: memory for threads, and with or without forces at tips."""
+
+    def __init__(
+        self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool, books: int
+    ) -> None:
+        """Keep what they are made of.
+
+        Args:
+            tables: Of a mechanism or an island.
+            laws: Of their groups of rows.
+            channels: Number of inputs.
+            moved: Whether the base moves.
+            books: Number of energies and powers that are booked.
+        """
+        self.tables, self.books = tables, books
+        self._laws, self._channels, self._moved = laws, channels, moved
+        self._known: dict[tuple[bool, int], BoundModel] = {}
+
+    def model(self, loaded: bool = False, thread: int = 0) -> BoundModel:
+        """Return a thread's model that minds forces at the tips or not.
+
+        Each has memory of its own: without loads, nothing writes where loads have left their torques.
+        """
+        if (loaded, thread) not in self._known:
+            tables = self.tables
+            own = copied(tables)._replace(loaded=loaded)
+            work = build_work(own, self._laws, self._channels)
+            control = held_control(self._channels, len(work.torque))
+            self._known[loaded, thread] = BoundModel(own, control, work, self._moved)
+        return self._known[loaded, thread]
+
+    def renew(self, tables: Tables) -> None:
+        """Take the numbers of other tables, which fit, into all that is bound."""
+        self.tables = tables
+        for (loaded, _), model in self._known.items():
+            model.renew(tables._replace(loaded=loaded), model.model.control)
+
+
+def book_many(
+    models: Models, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
+) -> tuple[Array, Array]:
+    """Return energies and powers at states of the core, shape (m, books), and J^T F, shape (m, N).
+
+    Args:
+        models: Of the mechanism or island.
+        states: Shape (m, size), of the core.
+        attitudes: Of free bodies, shape (m, f, 4).
+        commands: Inputs, shape (m, u).
+        forces: At the tips, shape (m, t, 3), N.
+        base: How the base moves, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
+    """
+    count, work = len(states), models.model().model.work
+    room = Room(
+        packed=states,
+        rates=np.zeros((0, states.shape[1])),
+        rows=np.zeros((len(work.rows), 0, work.rows.shape[1])),
+        first=0,
+        torques=np.zeros((count, len(work.torque))),
+        externals=np.zeros((count, len(work.torque))),
+        booked=np.zeros((count, models.books)),
+        touches=np.zeros((0, models.tables.touching // CONTACT.arms, 9)),
+    )
+    fill(models, room, states, attitudes, commands, np.ascontiguousarray(forces), base)
+    return room.booked, room.externals
+
+
+def fill(
+    models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
+) -> None:
+    """Fill a room with what is computed of states of the core, as for `book_many`."""
+    bases = path_motions(base, len(states), int(models.tables.guided.max(initial=-1)) + 1)
+    loaded, count = bool(np.any(forces)), len(states)
+
+    def fill_part(model: BoundModel, part: slice) -> None:
+        own = room.part(part)
+        filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
+        given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part], own.touches)
+        call(evaluate_many, States(model.address, *given), STATES)
+
+    if count < FEW:
+        fill_part(models.model(loaded), slice(None))
+    else:
+        half = count // 2
+        pair = (models.model(loaded), models.model(loaded, 1))
+        in_threads(lambda each: fill_part(*each), list(zip(pair, (slice(half), slice(half, None)), strict=True)))
+
+
+def path_motions(base: Array | None, count: int, guided: int) -> Array:
+    """Return the motions of the base and of what is moved along paths, shape (count, 15 + g), or no rows at rest."""
+    if base is None:
+        return np.zeros((0, 15 + guided))
+    given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + guided]], axis=-1)
+    return rows_of(given, (count, 15 + guided))
+
+
+def rows_of(values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return a copy of one kind alone, of which the core has one compilation: writable, contiguous, of floats."""
+    return np.array(np.broadcast_to(values, shape), dtype=float, order="C")
