@@ -152,7 +152,7 @@ def _fingertip(scenario: Scenario, finger: Finger) -> FingertipForce | None:
     signals = scenario.controller.fingertip_force
     if not signals:
         return None
-    wanted = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES])
+    wanted = Signal.from_settings([signals.get(axis, ForceSignal()) for axis in AXES], scenario.simulation.rtol)
     return FingertipForce(wanted.later(scenario.simulation.start_time), finger.rigid_body.jacobian)
 
 

@@ -129,16 +129,17 @@ class ClosedLoop:
             reference=choose_reference(reference, scenario, finger.routing),
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
-            palm=PalmPath.of(scenario.hand, start, finger),
-            guides=Guides.of(finger, start),
+            palm=PalmPath.of(scenario.hand, start, finger, scenario.simulation.rtol),
+            guides=Guides.of(finger, start, scenario.simulation.rtol),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
             columns = AXES if alone else [f"{name}.{axis}" for name in acting for axis in AXES]
-            force = Signal.from_samples("fingertip_force", fingertip_force, columns)
+            force = Signal.from_samples("fingertip_force", fingertip_force, columns, scenario.simulation.rtol)
             loop = replace(loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.later(start))
         elif any(signals):
-            force = Signal.from_settings([each.get(axis, ForceSignal()) for each in signals for axis in AXES])
+            settings = [each.get(axis, ForceSignal()) for each in signals for axis in AXES]
+            force = Signal.from_settings(settings, scenario.simulation.rtol)
             loop = replace(loop, varying_force=force.later(start))
         initial = scenario.simulation.initial
         if initial is not None:

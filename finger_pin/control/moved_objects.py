@@ -29,8 +29,11 @@ class Guides:
     gravity: Array
 
     @classmethod
-    def of(cls, finger: Finger, start: float) -> Guides | None:
-        """Return the paths of the objects around a finger from a time on, s; None where none is moved."""
+    def of(cls, finger: Finger, start: float, tolerance: float) -> Guides | None:
+        """Return the paths of the objects around a finger from a time on, s; None where none is moved.
+
+        The tolerance is that of `Signal.from_settings`.
+        """
         around = finger.surroundings
         paths = {} if around is None else {name: each.path for name, each in around.free.items() if each.path}
         if around is None or not paths:
@@ -38,7 +41,9 @@ class Guides:
         settings = [path.get(axis, PathSignal()) for path in paths.values() for axis in (*PATH, "", "", "")]
         names = list(around.free)
         places = np.array([names.index(name) for name in paths])
-        return cls(Signal.from_settings(settings).later(start), places, np.array(around.body.model.gravity.linear))
+        return cls(
+            Signal.from_settings(settings, tolerance).later(start), places, np.array(around.body.model.gravity.linear)
+        )
 
     def place(self, finger: Finger, x: Array) -> Array:
         """Return a packed state with the objects where their paths begin."""

@@ -47,7 +47,9 @@ class OpenLoopTensions(LoopController):
         ]
         driven = scenario.controller.inputs or {}
         settings += [driven.get(name, InputSignal()) for name in _actuators(scenario)]
-        return cls(Signal.from_settings(settings).later(scenario.simulation.start_time), routing)
+        return cls(
+            Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time), routing
+        )
 
     @classmethod
     def from_samples(
@@ -60,9 +62,8 @@ class OpenLoopTensions(LoopController):
         Raises:
             InputError: If shapes or numbers are wrong, or a tension is negative.
         """
-        signal = Signal.from_samples(
-            "controller", samples, (*routing.tendons[: routing.actuated], *_actuators(scenario))
-        )
+        columns = (*routing.tendons[: routing.actuated], *_actuators(scenario))
+        signal = Signal.from_samples("controller", samples, columns, scenario.simulation.rtol)
         least = float(np.min(np.asarray(samples[1])[:, : routing.actuated], initial=0.0))
         if least < 0.0:
             raise InputError("controller", "tensions must not be negative: a tendon only pulls", least)

@@ -28,13 +28,18 @@ class PalmPath:
     carries: bool
 
     @classmethod
-    def of(cls, hand: HandDescription | None, start: float, finger: Finger | None = None) -> PalmPath | None:
-        """Return the path of a hand's palm from a time on, s; None if it rests. Around the finger objects stand."""
+    def of(
+        cls, hand: HandDescription | None, start: float, finger: Finger | None = None, tolerance: float = 0.0
+    ) -> PalmPath | None:
+        """Return the path of a hand's palm from a time on, s; None if it rests. Around the finger objects stand.
+
+        The tolerance is that of `Signal.from_settings`.
+        """
         if hand is None or hand.palm.path is None:
             return None
         settings = [hand.palm.on_path(name) for name in PATH]
         carries = finger is not None and bool(finger.layout.world)
-        return cls(Signal.from_settings(settings).later(start), np.array(hand.gravity), carries)
+        return cls(Signal.from_settings(settings, tolerance).later(start), np.array(hand.gravity), carries)
 
     def place(self, time: Array | float) -> tuple[Array, Array]:
         """Return the palm's place, shape (..., 3), m, and rotation to the world, (..., 3, 3), at times (...)."""

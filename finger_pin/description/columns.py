@@ -8,11 +8,12 @@ import math
 
 import numpy as np
 
+from finger_pin.description.series import Series
 from finger_pin.description.signals import MOST_POINTS
 from finger_pin.exceptions import InputError
 
 
-def read_columns(what: str, text: str) -> dict[str, tuple[float, ...]]:
+def read_columns(what: str, text: str) -> dict[str, Series]:
     """Return the columns of a CSV text by their names, ``time`` first.
 
     Numbers are read all at once; row by row is for what is not as it should be, or quoted.
@@ -33,7 +34,7 @@ def read_columns(what: str, text: str) -> dict[str, tuple[float, ...]]:
             table = np.zeros((0, 0))
         whole = len(table) == len(header) and 2 <= table.shape[1] <= MOST_POINTS
         if whole and np.isfinite(table).all() and np.all(np.diff(table[0]) > 0.0):
-            return {name: tuple(column.tolist()) for name, column in zip(header, table, strict=True)}
+            return {name: Series(column) for name, column in zip(header, table, strict=True)}
     return _read_rows(what, text)
 
 
@@ -41,7 +42,7 @@ def _named(header: list[str]) -> bool:
     return len(header) >= 2 and header[0] == "time" and len(set(header)) == len(header)
 
 
-def _read_rows(what: str, text: str) -> dict[str, tuple[float, ...]]:
+def _read_rows(what: str, text: str) -> dict[str, Series]:
     """Return the columns read row by row, or raise the error of what is wrong."""
     try:
         rows = [
@@ -63,7 +64,7 @@ def _read_rows(what: str, text: str) -> dict[str, tuple[float, ...]]:
             columns[name].append(_number(what, f"line {number}, column {name}", cell))
         if len(columns["time"]) > 1 and columns["time"][-1] <= columns["time"][-2]:
             raise InputError(what, f"line {number}: times must increase", columns["time"][-1])
-    return {name: tuple(column) for name, column in columns.items()}
+    return {name: Series(column) for name, column in columns.items()}
 
 
 def _number(what: str, where: str, cell: str) -> float:

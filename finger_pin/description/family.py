@@ -15,6 +15,7 @@ from finger_pin.description.overriding import from_here, override
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.reading import Table, resolve_signals
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.series import Series
 from finger_pin.description.validation import Description, find_field, validate
 from finger_pin.exceptions import InputError
 
@@ -120,8 +121,8 @@ class Family:
         value = _found(self.scenario, places[0]) if places else None
         if index is None or value is None:
             return value
-        if not isinstance(value, tuple) or index >= len(value):
-            count = f"a list of {len(value)}" if isinstance(value, tuple) else "no list"
+        if not isinstance(value, tuple | Series) or index >= len(value):
+            count = f"a list of {len(value)}" if isinstance(value, tuple | Series) else "no list"
             raise InputError(self.keys[key], f"there is no such number: it is {count}")
         return value[index]
 

@@ -16,6 +16,7 @@ from finger_pin.description.friction import JointFriction, TendonFriction
 from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiter
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
+from finger_pin.description.series import Series, series
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.validation import (
     IN_RADIANS,
@@ -26,7 +27,6 @@ from finger_pin.description.validation import (
     problem,
     quantity,
     real,
-    series,
     vector,
 )
 from finger_pin.exceptions import InputError
@@ -48,7 +48,7 @@ class PathSignal(SignalSettings):
     offset: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Mean.")
     amplitude: Annotated[float, _COORDINATE] = quantity(0.0, unit="m or rad", source="chosen", doc="Half the swing.")
     height: Annotated[float, _COORDINATE] | None = quantity(None, unit="m or rad", source="chosen", doc="Of none.")
-    values: Annotated[tuple[float, ...], series(-12.5, 12.5)] | None = quantity(
+    values: Annotated[tuple[float, ...] | Series, series(-12.5, 12.5)] | None = quantity(
         None, unit="m or rad", source="chosen", doc="At the points or samples."
     )
 

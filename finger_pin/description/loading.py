@@ -27,7 +27,8 @@ from finger_pin.description.reading import (
     shipped,
 )
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, packed, validate
+from finger_pin.description.series import PACKED, Series, packed
+from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
 
 # Of more numbers than this a text is written that is read at once; nobody reads them one by one.
@@ -185,7 +186,7 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
 def to_toml(description: Description) -> str:
     """Return the TOML text of a description, complete: reading it gives the same description back, bit for bit.
 
-    Series of more than 10,000 numbers are written as base64 of their doubles.
+    Series of more than 10,000 numbers are written as base64 of their doubles; times that signals share, once.
 
     Raises:
         InputError: If it is none.
@@ -221,10 +222,23 @@ def _depth_limited(what: str) -> Iterator[None]:
 
 
 def _plain(value: Any, long: list[str]) -> Any:
-    """Return what TOML holds; long series are put aside, and their place says at which index."""
+    """Return what TOML holds; long series are put aside, and their place says at which index.
+
+    Times that a neighbour has already are that neighbour's name.
+    """
     if isinstance(value, dict):
-        return {key: _plain(item, long) for key, item in value.items()}
-    if isinstance(value, tuple) and len(value) > _MANY:
+        found, timed = {}, dict[str, Any]()
+        for key, item in value.items():
+            times = item.get("times") if isinstance(item, dict) else None
+            if times is not None and len(times) > _MANY:
+                same = next((name for name, other in timed.items() if other == times), None)
+                item = item if same is None else item | {"times": same}
+                timed[key] = times
+            found[key] = _plain(item, long)
+        return found
+    if not isinstance(value, tuple | Series):
+        return value
+    if len(value) > _MANY:
         long.append(packed(value))
-        return f"base64:{len(long) - 1}"
-    return [_plain(item, long) for item in value] if isinstance(value, tuple) else value
+        return f"{PACKED}{len(long) - 1}"
+    return [_plain(item, long) for item in value]

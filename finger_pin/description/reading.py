@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from finger_pin.description.columns import read_columns
+from finger_pin.description.series import PACKED
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
 
@@ -226,6 +227,26 @@ def resolve_signals(table: Table, folder: Path) -> None:
         times, *columns = read_columns(f"{entry} {name}", text).items()
         samples = {name: {"kind": "samples", "times": times[1], "values": values} for name, values in columns}
         settings[target] = {**as_table(settings.get(target)), **samples}
+    _share_times(table)
+
+
+def _share_times(table: Table) -> None:
+    """Put the times of its neighbour where a signal names one that has them."""
+    inner = [("", table)]
+    # Tables may be nested more deeply than calls.
+    while inner:
+        place, around = inner.pop()
+        for name, each in around.items():
+            if not isinstance(each, dict):
+                continue
+            inner.append((f"{place}{name}.", each))
+            times = each.get("times")
+            if isinstance(times, str) and not times.startswith(PACKED):
+                shared = as_table(around.get(times)).get("times")
+                if not shared or (isinstance(shared, str) and not shared.startswith(PACKED)):
+                    allowed = "must be a list of numbers, or the name of another signal here that has one"
+                    raise InputError(f"{place}{name}.times", allowed, times)
+                each["times"] = shared
 
 
 def _resolve_recordings(table: Table, folder: Path) -> None:

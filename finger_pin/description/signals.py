@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
+from finger_pin.description.series import Series, series
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,
@@ -18,7 +19,6 @@ from finger_pin.description.validation import (
     problem,
     quantity,
     real,
-    series,
 )
 
 #: The most points or samples of a signal in a file. Arrays in Python may be longer.
@@ -55,13 +55,13 @@ class SignalSettings(Description):
     duration: Annotated[float, real(1e-6, _LATEST)] | None = quantity(
         None, unit="s", source="chosen", doc="Of the ramp."
     )
-    times: Annotated[tuple[float, ...], series(-_LATEST, _LATEST)] | None = quantity(
+    times: Annotated[tuple[float, ...] | Series, series(-_LATEST, _LATEST)] | None = quantity(
         None, unit="s", source="chosen", doc="Of the points or samples, increasing."
     )
     offset: float
     amplitude: float
     height: float | None
-    values: tuple[float, ...] | None
+    values: tuple[float, ...] | Series | None
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -78,7 +78,7 @@ class SignalSettings(Description):
                 raise problem("values", f"must be {len(self.times)} numbers, one for each of times", self.values)
             if not 2 <= len(self.times) <= MOST_POINTS:
                 raise problem("times", f"must be 2 to {MOST_POINTS} numbers, not {len(self.times)}")
-            falls = np.flatnonzero(np.diff(self.times) <= 0.0)
+            falls = np.flatnonzero(np.diff(np.asarray(self.times)) <= 0.0)
             if len(falls):
                 before, after = self.times[falls[0] : falls[0] + 2]
                 raise problem(f"times[{falls[0] + 1}]", f"times must increase: it comes after {before:g}", after)
@@ -86,24 +86,24 @@ class SignalSettings(Description):
 
     def faster(self, factor: float) -> Self:
         """Return the same signal in its time over a factor."""
-        update: dict[str, float | tuple[float, ...]] = {"frequency": self.frequency * factor}
+        update: dict[str, float | Series] = {"frequency": self.frequency * factor}
         for entry in ("time", "duration"):
             if getattr(self, entry) is not None:
                 update[entry] = getattr(self, entry) / factor
         if self.times is not None:
-            update["times"] = tuple(time / factor for time in self.times)
+            update["times"] = Series(np.asarray(self.times) / factor)
         return self.model_copy(update=update)
 
     @property
     def greatest(self) -> float:
         """A magnitude that the signal never exceeds."""
-        added = max(map(abs, self.values or (self.height or 0.0,)))
-        return abs(self.offset) + abs(self.amplitude) + added
+        added = np.max(np.abs(self.values or (self.height or 0.0,)))
+        return abs(self.offset) + abs(self.amplitude) + float(added)
 
     @property
     def lowest(self) -> float:
         """A value that the signal is never below: the least of the sinusoid and of the rest together."""
-        return self.offset - abs(self.amplitude) + min(self.values or (0.0, self.height or 0.0))
+        return self.offset - abs(self.amplitude) + float(np.min(self.values or (0.0, self.height or 0.0)))
 
 
 class JointReference(SignalSettings):
@@ -112,7 +112,7 @@ class JointReference(SignalSettings):
     offset: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Mean.")
     amplitude: Annotated[float, _ANGLE] = quantity(0.0, unit="rad", source="chosen", doc="Half the swing.")
     height: Annotated[float, _ANGLE] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...], series(-MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] | None = quantity(
+    values: Annotated[tuple[float, ...] | Series, series(-MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] | None = quantity(
         None, unit="rad", source="chosen", doc="At the points or samples."
     )
 
@@ -123,7 +123,7 @@ class InputSignal(SignalSettings):
     offset: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Mean.")
     amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="1", source="chosen", doc="Half the swing.")
     height: Annotated[float, _FORCE] | None = quantity(None, unit="1", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...], series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
+    values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
         None, unit="1", source="chosen", doc="At the points or samples."
     )
 
@@ -134,7 +134,7 @@ class ForceSignal(SignalSettings):
     offset: Annotated[float, _FORCE] = quantity(0.0, unit="N", source="chosen", doc="Mean.")
     amplitude: Annotated[float, _FORCE] = quantity(0.0, unit="N", source="chosen", doc="Half the swing.")
     height: Annotated[float, _FORCE] | None = quantity(None, unit="N", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...], series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
+    values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
         None, unit="N", source="chosen", doc="At the points or samples."
     )
 

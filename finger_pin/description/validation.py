@@ -6,7 +6,6 @@ its source beside the bounds, so that a schema printed from the models documents
 
 from __future__ import annotations
 
-import base64
 import difflib
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -14,7 +13,7 @@ from typing import Annotated, Any, ClassVar, NoReturn, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, StringConstraints, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -27,8 +26,6 @@ FullName = Annotated[str, StringConstraints(strict=True, pattern=_FULL, max_leng
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
-# What a text of many numbers begins with.
-_PACKED = "base64:"
 Numbers = float | tuple[float, ...]
 _Model = TypeVar("_Model", bound="Description")
 
@@ -76,7 +73,7 @@ def quantity(default: Any, *, unit: str, source: str, doc: str) -> Any:
 
 def real(low: float = -math.inf, high: float = math.inf, *, above: bool = False, hint: str = "") -> BeforeValidator:
     """Return a validator for one finite number in [low, high], or (low, high] with ``above``."""
-    check = _checker(low, high, above, hint)
+    check = checker(low, high, above, hint)
     return BeforeValidator(lambda value: check(value, ""))
 
 
@@ -84,7 +81,7 @@ def reals(
     low: float = -math.inf, high: float = math.inf, *, above: bool = False, hint: str = "", whole: bool = False
 ) -> BeforeValidator:
     """Return a validator for one finite number or a list of them, each in [low, high], and ``whole`` if asked."""
-    check = _checker(low, high, above, hint, whole)
+    check = checker(low, high, above, hint, whole)
 
     def validate(value: Any) -> Numbers:
         if isinstance(value, list | tuple):
@@ -98,7 +95,7 @@ def reals(
 
 def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str = "") -> BeforeValidator:
     """Return a validator for a list of ``size`` finite numbers in [low, high]."""
-    check = _checker(low, high, False, hint)
+    check = checker(low, high, False, hint)
 
     def validate(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or len(value) != size:
@@ -106,38 +103,6 @@ def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str 
         return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
 
     return BeforeValidator(validate)
-
-
-def series(low: float = -math.inf, high: float = math.inf, hint: str = "") -> PlainValidator:
-    """Return a validator for a list of finite numbers in [low, high], or the text that `packed` makes of one."""
-    check = _checker(low, high, False, hint)
-
-    def validate(value: Any) -> tuple[float, ...]:
-        if isinstance(value, str):
-            value = _unpacked(value)
-        if not isinstance(value, list | tuple):
-            raise problem("", "must be a list of numbers", value)
-        # A million samples are not asked one by one unless something is wrong; a sum tells of what is not finite.
-        if set(map(type, value)) == {float} and low <= min(value) and max(value) <= high and math.isfinite(sum(value)):
-            return tuple(value)
-        return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
-
-    return PlainValidator(validate)
-
-
-def packed(values: Sequence[float]) -> str:
-    """Return numbers as a text that `series` reads back bit for bit: base64 of doubles, the least byte first."""
-    return _PACKED + base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode("ascii")
-
-
-def _unpacked(text: str) -> list[float]:
-    try:
-        if not text.startswith(_PACKED):
-            raise ValueError
-        found: list[float] = np.frombuffer(base64.b64decode(text[len(_PACKED) :], validate=True), "<f8").tolist()
-    except ValueError:
-        raise problem("", "must be a list of numbers", text[:40]) from None
-    return found
 
 
 def choice(*allowed: str) -> BeforeValidator:
@@ -278,7 +243,9 @@ def _document(model: type[BaseModel], location: list[str]) -> str:
     return str(field.description if field and field.description else "a table")
 
 
-def _checker(low: float, high: float, above: bool, hint: str, whole: bool = False) -> Callable[[Any, str], float]:
+def checker(low: float, high: float, above: bool, hint: str, whole: bool = False) -> Callable[[Any, str], float]:
+    """Return a function from a value and its place in a list, as ``[2]``, to one number of `reals`."""
+
     def check(value: Any, where: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
             raise problem(where, "must be a number", value)

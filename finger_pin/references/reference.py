@@ -58,7 +58,7 @@ class SignalReference:
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> SignalReference:
         """Read a scenario's reference, for the routing of its finger."""
         settings = [scenario.reference.joints.get(name, JointReference()) for name in routing.joints]
-        signal = Signal.from_settings(settings).later(scenario.simulation.start_time)
+        signal = Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time)
         return cls(signal, scenario.coupling(routing))
 
     @classmethod
@@ -78,7 +78,8 @@ class SignalReference:
         """
         coupling = scenario.coupling(routing)
         free = [index for index in range(len(routing.joints)) if index not in coupling.followers]
-        given = Signal.from_samples("reference", samples, [routing.joints[index] for index in free])
+        names = [routing.joints[index] for index in free]
+        given = Signal.from_samples("reference", samples, names, scenario.simulation.rtol)
         largest = float(np.max(np.abs(np.asarray(samples[1], dtype=float))))
         if largest > MOST_ANGLE:
             raise InputError("reference", f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}", largest)

@@ -20,6 +20,7 @@ from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.harmonic import harmonic, harmonic_rate
 from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
+from finger_pin.references.thinning import thinned
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -45,19 +46,27 @@ class Signal:
     coefficients: Array
 
     @classmethod
-    def from_settings(cls, settings: Sequence[SignalSettings]) -> Signal:
-        """Return the signals that settings describe, k of them."""
+    def from_settings(cls, settings: Sequence[SignalSettings], tolerance: float = 0.0) -> Signal:
+        """Return the signals that settings describe, k of them.
+
+        Args:
+            settings: Of each signal.
+            tolerance: Of their range, what dense samples may be missed by (`thinning`).
+        """
         harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
-        return cls(harmonics.reshape(-1, 4), *_joined([_polynomial(each) for each in settings]))
+        return cls(harmonics.reshape(-1, 4), *_joined(_polynomials(settings, tolerance)))
 
     @classmethod
-    def from_samples(cls, name: str, samples: tuple[ArrayLike, ArrayLike], columns: Sequence[str]) -> Signal:
-        """Return signals through samples, joined by monotone cubics.
+    def from_samples(
+        cls, name: str, samples: tuple[ArrayLike, ArrayLike], columns: Sequence[str], tolerance: float = 0.0
+    ) -> Signal:
+        """Return signals through samples, joined by monotone cubics, or by fewer where samples are dense (`thinning`).
 
         Args:
             name: Of the argument, for messages.
             samples: Times, shape (m,), s, and values, shape (m, k).
             columns: Names of the k signals.
+            tolerance: Of their range, what dense samples may be missed by.
 
         Raises:
             InputError: If the shapes differ from these, a number is not finite, or times do not increase.
@@ -74,14 +83,7 @@ class Signal:
             raise InputError(name, "times and values must be finite")
         if not np.all(np.diff(times) > 0.0):
             raise InputError(name, "times must increase")
-        # Importing it takes a while, which nobody without samples shall wait for.
-        from scipy.interpolate import PchipInterpolator
-
-        # Of slopes next to nothing it takes the inverse.
-        with np.errstate(over="ignore"):
-            found = PchipInterpolator(times, values).c
-        coefficients = np.concatenate([np.zeros((_ORDER - len(found), *found.shape[1:])), found])
-        return cls(np.zeros((len(columns), 4)), times.copy(), coefficients)
+        return cls(np.zeros((len(columns), 4)), *thinned(times, values, tolerance))
 
     @classmethod
     def held(cls, knots: Array, values: Array) -> Signal:
@@ -220,14 +222,30 @@ def _widened(marks: Flags) -> Flags:
     return wide
 
 
+def _polynomials(settings: Sequence[SignalSettings], tolerance: float) -> list[PPoly | None]:
+    """Return the polynomials that the kinds of signals add to the sinusoids, or None."""
+    found = [None if each.kind == "samples" else _polynomial(each) for each in settings]
+    rest = [index for index, each in enumerate(settings) if each.kind == "samples"]
+    while rest:
+        from scipy.interpolate import PPoly
+
+        # Those with the same times at once.
+        times = settings[rest[0]].times
+        together = [index for index in rest if settings[index].times == times]
+        values = np.transpose([np.asarray(settings[index].values) for index in together])
+        knots, coefficients = thinned(np.asarray(times), values, tolerance)
+        for column, index in enumerate(together):
+            found[index] = PPoly(coefficients[:, :, column], knots)
+        rest = [index for index in rest if index not in together]
+    return found
+
+
 def _polynomial(settings: SignalSettings) -> PPoly | None:
-    """Return the polynomial that the kind of a signal adds to the sinusoid, or None."""
+    """Return the polynomial that a kind without samples adds to the sinusoid, or None."""
     if settings.times is not None:
-        from scipy.interpolate import PchipInterpolator, PPoly
+        from scipy.interpolate import PPoly
 
         times, values = np.array(settings.times), np.array(settings.values)
-        if settings.kind == "samples":
-            return PchipInterpolator(times, values)
         length, change = np.diff(times), np.diff(values)
         nothing = np.zeros_like(change)
         terms = [6.0 / length**5, -15.0 / length**4, 10.0 / length**3]

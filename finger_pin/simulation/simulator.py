@@ -95,7 +95,8 @@ class Simulator:
     def _build(self, finger: Finger) -> None:
         """Build what steps a finger; `_begin` says from where."""
         self.finger, mechanism = finger, finger.mechanism
-        control, self._guides = held_control(mechanism.channels, mechanism.coordinates), Guides.of(finger, 0.0)
+        control = held_control(mechanism.channels, mechanism.coordinates)
+        self._guides = Guides.of(finger, 0.0, self._settings["rtol"])
         if self._guides is not None:
             control = control._replace(guide=core_signal(self._guides.signal))
         rest = finger.rest_state(np.zeros(len(finger.routing.joints)))

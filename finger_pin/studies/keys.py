@@ -13,6 +13,7 @@ from typing import Any
 
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.series import Series
 from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
@@ -141,7 +142,7 @@ class Starting:
         held = changed.get(name, self._found(name))
         if isinstance(held, int | float):
             raise InputError(key, f"{name} is one number for all; give it a list first, or leave out the index")
-        if not isinstance(held, list | tuple):
+        if not isinstance(held, list | tuple | Series):
             raise InputError(key, "there is no such list of numbers")
         if index >= len(held):
             raise InputError(key, f"{name} has {len(held)} numbers, [0] to [{len(held) - 1}]")
@@ -200,4 +201,4 @@ def _look_up(scenario: Scenario, key: str) -> Any:
         held = next(iter(below.values()), None) if part == "*" else below.get(part)
     if index is None:
         return held
-    return held[index] if isinstance(held, list | tuple) and index < len(held) else None
+    return held[index] if isinstance(held, list | tuple | Series) and index < len(held) else None

@@ -82,6 +82,7 @@ WRONG = [
     ({KEY: POINTS | {"times": [0.0, 0.0]}}, f"{KEY}.times[1]", "times must increase"),
     ({KEY: POINTS | {"values": [0.0, 45.0]}}, f"{KEY}.values[1]", "is it in degrees?"),
     ({KEY: POINTS | {"values": 0.5}}, f"{KEY}.values", "must be a list of numbers"),
+    ({KEY: POINTS | {"times": "proximal"}}, f"{KEY}.times", "or the name of another signal here that has one"),
     ({KEY: POINTS | {"times": [0.0], "values": [0.5]}}, f"{KEY}.times", "must be 2 to 1000000 numbers"),
     ({"reference.joints.distal": POINTS}, "reference.joints.distal", "follows from the passive tendon (20)"),
     ({"reference.joints.medail": POINTS}, "reference.joints.medail", "did you mean medial?"),
@@ -151,6 +152,12 @@ def test_many_samples_are_read_alike_at_once_and_row_by_row_and_written_bit_for_
     assert loaded[0] == loaded[1] and medial.times == tuple(times) and medial.values == tuple(angles)
     text = fp.to_toml(loaded[0])
     assert fp.load_scenario(write(tmp_path, "again.toml", text)) == loaded[0] and len(text) < 250_000
+    # Both signals of another file, and their times once, in 4 letters for 3 of 8 bytes each.
+    both = "\n".join(["time,medial,proximal", *(f"{row},0.25" for row in rows)])
+    given = fp.load_scenario("fig6", {"reference.file": str(write(tmp_path, "both.csv", both))})
+    doubles = 3 * 8 * len(times) * 4 / 3
+    assert doubles < len(fp.to_toml(given)) < doubles + 10_000
+    assert fp.load_scenario(write(tmp_path, "both.toml", fp.to_toml(given))) == given
     cut = write(tmp_path, "cut.toml", text.replace("times = 'base64:", "times = 'base64:?"))
     with pytest.raises(InputError, match=r"medial.times = .*: must be a list of numbers"):
         fp.load_scenario(cut)
