@@ -9,23 +9,23 @@ from __future__ import annotations
 
 from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.distribution import Distribution, Plan, PseudoInverse
+from finger_pin.control.distribution import Plan, PseudoInverse, TensionDistribution
 from finger_pin.control.joint_compensation import JointCompensation
-from finger_pin.control.measurement import Instant, Sensor
+from finger_pin.control.measurement import Instant, SampledSensor
 from finger_pin.control.passive_loop import PassiveTensionLoop
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
 
 __all__ = [
     "CompensatedController",
-    "Distribution",
     "Instant",
     "JointCompensation",
     "PassiveTensionLoop",
     "Plan",
     "PseudoInverse",
-    "Sensor",
+    "SampledSensor",
     "TendonFeedforward",
+    "TensionDistribution",
     "TorqueLaw",
     "build_controller",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 
 from finger_pin.analysis import closure_over_range, critical_friction
 from finger_pin.control.compensated import CompensatedController
-from finger_pin.control.distribution import Distribution, PseudoInverse
+from finger_pin.control.distribution import PseudoInverse, TensionDistribution
 from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.hand import joined_controller
 from finger_pin.control.joint_compensation import JointCompensation
@@ -97,7 +97,7 @@ def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
     return RoutedController(finger, law, expand(settings.minimum_tension, len(finger.routing.tendons)))
 
 
-def _distribution(scenario: Scenario, finger: Finger) -> Distribution:
+def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:
     limits = scenario.controller.distribution
     if limits is None and finger.routing.force_closure().holds:
         return PseudoInverse.from_routing(finger.routing)

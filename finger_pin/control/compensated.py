@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.control.distribution import Distribution, Plan
+from finger_pin.control.distribution import Plan, TensionDistribution
 from finger_pin.control.fingertip import FingertipForce
 from finger_pin.control.joint_compensation import JointCompensation
 from finger_pin.control.loop_controller import LoopController
@@ -41,7 +41,7 @@ class CompensatedController(LoopController):
 
     routing: Routing
     law: TorqueLaw
-    distribution: Distribution
+    distribution: TensionDistribution
     minimum: Array
     tendons: TendonFeedforward | None = None
     joints: JointCompensation | None = None

@@ -95,9 +95,9 @@ def with_force(control: Control, loop: ClosedLoop) -> Control:
     return control._replace(force=force)
 
 
-def core_signal(signal: Signal) -> signal_core.Signal:
+def core_signal(signal: Signal) -> signal_core.SignalTable:
     """Return a signal as arrays of the core's own; polynomials that are zero are left out."""
     harmonics = np.array(signal.harmonics, dtype=float)
     if signal.is_harmonic:
-        return signal_core.Signal(harmonics, np.zeros(0), np.zeros((6, 0, len(harmonics))))
-    return signal_core.Signal(harmonics, signal.knots.copy(), np.ascontiguousarray(signal.coefficients))
+        return signal_core.SignalTable(harmonics, np.zeros(0), np.zeros((6, 0, len(harmonics))))
+    return signal_core.SignalTable(harmonics, signal.knots.copy(), np.ascontiguousarray(signal.coefficients))

@@ -26,7 +26,7 @@ class Plan:
     slope: Array
 
 
-class Distribution(Protocol):
+class TensionDistribution(Protocol):
     """Anything that shares a torque out to tendons."""
 
     def plan(self, torque: Array, minimum: Array) -> Plan:

@@ -12,7 +12,7 @@ from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.references.signal import Signal
 
 if TYPE_CHECKING:
-    from finger_pin.control.measurement import Sensor
+    from finger_pin.control.measurement import SampledSensor
     from finger_pin.control.proportional import ControlSignals
     from finger_pin.mechanism.finger import Finger
 
@@ -31,7 +31,7 @@ class LoopController(ABC):
     """
 
     measures = False
-    sensors: Sequence[Sensor] = ()
+    sensors: Sequence[SampledSensor] = ()
     problem = ""
     problem_time = float("-inf")
 

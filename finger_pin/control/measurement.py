@@ -48,7 +48,7 @@ class Instant:
         return loop.dynamics.evaluate(self.x, self.tension, loop.force(self.time), loop.base(self.time))
 
 
-class Sensor(ABC):
+class SampledSensor(ABC):
     """A sensor of a sampled controller: what it reads is recorded, and told to a controller that listens.
 
     A controller of one's own names its own in ``sensors``. One object belongs to one simulation: it may remember.
@@ -70,7 +70,7 @@ class Sensor(ABC):
         """Return its values: one number, or shape (k,)."""
 
 
-def readings(sensors: Sequence[Sensor], now: Instant) -> dict[str, Array]:
+def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]:
     """Return what sensors read, by their names.
 
     Raises:
@@ -90,7 +90,7 @@ def readings(sensors: Sequence[Sensor], now: Instant) -> dict[str, Array]:
     return found
 
 
-class JointEncoder(Sensor):
+class JointEncoder(SampledSensor):
     """Encoders of the joints, which read the nearest multiple of a resolution; exact without one."""
 
     name, units, dimension = "joint_position", "rad", "joint"
@@ -105,7 +105,7 @@ class JointEncoder(Sensor):
         return np.round(exact / self._resolution) * self._resolution if self._resolution else exact
 
 
-class JointSpeed(Sensor):
+class JointSpeed(SampledSensor):
     """Differences of encoders' readings over the period, zero at the first sample; exact without a resolution."""
 
     name, units, dimension = "joint_velocity", "rad/s", "joint"
@@ -125,7 +125,7 @@ class JointSpeed(Sensor):
         return velocity
 
 
-class TensionSensor(Sensor):
+class TensionSensor(SampledSensor):
     """Sensors of the delivered tensions, of passive tendons at the distal end.
 
     Their noise is normal, independent from sample to sample, and the same for the same seed.

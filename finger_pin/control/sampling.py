@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.measurement import Instant, JointEncoder, JointSpeed, Sensor, TensionSensor, readings
+from finger_pin.control.measurement import Instant, JointEncoder, JointSpeed, SampledSensor, TensionSensor, readings
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.controller import SamplingSettings
@@ -41,7 +41,7 @@ class SampledController(LoopController):
         resolution, listens = settings.encoder_resolution, loop.controller.measures
         tension = [TensionSensor(settings.tension_noise, settings.seed)] if listens else []
         encoders = JointEncoder(resolution), JointSpeed(settings.period, resolution)
-        self.sensors: tuple[Sensor, ...] = (*encoders, *tension, *loop.controller.sensors)
+        self.sensors: tuple[SampledSensor, ...] = (*encoders, *tension, *loop.controller.sensors)
         self._samples: list[ControlSignals] = []
         self._readings: list[dict[str, Array]] = []
         whole = math.floor(settings.delay / settings.period + _COINCIDENT)

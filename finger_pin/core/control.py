@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.evaluation.time_functions import Signal, no_signal
+from finger_pin.core.evaluation.time_functions import SignalTable, no_signal
 from finger_pin.core.jit import Indices, Matrix, Vector
 from finger_pin.description.routing import Array
 
@@ -52,15 +52,15 @@ class Control(NamedTuple):
     internal: Vector
     loop: Indices
     channel: Indices
-    reference: Signal
+    reference: SignalTable
     coupling: Matrix
     offset: Vector
-    schedule: Signal
-    force: Signal
+    schedule: SignalTable
+    force: SignalTable
     damping: Vector
     damped: bool
-    guide: Signal
-    palm: Signal
+    guide: SignalTable
+    palm: SignalTable
     desired: Vector
     rate: Vector
     acceleration: Vector
@@ -81,7 +81,7 @@ def planned_control(
     inverse: Array,
     internal: Array,
     channel: NDArray[np.int64],
-    reference: Signal,
+    reference: SignalTable,
     coupling: Array,
     offset: Array,
     loop: NDArray[np.int64] | None = None,
@@ -102,12 +102,12 @@ def held_control(channels: int, coordinates: int) -> Control:
     return _without_plan(HELD, channels, coordinates, no_signal())
 
 
-def scheduled_control(schedule: Signal, coordinates: int) -> Control:
+def scheduled_control(schedule: SignalTable, coordinates: int) -> Control:
     """Return the control that gives inputs over time."""
     return _without_plan(SCHEDULED, len(schedule.harmonics), coordinates, schedule)
 
 
-def _without_plan(kind: int, channels: int, coordinates: int, schedule: Signal) -> Control:
+def _without_plan(kind: int, channels: int, coordinates: int, schedule: SignalTable) -> Control:
     nothing, none = np.zeros(0), np.zeros(0, dtype=np.int64)
     return _control(
         kind,
@@ -134,10 +134,10 @@ def _control(
     internal: Array,
     loop: NDArray[np.int64],
     channel: NDArray[np.int64],
-    reference: Signal,
+    reference: SignalTable,
     coupling: Array,
     offset: Array,
-    schedule: Signal,
+    schedule: SignalTable,
 ) -> Control:
     coordinates, loops = len(gain), int(loop.max(initial=-1)) + 1
     functions = max(len(reference.harmonics), len(schedule.harmonics))

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.tree import Actuator
+from finger_pin.description.tree import TreeActuator
 
 # Of the motion, Hz, and of the tensions of tendons that only pull, N.
 _FREQUENCY = 0.5
@@ -51,7 +51,7 @@ def exercise(description: FingerDescription, duration: float = 4.0) -> dict[str,
     }
 
 
-def _range(description: FingerDescription, actuator: Actuator) -> tuple[float, float]:
+def _range(description: FingerDescription, actuator: TreeActuator) -> tuple[float, float]:
     """Return middle and half of the swing of an actuator's input."""
     servo = actuator.by_length * actuator.gain < 0.0
     lower, upper = actuator.input_range or (0.0, 0.0)

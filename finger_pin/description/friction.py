@@ -10,7 +10,7 @@ from finger_pin.description.validation import Description, Numbers, problem, qua
 from finger_pin.exceptions import toml_like
 
 
-class TendonFriction(Description):
+class TendonFrictionSettings(Description):
     """Law (9) for tendons: one number for all, or one per tendon."""
 
     coulomb: Annotated[Numbers, reals(0.0, 10.0)] = quantity(
@@ -42,7 +42,7 @@ class TendonFriction(Description):
     )
 
 
-class JointFriction(Description):
+class JointFrictionSettings(Description):
     """Law (9) for joints: one number for all, or one per joint."""
 
     coulomb: Annotated[Numbers, reals(0.0, 0.1, hint=" m (is it in millimetres?)")] = quantity(

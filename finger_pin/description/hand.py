@@ -12,8 +12,8 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.friction import JointFriction, TendonFriction
-from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiter
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
+from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiterSettings
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.series import Series, series
@@ -188,10 +188,10 @@ class HandDescription(Description):
                 )
                 for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
             },
-            tendon_friction=TendonFriction.model_construct(**_lists(parts, "tendon_friction")),
-            joint_friction=JointFriction.model_construct(**_lists(parts, "joint_friction")),
+            tendon_friction=TendonFrictionSettings.model_construct(**_lists(parts, "tendon_friction")),
+            joint_friction=JointFrictionSettings.model_construct(**_lists(parts, "joint_friction")),
             passive_tendon=PassiveTendon.model_construct(**_lists(parts, "passive_tendon")),
-            stroke_limiter=StrokeLimiter.model_construct(**_lists(parts, "stroke_limiter")),
+            stroke_limiter=StrokeLimiterSettings.model_construct(**_lists(parts, "stroke_limiter")),
             actuators={
                 f"{name}.{own}": actuator.model_copy(
                     update={"tendons": tuple(f"{name}.{tendon}" for tendon in actuator.tendons)}

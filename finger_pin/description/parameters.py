@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
-from finger_pin.description.friction import JointFriction, TendonFriction
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
     IN_RADIANS,
@@ -185,7 +185,7 @@ class PassiveTendon(Description):
     )
 
 
-class StrokeLimiter(Description):
+class StrokeLimiterSettings(Description):
     """Hunt-Crossley stroke limiter (2): one number for all, or one per joint."""
 
     stiffness: Annotated[Numbers, reals(0.0, 1e7)] = quantity(50.0, unit="N m/rad", source="estimate", doc="k.")
@@ -213,10 +213,10 @@ class FingerDescription(Description):
     )
     joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
     tendons: dict[Name, Tendon] = Field(description="By name; at least one, unless there is a tree.")
-    tendon_friction: TendonFriction = TendonFriction()
-    joint_friction: JointFriction = JointFriction()
+    tendon_friction: TendonFrictionSettings = TendonFrictionSettings()
+    joint_friction: JointFrictionSettings = JointFrictionSettings()
     passive_tendon: PassiveTendon = PassiveTendon()
-    stroke_limiter: StrokeLimiter = StrokeLimiter()
+    stroke_limiter: StrokeLimiterSettings = StrokeLimiterSettings()
     actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
     touches_itself: bool = Field(
         False,

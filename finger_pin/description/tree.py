@@ -33,7 +33,7 @@ _LARGE = 1e9
 Pair = tuple[float, float]
 
 
-class Solid(Description):
+class TreeSolid(Description):
     """What is seen of a body."""
 
     kind: Annotated[
@@ -78,7 +78,7 @@ class Body(Description):
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
-    solids: dict[Name, Solid] = Field({}, description="What is seen of it, by name.")
+    solids: dict[Name, TreeSolid] = Field({}, description="What is seen of it, by name.")
     shapes: dict[Name, BodyShape] = Field({}, description="What touches of it, by name; no two of a tree are alike.")
 
     @field_validator("orientation")
@@ -166,7 +166,7 @@ class Coupling(Description):
     damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.1, unit="N m s/rad", source="estimate", doc="c.")
 
 
-class Actuator(Description):
+class TreeActuator(Description):
     """What drives a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length."""
 
     joint: Name | None = Field(None, description="The joint that it drives.")
@@ -208,7 +208,7 @@ class Tree(Description):
     joints: dict[Name, TreeJoint] = Field(min_length=1, description="By name, those of parents first.")
     tendons: dict[Name, TreeTendon] = Field({}, description="By name.")
     couplings: dict[Name, Coupling] = Field({}, description="By name.")
-    actuators: dict[Name, Actuator] = Field({}, description="By name.")
+    actuators: dict[Name, TreeActuator] = Field({}, description="By name.")
     tip: Tip = Tip()
     touching: tuple[tuple[Name, Name], ...] = Field((), description="Pairs of its own shapes that touch each other.")
     meshes: dict[Name, Mesh] = Field({}, description="What solids are made of, by name.")

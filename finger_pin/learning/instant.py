@@ -19,24 +19,24 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
-from finger_pin.simulation.motions import Motions
-from finger_pin.simulation.variables import RESIDUAL, Variable, variables
+from finger_pin.simulation.motions import SampledMotion
+from finger_pin.simulation.variables import RESIDUAL, Quantity, variables
 
 _NOTHING = Statistics(0, 0, 0, 0, 0.0)
 # Of a reference and a controller, which do not act.
 _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
 
 
-def instant(loop: ClosedLoop, time: float, x: Array) -> Motions:
+def instant(loop: ClosedLoop, time: float, x: Array) -> SampledMotion:
     """Return what is known of a state, shape (size,), at a time, s."""
     return _motions(loop, np.array([time]), x[None], None)
 
 
-def _motions(loop: ClosedLoop, times: Array, x: Array, names: Sequence[str] | None) -> Motions:
-    return Motions(loop, Trajectory(np.array([np.inf]), lambda _: x, _NOTHING), times, names)
+def _motions(loop: ClosedLoop, times: Array, x: Array, names: Sequence[str] | None) -> SampledMotion:
+    return SampledMotion(loop, Trajectory(np.array([np.inf]), lambda _: x, _NOTHING), times, names)
 
 
-def known_variables(loop: ClosedLoop) -> dict[str, Variable]:
+def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the variables that are known at an instant, by name."""
     return {
         name: each
@@ -89,7 +89,7 @@ class SideBySide(ClosedLoop):
         """Whether all worlds have the same numbers."""
         return not isinstance(self.dynamics, CompiledFingers)
 
-    def at(self, times: Array, x: Array) -> Motions:
+    def at(self, times: Array, x: Array) -> SampledMotion:
         """Return what is known of packed states, shape (w, size), at times (w,), s."""
         return _motions(self, times, x, ["joint_acceleration"] if self.accelerated else [])
 

@@ -28,7 +28,7 @@ from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
 from finger_pin.views.viewer.video import draw_picture
 
@@ -219,7 +219,7 @@ class World:
         held = self.action.replayed() if self.action.compiled is None else None
         trajectory = integrate_compiled(stepper, end, self.origin.finger.layout.names, held=held)
         times = np.arange(round(end * sample_rate) + 1) / sample_rate
-        motions = Motions(self.loop, trajectory, times)
+        motions = SampledMotion(self.loop, trajectory, times)
         found = record(self._scenario, motions, self._scenario.simulation.method)
         found.attrs["own"] = "policy"
         return found

@@ -12,7 +12,7 @@ from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.books import Energy
-from finger_pin.mechanism.features import Part, contacts_of
+from finger_pin.mechanism.features import ContactPart, contacts_of
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -57,7 +57,7 @@ def contact_rows(solids: Sequence[Solid], width: int, within: Collection[frozens
     return Rows("contacts", CONTACT, tuple(names), parameters, arm, paths=tuple(paths), powers=_LOSSES)
 
 
-def _piece(a: Solid, part: Part, w: Solid, prism: tuple[float, ...]) -> Piece:
+def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> Piece:
     """Return the gap between a part of one solid and all of another."""
     first, second = (a.place.act(end) for end in part.ends)
     half = 0.5 * float(np.linalg.norm(second - first))

@@ -29,7 +29,7 @@ _STUD = 2.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ContactPart:
     """A part of a body: a segment or a point, widened by a disc across it, and rounded.
 
     Attributes:
@@ -53,7 +53,7 @@ def fillet(solid: Solid) -> float:
     return min(_SHARE * float(min(halves)), _LARGEST)
 
 
-def contacts_of(one: Solid, other: Solid) -> Iterator[tuple[Solid, Part, Solid, tuple[float, ...]]]:
+def contacts_of(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPart, Solid, tuple[float, ...]]]:
     """Yield all contacts of two solids: the body whose part touches, the part, the other body and its prism.
 
     A sphere or a capsule, the first one if both are, touches with its axis.
@@ -77,22 +77,22 @@ def contacts_of(one: Solid, other: Solid) -> Iterator[tuple[Solid, Part, Solid, 
         yield from ((a, part, w, prism) for part in parts)
 
 
-def _on_plane(solid: Solid) -> list[Part]:
+def _on_plane(solid: Solid) -> list[ContactPart]:
     if solid.shape == "box":
         return _corners(solid, 0.0)
     if solid.shape == "cylinder":
         return _rims(solid, 0.0)
     ends = _axis(solid)[1 if solid.shape == "sphere" or solid.joined else 0 :]
-    return [Part(np.stack([end, end]), solid.sizes[0]) for end in ends]
+    return [ContactPart(np.stack([end, end]), solid.sizes[0]) for end in ends]
 
 
-def _round(solid: Solid, faces: bool) -> list[Part]:
+def _round(solid: Solid, faces: bool) -> list[ContactPart]:
     """Return a sphere's or a capsule's axis, in two halves where it may lie on a face."""
     ends, radius = _axis(solid), solid.sizes[0]
     if solid.shape == "sphere" or not faces:
-        return [Part(ends, radius)]
+        return [ContactPart(ends, radius)]
     middle = ends.mean(axis=0)
-    return [Part(np.stack([middle, end]), radius) for end in ends]
+    return [ContactPart(np.stack([middle, end]), radius) for end in ends]
 
 
 def _axis(solid: Solid) -> Array:
@@ -100,33 +100,33 @@ def _axis(solid: Solid) -> Array:
     return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
 
 
-def _corners(solid: Solid, rounding: float) -> list[Part]:
+def _corners(solid: Solid, rounding: float) -> list[ContactPart]:
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * (0.5 * np.array(solid.sizes) - rounding)
-    return [Part(np.stack([corner, corner]), rounding) for corner in corners]
+    return [ContactPart(np.stack([corner, corner]), rounding) for corner in corners]
 
 
-def _edges(solid: Solid, rounding: float) -> list[Part]:
+def _edges(solid: Solid, rounding: float) -> list[ContactPart]:
     half = 0.5 * np.array(solid.sizes) - rounding
     found = []
     for axis in range(3):
         for signs in itertools.product((-1.0, 1.0), repeat=2):
             middle, along = np.insert(np.array(signs), axis, 0.0) * half, half * np.eye(3)[axis]
-            found.append(Part(np.stack([middle - along, middle + along]), rounding))
+            found.append(ContactPart(np.stack([middle - along, middle + along]), rounding))
     return found
 
 
-def _rims(solid: Solid, rounding: float) -> list[Part]:
+def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
     """Return both rims of a cylinder, and three studs of each face, which keep it from spinning where it stands."""
     radius, half = solid.sizes[0], 0.5 * solid.sizes[1] - rounding
     found = []
     for side in (-half, half):
-        found.append(Part(np.array([[0.0, 0.0, side], [0.0, 0.0, -side]]), rounding, radius - rounding, 0.0))
+        found.append(ContactPart(np.array([[0.0, 0.0, side], [0.0, 0.0, -side]]), rounding, radius - rounding, 0.0))
         for turn in 2.0 * np.pi * np.arange(3) / 3.0:
             stud = np.array([_STUD * radius * np.cos(turn), _STUD * radius * np.sin(turn), side])
-            found.append(Part(np.stack([stud, stud]), rounding))
+            found.append(ContactPart(np.stack([stud, stud]), rounding))
     return found
 
 
-def _whole(solid: Solid, rounding: float) -> Part:
+def _whole(solid: Solid, rounding: float) -> ContactPart:
     radius, half = solid.sizes[0] - rounding, 0.5 * solid.sizes[1] - rounding
-    return Part(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), rounding, radius)
+    return ContactPart(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), rounding, radius)

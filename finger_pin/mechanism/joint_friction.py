@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.friction import JointFriction as Friction
-from finger_pin.description.friction import TendonFriction
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
@@ -87,7 +86,7 @@ class JointFriction:
         )
 
 
-def bristles(law: Friction | TendonFriction, size: int) -> dict[str, Array]:
+def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int) -> dict[str, Array]:
     """Return what friction of tendons and of joints has alike, by the laws' names, a number for each of ``size``."""
     names = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
     found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}

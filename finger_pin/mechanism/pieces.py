@@ -20,7 +20,7 @@ from finger_pin.description.routing import Array
 from finger_pin.mechanism.rigid_body import RigidBody
 
 
-class Shape(Protocol):
+class PieceShape(Protocol):
     """What a piece is, seen from its own frame: a span of a tendon, or a gap between surfaces.
 
     Attributes:
@@ -71,7 +71,7 @@ class Piece:
             turns, m; infinite for a half-space.
     """
 
-    shape: Shape
+    shape: PieceShape
     parameters: Array
     ends: tuple[Place, Place]
     joint: int = 0

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Any
 
-from finger_pin.description.friction import JointFriction, TendonFriction
+from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.validation import Description, nearest, quantity, real, validate
 from finger_pin.exceptions import InputError
 
 
-class RoutedFriction(TendonFriction):
+class RoutedFriction(TendonFrictionSettings):
     """Law (9) for a tendon, and by how much its path turns."""
 
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
@@ -22,7 +22,7 @@ class RoutedFriction(TendonFriction):
     )
 
 
-TENDON_KEYS, JOINT = RoutedFriction, JointFriction
+TENDON_KEYS, JOINT = RoutedFriction, JointFrictionSettings
 
 
 def choose(

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.mujoco_friction import LINK, PIN, TENDON, Friction
+from finger_pin.mechanism.exchange.mujoco_friction import LINK, PIN, TENDON, PluginFriction
 
 # Kinds of joints that have one coordinate.
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
@@ -18,7 +18,9 @@ _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 _PARALLEL = 1e-9
 
 
-def frictions(model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str, tuple[Any, bool]]) -> list[Friction]:
+def frictions(
+    model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str, tuple[Any, bool]]
+) -> list[PluginFriction]:
     """Return the frictions that users have asked for, folded into as few rows as hold them.
 
     A fixed tendon over one joint acts in that joint's row, and fixed tendons that are multiples of each other share
@@ -27,7 +29,7 @@ def frictions(model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str
     Raises:
         InputError: If nothing pulls a tendon that was named, or a named joint neither turns nor slides.
     """
-    found: list[Friction] = []
+    found: list[PluginFriction] = []
     first: list[tuple[str, Array]] = []
     for name, (law, named) in tendons.items():
         if not _held(model, model.tendon(name).id) and not _share(model, model.tendon(name).id, list(tendons)):
@@ -42,19 +44,19 @@ def frictions(model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str
         numbers = _tendon_law(model, name, law)
         # What neither bends it nor has a pin that it loads would be passed over at every step.
         crossed = tuple(each for each in _crossed(model, name, law) if each[2] or each[1] in joints)
-        found.append(Friction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio)))
+        found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio)))
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
             numbers = (law.coulomb, law.stiction, law.stiffness, law.viscous, law.stribeck_velocity)
             numbers += (max(law.floor, loss), law.stribeck_exponent, law.micro_damping, 0.0, 0.0)
-            found.append(Friction(PIN, name, name, True, 1.0, numbers))
+            found.append(PluginFriction(PIN, name, name, True, 1.0, numbers))
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
     return _with_loss(model, found)
 
 
-def _with_loss(model: Any, found: list[Friction]) -> list[Friction]:
+def _with_loss(model: Any, found: list[PluginFriction]) -> list[PluginFriction]:
     """Return frictions, the constant one of a joint in whose row tendons act as the drag of the first of these."""
     rows = {each.row for each in found if each.kind == PIN}
     kept = []
@@ -77,7 +79,7 @@ def _held(model: Any, tendon: int) -> bool:
 
 
 def _share(model: Any, tendon: int, names: list[str]) -> float:
-    """Return how a fixed tendon shares in what drives the only joint that it runs over; see `Friction`.
+    """Return how a fixed tendon shares in what drives the only joint that it runs over; see `PluginFriction`.
 
     Zero of all others, and of those that have an actuator or a spring of their own.
     """

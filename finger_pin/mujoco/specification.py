@@ -10,7 +10,15 @@ import mujoco
 import numpy as np
 
 from finger_pin.exceptions import InputError, ScenarioWarning
-from finger_pin.mechanism.exchange.mujoco_friction import COUNT, GROUP, LEAST_LOSS, NAME, NO_INPUT, PLUGIN, Friction
+from finger_pin.mechanism.exchange.mujoco_friction import (
+    COUNT,
+    GROUP,
+    LEAST_LOSS,
+    NAME,
+    NO_INPUT,
+    PLUGIN,
+    PluginFriction,
+)
 from finger_pin.mujoco.choice import JOINT, TENDON_KEYS, choose
 from finger_pin.mujoco.frictions import frictions
 from finger_pin.mujoco.registration import register
@@ -75,7 +83,7 @@ def _name_all(spec: Any) -> None:
             each.name = each.name or f"{what}_{index}"
 
 
-def _write(spec: Any, model: Any, found: list[Friction]) -> None:
+def _write(spec: Any, model: Any, found: list[PluginFriction]) -> None:
     """Add actuator, tuple and plugin, and prepare the rows."""
     elements = [element for each in found for element in each.elements()]
     kinds, names, values = zip(*elements, strict=True)
@@ -101,7 +109,7 @@ def _write(spec: Any, model: Any, found: list[Friction]) -> None:
         row.frictionloss = max(float(row.frictionloss), abs(each.ratio) * each.least, LEAST_LOSS)
 
 
-def _target(spec: Any, found: list[Friction]) -> tuple[str, Any]:
+def _target(spec: Any, found: list[PluginFriction]) -> tuple[str, Any]:
     """Return what the actuator stands at, on which it does nothing: something driven, whose tree does not sleep."""
     for each in spec.actuators:
         if each.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):

@@ -18,7 +18,7 @@ from finger_pin.simulation.contact_variables import contact_values
 from finger_pin.simulation.energy import Flows, energies, powers
 
 
-class Motions:
+class SampledMotion:
     """A trajectory at times, and all that follows from it, computed when it is first asked for.
 
     The signals are recomputed from the states by the evaluation that the dynamics use.

@@ -22,7 +22,7 @@ from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import attributes_of, record, recorded
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.running import run
@@ -175,7 +175,7 @@ class Prepared:
         return setup
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
-        motions = Motions(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
+        motions = SampledMotion(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
         names = coordinates(setup.scenario, setup.loop, motions.times)
         attributes = attributes_of(setup.scenario, trajectory, setup.method)
         return RunArrays(recorded(motions, self.record), names, attributes)
@@ -188,7 +188,7 @@ class Prepared:
         setup = self._setup(scenario, initial, bindings)
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
-            motions = Motions(setup.loop, trajectory, scenario.sample_times(), self.record)
+            motions = SampledMotion(setup.loop, trajectory, scenario.sample_times(), self.record)
             reached, partial = float(trajectory.breakpoints[-1]), record(scenario, motions, setup.method, self.record)
             if trajectory.failure:
                 raise IntegrationError(reached, *setup.failure(trajectory), partial)

@@ -15,7 +15,7 @@ from finger_pin.description.embedded import embedded
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.variables import BASE_FRAME, SHORTFALL, coordinates, variables
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 Recorded = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
 
 
-def recorded(motions: Motions, names: Sequence[str] | None = None) -> Recorded:
+def recorded(motions: SampledMotion, names: Sequence[str] | None = None) -> Recorded:
     """Return variables of a motion, by default all; only what they need is computed.
 
     Args:
@@ -45,7 +45,7 @@ def recorded(motions: Motions, names: Sequence[str] | None = None) -> Recorded:
 
 def record(
     scenario: Scenario,
-    motions: Motions,
+    motions: SampledMotion,
     method: str,
     names: Sequence[str] | None = None,
     text: str | None = None,

@@ -33,7 +33,7 @@ from finger_pin.simulation.accuracy import (
     ringing,
     too_stiff,
 )
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def run(
     text = to_toml(scenario)
 
     def recorded(found: Trajectory) -> xr.Dataset:
-        return record(scenario, Motions(loop, found, scenario.sample_times()), setup.method, text=text)
+        return record(scenario, SampledMotion(loop, found, scenario.sample_times()), setup.method, text=text)
 
     watched = progress is not None or observe is not None
     first = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)

@@ -25,7 +25,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, SignalReference
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.accuracy import check_memory, left_open, open_account
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class Told:
         times = knots[0] + scenario.sample_times()
         near = knots[np.clip(np.searchsorted(knots, times - _SAME), 0, len(knots) - 1)]
         times = np.where(np.abs(near - times) < _SAME, near, times)
-        result = record(scenario, Motions(loop, trajectory, times), str(settings["method"]))
+        result = record(scenario, SampledMotion(loop, trajectory, times), str(settings["method"]))
         result.attrs["own"] = "loop"
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])

@@ -16,7 +16,7 @@ from finger_pin.mechanism.books import LOST, Energy
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_variables
 from finger_pin.simulation.energy import flows, stores
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR, _TIME = ("time", "motor"), ("time",)
@@ -27,7 +27,7 @@ RESIDUAL = "energy_residual"
 BASE_FRAME, WORLD_FRAME = "base", "world"
 
 
-class Variable(NamedTuple):
+class Quantity(NamedTuple):
     """A variable of a result.
 
     Attributes:
@@ -41,7 +41,7 @@ class Variable(NamedTuple):
     """
 
     dims: tuple[str, ...]
-    value: Callable[[Motions], Array]
+    value: Callable[[SampledMotion], Array]
     units: str
     long_name: str
     equation: str = ""
@@ -57,52 +57,52 @@ class Variable(NamedTuple):
         return found | {"equation": f"({self.equation})"} if self.equation else found
 
 
-def variables(loop: ClosedLoop) -> dict[str, Variable]:
+def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return all variables that a result of a loop can have, by name."""
     table = {
-        "joint_position": Variable(_JOINT, lambda of: of.state.position, "rad", "joint angle"),
-        "joint_velocity": Variable(_JOINT, lambda of: of.state.velocity, "rad/s", "joint velocity"),
-        "joint_acceleration": Variable(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
-        "joint_reference": Variable(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
-        "tracking_error": Variable(
+        "joint_position": Quantity(_JOINT, lambda of: of.state.position, "rad", "joint angle"),
+        "joint_velocity": Quantity(_JOINT, lambda of: of.state.velocity, "rad/s", "joint velocity"),
+        "joint_acceleration": Quantity(_JOINT, lambda of: of.finger.acceleration, "rad/s2", "joint acceleration", "18"),
+        "joint_reference": Quantity(_JOINT, lambda of: of.reference.position, "rad", "desired joint angle", "20"),
+        "tracking_error": Quantity(
             _JOINT, lambda of: of.reference.position - of.state.position, "rad", "desired less actual joint angle"
         ),
     }
     tip = ("time", "axis") if len(loop.finger.rigid_body.tips) == 1 else ("time", "finger", "axis")
     table |= {
-        "fingertip_position": Variable(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
-        "tendon_command": Variable(_TENDON, lambda of: of.control.tension, "N", "commanded or planned tension", "21b"),
-        "tendon_tension": Variable(
+        "fingertip_position": Quantity(tip, lambda of: of.motion.tip, "m", "fingertip position", "1"),
+        "tendon_command": Quantity(_TENDON, lambda of: of.control.tension, "N", "commanded or planned tension", "21b"),
+        "tendon_tension": Quantity(
             _TENDON,
             lambda of: of.loop.finger.routing.tendon_tension(of.finger.tendons.strands),
             "N",
             "delivered tension; distal half of a passive tendon",
             "12",
         ),
-        "tendon_velocity": Variable(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
-        "tendon_friction": Variable(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
-        "tendon_stiction": Variable(_TENDON, lambda of: of.state.tendon_stiction, "N", "tendon stiction force", "9a"),
-        "tendon_normal_force": Variable(
+        "tendon_velocity": Quantity(_TENDON, lambda of: of.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
+        "tendon_friction": Quantity(_TENDON, lambda of: of.finger.tendons.friction, "N", "tendon friction force", "9c"),
+        "tendon_stiction": Quantity(_TENDON, lambda of: of.state.tendon_stiction, "N", "tendon stiction force", "9a"),
+        "tendon_normal_force": Quantity(
             _TENDON, lambda of: of.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
         ),
-        "tendon_friction_coefficient": Variable(
+        "tendon_friction_coefficient": Quantity(
             _TENDON, lambda of: of.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
         ),
-        "tendon_curvature": Variable(
+        "tendon_curvature": Quantity(
             _TENDON, lambda of: of.finger.tendons.curvature, "rad", "total curvature of the path", "15"
         ),
-        "joint_torque_command": Variable(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
-        "joint_torque": Variable(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
-        "joint_friction": Variable(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
-        "joint_stiction": Variable(_JOINT, lambda of: of.state.joint_stiction, "N m", "joint stiction torque", "9a"),
-        "joint_reaction": Variable(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
-        "limiter_torque": Variable(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": Variable(tip, _fingertip_force, "N", "force on the fingertip", "6"),
-        "spring_torque": Variable(_JOINT, lambda of: of.finger.spring_torque, "N m", "torque of the joints' springs"),
-        "external_torque": Variable(
+        "joint_torque_command": Quantity(_JOINT, lambda of: of.control.torque, "N m", "desired joint torque", "19"),
+        "joint_torque": Quantity(_JOINT, lambda of: of.finger.tendon_torque, "N m", "torque of the tendons", "11"),
+        "joint_friction": Quantity(_JOINT, lambda of: of.finger.joints.friction, "N m", "joint friction torque", "9c"),
+        "joint_stiction": Quantity(_JOINT, lambda of: of.state.joint_stiction, "N m", "joint stiction torque", "9a"),
+        "joint_reaction": Quantity(_JOINT, lambda of: of.finger.joints.reaction, "N", "joint reaction force", "17"),
+        "limiter_torque": Quantity(_JOINT, lambda of: of.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
+        "fingertip_force": Quantity(tip, _fingertip_force, "N", "force on the fingertip", "6"),
+        "spring_torque": Quantity(_JOINT, lambda of: of.finger.spring_torque, "N m", "torque of the joints' springs"),
+        "external_torque": Quantity(
             _JOINT, lambda of: of.finger.external_torque, "N m", "torque of the fingertip force", "6"
         ),
-        SHORTFALL: Variable(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
+        SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
     }
     table |= _of_palm(loop) | _of_motors(loop) | _of_passive(loop) | _measured(loop) | _more(loop)
     for name, each in table.items():
@@ -111,71 +111,71 @@ def variables(loop: ClosedLoop) -> dict[str, Variable]:
     return table
 
 
-def _frame(name: str, variable: Variable) -> str:
+def _frame(name: str, variable: Quantity) -> str:
     """Return the frame of a variable with components: the base's, but for where that itself is."""
     if not {"axis", "quaternion"} & set(variable.dims):
         return ""
     return WORLD_FRAME if name.startswith("palm_") else BASE_FRAME
 
 
-def _more(loop: ClosedLoop) -> dict[str, Variable]:
+def _more(loop: ClosedLoop) -> dict[str, Quantity]:
     table = {
-        name: Variable(dims, partial(_contact, name), units, text)
+        name: Quantity(dims, partial(_contact, name), units, text)
         for name, (dims, units, text) in contact_variables(loop.finger).items()
     }
     return table | _of_further(loop.finger.further) | _of_account(loop)
 
 
-def _contact(name: str, of: Motions) -> Array:
+def _contact(name: str, of: SampledMotion) -> Array:
     return of.contacts[name]
 
 
-def _fingertip_force(of: Motions) -> Array:
+def _fingertip_force(of: SampledMotion) -> Array:
     force = of.loop.force(of.times)
     return np.broadcast_to(force, (len(of.times), *of.loop.fingertip_force.shape))
 
 
-def _shortfall(of: Motions) -> Array:
+def _shortfall(of: SampledMotion) -> Array:
     missing = of.control.shortfall
     return np.zeros_like(of.state.position) if missing is None else missing
 
 
-def _of_palm(loop: ClosedLoop) -> dict[str, Variable]:
+def _of_palm(loop: ClosedLoop) -> dict[str, Quantity]:
     if loop.palm is None:
         return {}
     path = loop.palm
 
-    def turned(of: Motions) -> Array:
+    def turned(of: SampledMotion) -> Array:
         return np.array([pin.Quaternion(each).coeffs() for each in path.place(of.times)[1]])
 
     text = "rotation of the palm to the world, x, y, z, w"
     return {
-        "palm_position": Variable(
+        "palm_position": Quantity(
             ("time", "axis"), lambda of: path.place(of.times)[0], "m", "place of the palm in the world"
         ),
-        "palm_orientation": Variable(("time", "quaternion"), turned, "1", text),
-        "palm_velocity": Variable(
+        "palm_orientation": Quantity(("time", "quaternion"), turned, "1", text),
+        "palm_velocity": Quantity(
             ("time", "axis"), lambda of: path.velocity(of.times)[0], "m/s", "velocity of the palm in the world"
         ),
-        "palm_angular_velocity": Variable(
+        "palm_angular_velocity": Quantity(
             ("time", "axis"), lambda of: path.velocity(of.times)[1], "rad/s", "angular velocity of the palm"
         ),
     }
 
 
-def _of_motors(loop: ClosedLoop) -> dict[str, Variable]:
+def _of_motors(loop: ClosedLoop) -> dict[str, Quantity]:
     if not loop.finger.actuators.names:
         return {}
 
-    def moved(of: Motions, name: str) -> Array:
+    def moved(of: SampledMotion, name: str) -> Array:
         return np.asarray(getattr(of.state, name))
 
-    def driven(of: Motions, name: str) -> Array:
+    def driven(of: SampledMotion, name: str) -> Array:
         return np.asarray(getattr(of.finger.motors, name))
 
     text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
     table = {
-        name: Variable(_MOTOR, partial(moved if inner == name else driven, name=inner), units, long_name, equation)
+        name: Quantity(_MOTOR, partial(moved if inner == name else driven, name=inner), units, long_name, equation)
         for name, inner, units, long_name, equation in (
             ("motor_position", "motor_position", "rad", "angle of the spool", ""),
             ("motor_velocity", "motor_velocity", "rad/s", "velocity of the spool", ""),
@@ -187,10 +187,10 @@ def _of_motors(loop: ClosedLoop) -> dict[str, Variable]:
             ("gearbox_load", "load", "N m", "torque that the gears carry", ""),
         )
     }
-    return table | {"spool_tension": Variable(_TENDON, lambda of: of.finger.tendons.entering, "N", text)}
+    return table | {"spool_tension": Quantity(_TENDON, lambda of: of.finger.tendons.entering, "N", text)}
 
 
-def _of_passive(loop: ClosedLoop) -> dict[str, Variable]:
+def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
     count, actuated = loop.finger.routing.passive, loop.finger.routing.actuated
     if not count:
         return {}
@@ -201,28 +201,28 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Variable]:
     def shaped(values: Array) -> Array:
         return values[:, 0] if single else values
 
-    def proximal(of: Motions) -> Array:
+    def proximal(of: SampledMotion) -> Array:
         return shaped(of.finger.tendons.strands[..., actuated::2])
 
     return {
-        "passive_tension_proximal": Variable(dims, proximal, "N", "tension of the proximal half", "12"),
-        "passive_position": Variable(
+        "passive_tension_proximal": Quantity(dims, proximal, "N", "tension of the proximal half", "12"),
+        "passive_position": Quantity(
             dims, lambda of: shaped(of.state.passive_position), "m", "position of the lumped mass", "13"
         ),
-        "passive_velocity": Variable(
+        "passive_velocity": Quantity(
             dims, lambda of: shaped(of.state.passive_velocity), "m/s", "velocity of the lumped mass", "13"
         ),
     }
 
 
-def _measured(loop: ClosedLoop) -> dict[str, Variable]:
+def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return what sensors of a sampled controller read, each held until the next sample."""
 
-    def held(of: Motions, name: str) -> Array:
+    def held(of: SampledMotion, name: str) -> Array:
         return of.loop.controller.measured(name, of.times)
 
     return {
-        f"measured_{each.name}": Variable(
+        f"measured_{each.name}": Quantity(
             ("time", each.dimension) if each.dimension else _TIME,
             partial(held, name=each.name),
             each.units,
@@ -232,24 +232,24 @@ def _measured(loop: ClosedLoop) -> dict[str, Variable]:
     }
 
 
-def _of_further(tables: tuple[Rows, ...]) -> dict[str, Variable]:
+def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
     """Return what rows of a user's own see and show, by table."""
 
-    def seen(of: Motions, group: str, name: str) -> Array:
+    def seen(of: SampledMotion, group: str, name: str) -> Array:
         found = of.finger.mechanism.rows[group]
         return np.asarray(getattr(found.row, name))
 
-    def exerted(of: Motions, group: str) -> Array:
+    def exerted(of: SampledMotion, group: str) -> Array:
         return of.finger.mechanism.rows[group].force
 
-    def shown(of: Motions, group: str, index: int) -> Array:
+    def shown(of: SampledMotion, group: str, index: int) -> Array:
         return of.finger.mechanism.rows[group].signals[index]
 
-    found: dict[str, Variable] = {}
+    found: dict[str, Quantity] = {}
     for table in tables:
         group = table.group
         units = {"length": table.unit, "speed": f"{table.unit}/s", "force": "N m" if table.unit == "rad" else "N"}
-        values: dict[str, Callable[[Motions], Array]] = {"force": partial(exerted, group=group)}
+        values: dict[str, Callable[[SampledMotion], Array]] = {"force": partial(exerted, group=group)}
         values |= {name: partial(seen, group=group, name=name) for name in ("length", "speed")}
         values |= {name: partial(shown, group=group, index=i) for i, name in enumerate(table.law.signals)}
         if np.any(table.channels >= 0):
@@ -258,34 +258,34 @@ def _of_further(tables: tuple[Rows, ...]) -> dict[str, Variable]:
             values["state"] = partial(seen, group=group, name="state")
         for name, value in values.items():
             unit = units.get(name, "SI") if table.unit else "SI"
-            found[f"{group}_{name}"] = Variable(("time", group), value, unit, f"{name} of {table.law.name}")
+            found[f"{group}_{name}"] = Quantity(("time", group), value, unit, f"{name} of {table.law.name}")
     return found
 
 
-def _of_account(loop: ClosedLoop) -> dict[str, Variable]:
-    def stored(of: Motions, name: str) -> Array:
+def _of_account(loop: ClosedLoop) -> dict[str, Quantity]:
+    def stored(of: SampledMotion, name: str) -> Array:
         return of.stored[name]
 
-    def power(of: Motions, name: str) -> Array:
+    def power(of: SampledMotion, name: str) -> Array:
         return of.powers[name]
 
-    def work(of: Motions, name: str) -> Array:
+    def work(of: SampledMotion, name: str) -> Array:
         return of.account.works[name]
 
     table = {}
     for each in stores(loop.finger):
-        table[f"energy_{each.name}"] = Variable(
+        table[f"energy_{each.name}"] = Quantity(
             _TIME, partial(stored, name=each.name), "J", f"energy stored: {each.label}", booked=each
         )
     # What comes in before what is lost.
     for each in sorted(flows(loop.finger.mechanism.books), key=lambda each: each.kind == LOST):
         name, text = each.name, f"{each.kind}: {each.label}"
-        table[f"power_{name}"] = Variable(_TIME, partial(power, name=name), "W", f"power {text}", booked=each)
-        table[f"energy_exchanged_{name}"] = Variable(
+        table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", booked=each)
+        table[f"energy_exchanged_{name}"] = Quantity(
             _TIME, partial(work, name=name), "J", f"energy {text}", booked=each
         )
     text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
-    table[RESIDUAL] = Variable(_TIME, lambda of: of.account.residual, "J", text)
+    table[RESIDUAL] = Quantity(_TIME, lambda of: of.account.residual, "J", text)
     return table
 
 

@@ -16,13 +16,13 @@ from finger_pin.studies.designs import SAMPLE, Design
 from finger_pin.studies.fingerprint import versions
 from finger_pin.studies.keys import describe
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.runs import FAILED, Record
+from finger_pin.studies.runs import FAILED, RunRecord
 
 MISSING = "missing"
 
 
 def assemble(
-    scenario: Scenario, design: Design, metrics: Iterable[Metric], records: Iterable[Record | None]
+    scenario: Scenario, design: Design, metrics: Iterable[Metric], records: Iterable[RunRecord | None]
 ) -> xr.Dataset:
     """Return the Dataset of a sweep.
 

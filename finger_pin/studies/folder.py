@@ -26,7 +26,7 @@ from finger_pin.simulation.netcdf import save
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, versions
 from finger_pin.studies.keys import Starting
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.runs import Record
+from finger_pin.studies.runs import RunRecord
 
 STUDY, RUNS = "study.toml", "runs.jsonl"
 _LOCK = ".lock"
@@ -51,18 +51,18 @@ class Store:
         Raises:
             OSError: If it cannot be read or written.
         """
-        self._records: dict[str, Record] = {}
+        self._records: dict[str, RunRecord] = {}
         self._file: int | None = None
         if path is not None:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _BINARY, 0o666)
             self._read(Path(path))
 
     @property
-    def records(self) -> Mapping[str, Record]:
+    def records(self) -> Mapping[str, RunRecord]:
         """All records by key."""
         return self._records
 
-    def append(self, record: Record) -> None:
+    def append(self, record: RunRecord) -> None:
         """Keep a record; once this returns it is on disk.
 
         Raises:
@@ -95,7 +95,7 @@ class Store:
             os.ftruncate(self._file, whole)
         for line in data[:whole].splitlines():
             try:
-                record = Record.from_json(line.decode())
+                record = RunRecord.from_json(line.decode())
             except ValueError:
                 # Not a record: its run is done again.
                 continue

@@ -22,7 +22,7 @@ from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import prepare, refuse_unknown
 from finger_pin.simulation.simulate import simulate
-from finger_pin.simulation.variables import Variable
+from finger_pin.simulation.variables import Quantity
 from finger_pin.simulation.variables import variables as known_variables
 from finger_pin.studies.executing import Crew, Lost
 
@@ -135,7 +135,7 @@ def _check_alike(runs: Sequence[Scenario]) -> None:
 
 def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | None) -> None:
     """Raise unless every variable is one of at least one run."""
-    known: dict[str, Variable] = {}
+    known: dict[str, Quantity] = {}
     for run in runs:
         if set(keep) <= set(known):
             return

@@ -36,7 +36,7 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.runs import DONE, Progress, Record, Stop, evaluate
+from finger_pin.studies.runs import DONE, Progress, RunRecord, Stop, evaluate
 from finger_pin.studies.search import HOPELESS, Search, nondominated
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
@@ -163,7 +163,7 @@ class _Course:
     progress: Progress | None
     stop: Stop | None
 
-    def follow(self, own: Point, search: Search) -> tuple[list[Point], list[Record | None]]:
+    def follow(self, own: Point, search: Search) -> tuple[list[Point], list[RunRecord | None]]:
         """Return all points with their records, the scenario's own first."""
         points, records = [own], self._evaluate([own], [])
         for _ in range(self.effort.generations):
@@ -179,7 +179,7 @@ class _Course:
             search.tell(np.array([value for value, _ in judged]), np.array([excess for _, excess in judged]))
         return points, records
 
-    def _evaluate(self, points: list[Point], earlier: list[Record | None]) -> list[Record | None]:
+    def _evaluate(self, points: list[Point], earlier: list[RunRecord | None]) -> list[RunRecord | None]:
         total = 1 + self.effort.population * self.effort.generations
         failed = sum(record is not None and record.status != DONE for record in earlier)
 
@@ -191,7 +191,7 @@ class _Course:
             self.starting, points, self.goals.metrics, self.store, self.crew, progress=report, stop=self.stop
         )
 
-    def _judge(self, record: Record) -> tuple[Array, Array]:
+    def _judge(self, record: RunRecord) -> tuple[Array, Array]:
         """Return objectives and excesses; those of a design that cannot be run are worse than all others."""
         if record.status == DONE:
             values, excesses = self.goals.values(record.metrics), self.goals.excesses(record.metrics)
@@ -214,7 +214,7 @@ def _shares(variables: Sequence[Variable], own: Mapping[str, float]) -> Array | 
     return np.array(shares)
 
 
-def _assembled(starting: Starting, goals: Goals, points: list[Point], records: list[Record | None]) -> xr.Dataset:
+def _assembled(starting: Starting, goals: Goals, points: list[Point], records: list[RunRecord | None]) -> xr.Dataset:
     listing = Listing({key: [point[key] for point in points] for key in points[0]})
     result = assemble(starting.scenario, listing, goals.metrics, records)
     measured = [(row, r.metrics) for row, r in enumerate(records) if r is not None and r.status == DONE]

@@ -31,7 +31,7 @@ Progress = Callable[[int, int, int], None]
 
 
 @dataclass(frozen=True)
-class Record:
+class RunRecord:
     """What is kept of a run.
 
     Attributes:
@@ -68,7 +68,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Task:
+class PlannedRun:
     """A run to be done.
 
     Attributes:
@@ -87,19 +87,19 @@ class Task:
     metrics: tuple[Metric, ...]
     source: str
 
-    def failed(self, reason: str, seconds: float = 0.0) -> Record:
+    def failed(self, reason: str, seconds: float = 0.0) -> RunRecord:
         """Return the record of a run that failed."""
-        return Record(self.key, dict(self.point), FAILED, " ".join(reason.split()), {}, seconds)
+        return RunRecord(self.key, dict(self.point), FAILED, " ".join(reason.split()), {}, seconds)
 
 
 class Archive(Protocol):
     """Where records are found and kept."""
 
     @property
-    def records(self) -> Mapping[str, Record]:
+    def records(self) -> Mapping[str, RunRecord]:
         """All records by key."""
 
-    def append(self, record: Record) -> None:
+    def append(self, record: RunRecord) -> None:
         """Keep a record."""
 
 
@@ -121,7 +121,7 @@ def evaluate(
     progress: Progress | None = None,
     stop: Stop | None = None,
     retry_failed: bool = False,
-) -> list[Record | None]:
+) -> list[RunRecord | None]:
     """Do the runs that are not in an archive, keep each as it finishes, and return all in the order of the points.
 
     Args:
@@ -144,7 +144,7 @@ def evaluate(
     plans = [_plan(starting, point, metrics, measured) for point in takewhile(lambda _: not asked_to_stop(), points)]
     found = {key: r for key, r in archive.records.items() if not (retry_failed and r.status == FAILED)}
     records = {each.key: found[each.key] for each in plans if each.key in found}
-    tasks = {each.key: each for each in plans if isinstance(each, Task) and each.key not in records}
+    tasks = {each.key: each for each in plans if isinstance(each, PlannedRun) and each.key not in records}
 
     def report() -> None:
         if progress is not None:
@@ -152,7 +152,7 @@ def evaluate(
             progress(len(done), sum(record.status == FAILED for record in done), len(points))
 
     for each in plans:
-        if isinstance(each, Record) and each.key not in records:
+        if isinstance(each, RunRecord) and each.key not in records:
             records[each.key] = each
             archive.append(each)
     report()
@@ -167,14 +167,14 @@ def evaluate(
     return [records.get(each.key) for each in plans] + [None] * (len(points) - len(plans))
 
 
-def _failed(task: Task, lost: Lost) -> Record:
+def _failed(task: PlannedRun, lost: Lost) -> RunRecord:
     """Return the record of a run that ended the processes that did it, as Dask finds out."""
     if type(lost.error).__name__ == "KilledWorker":
         return task.failed(f"the workers that ran it died: {lost.error}")
     raise ExecutorError(f"the executor cannot go on: {lost.reason}; give an output to keep what it has finished")
 
 
-def execute(task: Task, stop: Stop) -> Record:
+def execute(task: PlannedRun, stop: Stop) -> RunRecord:
     """Do a task.
 
     Raises:
@@ -192,7 +192,7 @@ def execute(task: Task, stop: Stop) -> Record:
         # Whatever goes wrong with one point is kept with it, and the others go on.
         kind = "" if isinstance(error, FingerPinError) else f"{type(error).__name__}: "
         return task.failed(f"{kind}{error}", time.perf_counter() - begin)
-    return Record(task.key, dict(task.point), DONE, "", values, time.perf_counter() - begin)
+    return RunRecord(task.key, dict(task.point), DONE, "", values, time.perf_counter() - begin)
 
 
 def _identity(metric: Metric) -> list[str]:
@@ -208,15 +208,17 @@ def _known(digest: Callable[[Any], str], thing: Any) -> str:
         return uuid.uuid4().hex
 
 
-def _plan(starting: Starting, point: Point, metrics: tuple[Metric, ...], measured: list[list[str]]) -> Task | Record:
+def _plan(
+    starting: Starting, point: Point, metrics: tuple[Metric, ...], measured: list[list[str]]
+) -> PlannedRun | RunRecord:
     """Return the task at a point, or the record of its failure if there is no such scenario."""
     try:
         scenario = starting.at(point)
     except InputError as error:
         key = _digest(to_toml(starting.scenario), dict(point), measured)
-        return Record(key, dict(point), FAILED, str(error), {}, 0.0)
+        return RunRecord(key, dict(point), FAILED, str(error), {}, 0.0)
     finger = starting.finger_at(scenario)
-    return Task(_digest(to_toml(scenario), measured), dict(point), scenario, finger, metrics, source_digest())
+    return PlannedRun(_digest(to_toml(scenario), measured), dict(point), scenario, finger, metrics, source_digest())
 
 
 def _digest(*parts: Any) -> str:

@@ -8,7 +8,7 @@ import finger_pin as fp
 PERIOD = 1e-3
 
 
-class Gauge(fp.control.Sensor):
+class Gauge(fp.control.SampledSensor):
     """The torque of the tendons at two joints, with noise."""
 
     name, units, dimension, labels = "link_torque", "N m", "gauge", ("proximal", "medial")
@@ -22,7 +22,7 @@ class Gauge(fp.control.Sensor):
         return self.exact[-1] + self.noise[len(self.exact) - 1]
 
 
-class Clock(fp.control.Sensor):
+class Clock(fp.control.SampledSensor):
     """One number: the time."""
 
     name, units = "clock", "s"

@@ -11,7 +11,7 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledMechanism
 from finger_pin.core.control import held_control, planned_control
-from finger_pin.core.evaluation.time_functions import Signal
+from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.jit import bound
 from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.integrator import integrate_compiled
@@ -72,7 +72,7 @@ class Joined:
             inverse=np.concatenate([spread["inverse"] for spread, _, _ in found]),
             internal=np.concatenate([control.internal for control in controls]),
             channel=np.concatenate([channels for _, _, channels in found]),
-            reference=Signal(
+            reference=SignalTable(
                 np.concatenate([control.reference.harmonics for control in controls]),
                 np.zeros(0),
                 np.zeros((6, 0, total)),

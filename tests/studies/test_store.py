@@ -6,11 +6,11 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.studies.folder import Store, StudyFolder
-from finger_pin.studies.runs import Record
+from finger_pin.studies.runs import RunRecord
 
 
 def record(key, value=1.0):
-    return Record(key, {"controller.gain": value}, "done", "", {"losses": value}, 0.1)
+    return RunRecord(key, {"controller.gain": value}, "done", "", {"losses": value}, 0.1)
 
 
 @pytest.fixture

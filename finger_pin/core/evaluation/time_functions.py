@@ -14,7 +14,7 @@ from finger_pin.laws.quintic import quintic
 _quintic = inlined(quintic)
 
 
-class Signal(NamedTuple):
+class SignalTable(NamedTuple):
     """k functions of time: a sinusoid about an offset each, plus a piecewise polynomial on shared knots.
 
     Attributes:
@@ -28,9 +28,9 @@ class Signal(NamedTuple):
     coefficients: Layers
 
 
-def no_signal() -> Signal:
+def no_signal() -> SignalTable:
     """Return a signal of no functions."""
-    return Signal(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
+    return SignalTable(np.zeros((0, 4)), np.zeros(0), np.zeros((6, 0, 0)))
 
 
 @compiled

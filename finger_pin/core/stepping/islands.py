@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.control import PLANNED, Control
-from finger_pin.core.evaluation.time_functions import Signal
+from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.jit import indices
 from finger_pin.core.path_tables import select_paths
 from finger_pin.core.tables import Tables
@@ -197,12 +197,12 @@ def select_control(control: Control, island: Island) -> Control:
     )
 
 
-def _chosen(signal: Signal, functions: Indices) -> Signal:
+def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:
     """Return some functions of a signal; none of none."""
     if not len(signal.harmonics):
         return signal
     coefficients = np.ascontiguousarray(signal.coefficients[:, :, functions])
-    return Signal(signal.harmonics[functions], signal.knots, coefficients)
+    return SignalTable(signal.harmonics[functions], signal.knots, coefficients)
 
 
 def _connected(first: Indices, second: Indices, count: int) -> Indices:

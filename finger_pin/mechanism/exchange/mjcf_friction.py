@@ -14,7 +14,7 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     PIN,
     PLUGIN,
     TENDON,
-    Friction,
+    PluginFriction,
 )
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.tendons import Tendons
@@ -53,7 +53,7 @@ def add_friction_elements(root: ET.Element, description: FingerDescription, tend
             ET.SubElement(table, "element", objtype=kind, objname=name, prm=repr(float(value)))
 
 
-def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[Friction]:
+def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool) -> list[PluginFriction]:
     found = []
     for index, (name, tendon) in enumerate(description.tendons.items()):
         numbers = [float(getattr(tendons, each)[index]) for each in _TENDON]
@@ -61,16 +61,16 @@ def _of_tendons(description: FingerDescription, tendons: Tendons, massless: bool
         law = (*numbers, tendon.curvature_offset)
         crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
         if tendon.kind == "actuated":
-            found.append(Friction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
+            found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         elif massless:
             # Its viscous friction is left out with its mass.
             law = (*law[:3], 0.0, *law[4:])
-            found.append(Friction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
+            found.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         else:
             split, mass = tendon.proximal_crossings, f"{name}_mass"
             halves = [(False, f"{name}_{half}", 0.0) for half in ("proximal", "distal")]
             more = (halves[0], *crossed[:split], halves[1], *crossed[split:])
-            found.append(Friction(MASS, mass, mass, True, 1.0, law, more))
+            found.append(PluginFriction(MASS, mass, mass, True, 1.0, law, more))
     return found
 
 
@@ -78,11 +78,11 @@ _TENDON = ("surface", "stiction_ratio", "stiffness", "viscous", "stribeck_veloci
 _JOINT = ("kinetic", "static", "stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
 
 
-def _of_joints(description: FingerDescription, tendons: Tendons) -> list[Friction]:
+def _of_joints(description: FingerDescription, tendons: Tendons) -> list[PluginFriction]:
     friction = JointFriction.from_description(description, tendons.routing.loads)
     found = []
     for index, name in enumerate(description.joints):
         numbers = [float(getattr(friction, each)[index]) for each in _JOINT]
         law = (*numbers, float(friction.lag[index] * friction.stiffness[index]), 0.0, 0.0)
-        found.append(Friction(PIN, name, name, True, 1.0, law))
+        found.append(PluginFriction(PIN, name, name, True, 1.0, law))
     return found

@@ -33,7 +33,7 @@ LEVEL, FORCE, LOAD, TURN, SIGNALS = range(5)
 
 
 @dataclass(frozen=True)
-class Friction:
+class PluginFriction:
     """A friction.
 
     Attributes:

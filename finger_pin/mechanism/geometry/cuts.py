@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.geometry.winding import Arc, Span
+from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
 
 
 class Groove(Enum):
@@ -51,7 +51,7 @@ class Cut:
     direction: Array
 
 
-def cuts(model: pin.Model, tendon: str, pieces: Sequence[Span | Arc], groove: Groove) -> Iterator[Cut]:
+def cuts(model: pin.Model, tendon: str, pieces: Sequence[WoundSpan | Arc], groove: Groove) -> Iterator[Cut]:
     """Yield the cuts of a wound tendon, joint by joint.
 
     Args:
@@ -60,7 +60,7 @@ def cuts(model: pin.Model, tendon: str, pieces: Sequence[Span | Arc], groove: Gr
         pieces: From `winding.wind`.
         groove: What the grooves are part of.
     """
-    spans = [piece for piece in pieces if isinstance(piece, Span)]
+    spans = [piece for piece in pieces if isinstance(piece, WoundSpan)]
     arcs = {piece.joint: piece for piece in pieces if isinstance(piece, Arc)}
     after = {span.link: span for span in spans}
     for span in spans:

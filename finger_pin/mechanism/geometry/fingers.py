@@ -15,7 +15,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
 from finger_pin.mechanism.geometry.foreign import chain, placed_solids, turned_model, width_of
 from finger_pin.mechanism.geometry.lanes import Lanes, tendon_lanes
-from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, Span, wind
+from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, WoundSpan, wind
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS
 
@@ -69,7 +69,7 @@ class WoundFinger:
         size: How far its tip can be from its base, about, m.
     """
 
-    pieces: dict[str, tuple[Span | Arc, ...]]
+    pieces: dict[str, tuple[WoundSpan | Arc, ...]]
     pulleys: tuple[Pulley, ...]
     visuals: tuple[Visual, ...]
     lanes: Lanes
@@ -199,9 +199,9 @@ def _visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:
     return Visual(solid.name, int(solid.parentJoint), solid.geometry, placement, (red, green, blue, opacity))
 
 
-def _moved(pieces: tuple[Span | Arc, ...], place: pin.SE3, first: int) -> tuple[Span | Arc, ...]:
+def _moved(pieces: tuple[WoundSpan | Arc, ...], place: pin.SE3, first: int) -> tuple[WoundSpan | Arc, ...]:
     """Return the pieces of a finger's tendon as those of a hand, where its joints come after others."""
-    moved: list[Span | Arc] = []
+    moved: list[WoundSpan | Arc] = []
     for piece in pieces:
         if isinstance(piece, Arc):
             moved.append(replace(piece, joint=first + piece.joint))

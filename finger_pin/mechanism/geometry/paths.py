@@ -16,7 +16,7 @@ from finger_pin.mechanism.exchange.urdf import build_rigid_body
 from finger_pin.mechanism.geometry.cuts import Cut, Groove, cuts
 from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model, palm_of
 from finger_pin.mechanism.geometry.foreign import turned_model
-from finger_pin.mechanism.geometry.winding import Arc, Span
+from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
 from finger_pin.mechanism.rigid_body import RigidBody
 
 #: Drawn sag of a loose span in parts of its length, and lift of a loose arc off its pulley in parts of its radius.
@@ -161,10 +161,10 @@ class TendonGeometry:
         found = (cuts(self.model, name, pieces, groove) for name, pieces in self._pieces.items())
         return tuple(cut for each in found for cut in each)
 
-    def _place(self, piece: Span | Arc, q: Array, loose: Array, poses: LinkPoses) -> Array:
-        link = piece.link if isinstance(piece, Span) else piece.joint
+    def _place(self, piece: WoundSpan | Arc, q: Array, loose: Array, poses: LinkPoses) -> Array:
+        link = piece.link if isinstance(piece, WoundSpan) else piece.joint
         rotation, translation = poses.rotation[..., link, :, :], poses.translation[..., link, None, :]
-        if isinstance(piece, Span):
+        if isinstance(piece, WoundSpan):
             gravity = np.array(self.description.gravity)
             down = gravity / (np.linalg.norm(gravity) or 1.0)
             sag = (SAG * loose * piece.sag)[..., None] * down

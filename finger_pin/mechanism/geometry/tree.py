@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.tree import Solid
+from finger_pin.description.tree import TreeSolid
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.lanes import Lanes, joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath
@@ -163,7 +163,9 @@ def _surface(mesh: Mesh) -> coal.BVHModelBase:
     return found
 
 
-def _visuals(name: str, joint: int, frame: pin.SE3, solid: Solid, surface: coal.BVHModelBase | None) -> list[Visual]:
+def _visuals(
+    name: str, joint: int, frame: pin.SE3, solid: TreeSolid, surface: coal.BVHModelBase | None
+) -> list[Visual]:
     """Return a solid as boxes, cylinders, spheres and its surface, if it is a mesh."""
     place = frame * pin.SE3(rotation(solid.orientation), np.array(solid.position))
     colour = MATERIALS["shell"]

@@ -30,7 +30,7 @@ BASE_LEAD, LINK_LEAD = 2.5, 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
+class WoundSpan:
     """A straight piece.
 
     Attributes:
@@ -57,7 +57,7 @@ class Arc:
         turn: Turn of the path from entry to exit at theta = 0, rad.
         offset: Of each point along the joint axis, shape (P,), m.
         fraction: Of each point along the arc, 0 to 1, shape (P,).
-        distal: As for `Span`.
+        distal: As for `WoundSpan`.
     """
 
     joint: int
@@ -71,7 +71,7 @@ class Arc:
 
 def wind(
     description: FingerDescription, model: pin.Model, lanes: Lanes, tendon: str, resolution: int
-) -> tuple[Span | Arc, ...]:
+) -> tuple[WoundSpan | Arc, ...]:
     """Return the pieces of a tendon from its actuator or proximal anchor to its insertion.
 
     Args:
@@ -118,7 +118,7 @@ def wind(
     back = np.array([math.cos(entry[path[0]]), math.sin(entry[path[0]]), 0.0])
     placement = model.jointPlacements[path[0]]
     ends = np.array([placement.act(begin - start * back), placement.act(begin)])
-    pieces: list[Span | Arc] = [_span(path[0] - 1, ends, resolution, mass_link, whole=True)]
+    pieces: list[WoundSpan | Arc] = [_span(path[0] - 1, ends, resolution, mass_link, whole=True)]
     for j in path:
         offset = lanes.offset[tendon, j]
         if radius[j]:
@@ -170,10 +170,10 @@ def _mass_link(description: FingerDescription, tendon: str, crossed: list[int]) 
     return crossed[before - 1] if before else crossed[0] - 1
 
 
-def _span(link: int, ends: Array, resolution: int, mass_link: int, *, whole: bool) -> Span:
+def _span(link: int, ends: Array, resolution: int, mass_link: int, *, whole: bool) -> WoundSpan:
     # Not whole: without the first point, which the piece before has already.
     fraction = np.linspace(0.0, 1.0, max(3, resolution))[0 if whole else 1 :]
     points = ends[0] + fraction[:, None] * (ends[1] - ends[0])
     sag = 4.0 * fraction * (1.0 - fraction) * np.linalg.norm(ends[1] - ends[0])
     distal = fraction > 0.5 if link == mass_link else np.full(len(fraction), link > mass_link)
-    return Span(link, points, sag, distal)
+    return WoundSpan(link, points, sag, distal)

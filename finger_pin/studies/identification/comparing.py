@@ -25,7 +25,7 @@ _SHARES = (0.9, 0.7, 0.5, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LawComparison:
     """Laws side by side; lists by law.
 
     Attributes:
@@ -54,7 +54,7 @@ class Comparison:
         return cls(**table)
 
 
-def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> Comparison:
+def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> LawComparison:
     """Return the scenario's own law beside others.
 
     Args:
@@ -72,7 +72,7 @@ def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> Co
         values = dict(zip(law.keys[: law.asked], law.values(best.z).tolist(), strict=False))
         out = _held_out(law, best, found, folds)
         rows.append((name, law.asked, value, _scaled_rms(best.residuals, found.noise), out, values))
-    return Comparison(*(list(column) for column in zip(*rows, strict=True)))
+    return LawComparison(*(list(column) for column in zip(*rows, strict=True)))
 
 
 def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:

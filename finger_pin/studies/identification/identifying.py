@@ -17,13 +17,13 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
 from finger_pin.studies.fingerprint import finger_digest
-from finger_pin.studies.identification.comparing import Comparison, compare_laws
+from finger_pin.studies.identification.comparing import LawComparison, compare_laws
 from finger_pin.studies.identification.estimate import Fit, fit
 from finger_pin.studies.identification.intervals import Side, covariance, profile
 from finger_pin.studies.identification.ledger import Ledger, digest
 from finger_pin.studies.identification.motions import RecordedMotion, windows
 from finger_pin.studies.identification.outcome import outcome, write_outcome
-from finger_pin.studies.identification.problem import Model, Problem, Signal, Stopped
+from finger_pin.studies.identification.problem import Problem, RecordedSignal, RecordingModel, Stopped
 from finger_pin.studies.identification.readings import SteadyReadings
 from finger_pin.studies.identification.recordings import Recording, read_recording, unit_of
 
@@ -113,8 +113,8 @@ def build_problem(
     Raises:
         InputError: If an input or output names nothing of the scenario, or there are fewer readings than parameters.
     """
-    models: list[Model] = []
-    signals: list[Signal] = []
+    models: list[RecordingModel] = []
+    signals: list[RecordedSignal] = []
     for recording in taken:
         if recording.settings.kind == "steady":
             models.append(SteadyReadings(recording, scenario))
@@ -132,7 +132,7 @@ def build_problem(
     return Problem(scenario, tuple(settings.parameters), low, high, models, signals, {})
 
 
-def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.intp]) -> Signal:
+def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.intp]) -> RecordedSignal:
     later = recording.time[rows] - recording.time[rows[0]] >= recording.settings.settle
     there = np.flatnonzero(np.isfinite(values[rows]) & (later | (recording.settings.kind == "steady")))
     at = rows[there]
@@ -140,7 +140,9 @@ def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.int
     loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
     load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
     instant = np.arange(len(values), dtype=float) if steady else recording.time
-    return Signal(recording.name, name, unit_of(name), values[at], there, instant[at], load[at], ordered=not steady)
+    return RecordedSignal(
+        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], ordered=not steady
+    )
 
 
 class _Work:
@@ -152,7 +154,7 @@ class _Work:
         self.fits: list[Fit] = []
         self.sides: dict[tuple[int, int], Side] = {}
         self.spread: Array | None = None
-        self.comparison: Comparison | None = None
+        self.comparison: LawComparison | None = None
 
     @property
     def best(self) -> Fit:

@@ -17,7 +17,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.studies.identification.comparing import Comparison
+from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit, fit
 from finger_pin.studies.identification.intervals import Side
 from finger_pin.studies.identification.problem import Problem
@@ -94,8 +94,8 @@ class Ledger:
             self._done[name] = (found.end, found.path.tolist())
         return found
 
-    def comparison(self, work: Callable[[], Comparison]) -> Comparison:
+    def comparison(self, work: Callable[[], LawComparison]) -> LawComparison:
         """Return a comparison of laws."""
         if "comparison" not in self._done:
             self._done["comparison"] = work().plain()
-        return Comparison.of(self._done["comparison"])
+        return LawComparison.of(self._done["comparison"])

@@ -17,7 +17,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.simulation.motions import Motions
+from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.sensitivity import changed, nearby
@@ -172,7 +172,7 @@ class RecordedMotion:
         """Return the variables of the outputs with a delay, at the instants that they are of."""
         names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
-        motions = Motions(setup.loop, trajectory, times, tuple(names))
+        motions = SampledMotion(setup.loop, trajectory, times, tuple(names))
         return RunArrays(recorded(motions, tuple(names)), coordinates(setup.scenario, setup.loop, times), {})
 
     def _one(self, found: RunArrays, name: str) -> Array:

@@ -17,10 +17,10 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.files import replacing
 from finger_pin.simulation.netcdf import save
-from finger_pin.studies.identification.comparing import Comparison
+from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit
 from finger_pin.studies.identification.intervals import Side, free_directions
-from finger_pin.studies.identification.problem import Problem, Signal
+from finger_pin.studies.identification.problem import Problem, RecordedSignal
 from finger_pin.studies.keys import describe, split
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def outcome(
     fits: Sequence[Fit],
     sides: Mapping[tuple[int, int], Side],
     spread: Array | None,
-    comparison: Comparison | None,
+    comparison: LawComparison | None,
     unfinished: str = "",
 ) -> xr.Dataset:
     """Return the Dataset of an identification; what is not finished is not a number."""
@@ -173,7 +173,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
     }
 
 
-def _replicates(signal: Signal) -> float:
+def _replicates(signal: RecordedSignal) -> float:
     """Return the rms by which readings of the same load differ from their mean: what no law can explain."""
     if signal.ordered or not np.isfinite(signal.load).all():
         return math.nan

@@ -33,7 +33,7 @@ class Own:
 At = Callable[[Array], tuple[Scenario, dict[str, float]]]
 
 
-class Model(Protocol):
+class RecordingModel(Protocol):
     """A recording, or a part of it, beside a scenario."""
 
     @property
@@ -57,7 +57,7 @@ def own_number(own: Mapping[str, float], recording: str, output: str, what: str,
 
 
 @dataclass(frozen=True, eq=False)
-class Signal:
+class RecordedSignal:
     """An output of a recording.
 
     Attributes:
@@ -106,8 +106,8 @@ class Problem:
     keys: tuple[str, ...]
     low: Array
     high: Array
-    models: Sequence[Model]
-    signals: Sequence[Signal]
+    models: Sequence[RecordingModel]
+    signals: Sequence[RecordedSignal]
     held: Mapping[str, float]
     stop: Callable[[], bool] = lambda: False
     evaluations: int = 0
@@ -221,7 +221,7 @@ class Problem:
     def subset(self, kept: Sequence[NDArray[np.bool_]]) -> Problem:
         """Return the problem with some of the samples of every signal."""
         signals = [
-            Signal(s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.ordered)
+            RecordedSignal(s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.ordered)
             for s, k in zip(self.signals, kept, strict=True)
         ]
         asked = slice(0, self.asked)
