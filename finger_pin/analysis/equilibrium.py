@@ -1,4 +1,4 @@
-"""Where a finger comes to rest under given tensions."""
+"""Equilibria of a finger under given tensions."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ class FrictionLoop:
         return worst, torque, command
 
     def growth(self, position: Array, weights: Array, sliding: Array) -> Array:
-        """Return by how much a torque grows on its way around the loop, of m cases, shape (m,): a cheap ranking.
+        """Return the growth of a torque on its way around the loop, of m cases, shape (m,): a cheap ranking.
 
         A few turns of the loop without offsets and with passive tendons as planned, from the internal tensions. The
         closer a case is to self-locking the more it grows; 1 and above is no proof of locking, nor below 1 of none.

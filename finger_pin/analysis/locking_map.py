@@ -1,4 +1,4 @@
-"""Where in the workspace a finger locks itself, and what tension it needs to move slowly."""
+"""Self-locking over the workspace of a finger, and the tension of its slow motion."""
 
 from __future__ import annotations
 

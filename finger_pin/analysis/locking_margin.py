@@ -1,4 +1,4 @@
-"""How far a scenario stays from self-locking on its reference."""
+"""The margin of a scenario to self-locking on its reference."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NEARLY, _MOST, _HALVINGS = 0.95, 1e3, 8
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SelfLockingMargin(BriefRepr):
-    """How far a scenario stays from self-locking.
+    """The margin of a scenario to self-locking.
 
     Attributes:
         margin: Factor by which every M^c could be raised until the finger locks somewhere on its reference; infinite

@@ -1,4 +1,4 @@
-"""Whether law (9) can drive motion: micro-damping above what the viscous friction covers."""
+"""Passivity of law (9), which micro-damping beyond the viscous friction takes from it."""
 
 from __future__ import annotations
 

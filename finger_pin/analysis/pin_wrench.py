@@ -34,7 +34,7 @@ from finger_pin.mechanism.geometry import Groove, TendonGeometry
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PinWrench(BriefRepr):
-    """What the pins exert on what the joints carry, base frame, moments about the joints' origins; shapes (m, n, 3).
+    """Wrenches of the pins on the links that they carry, base frame, about the joints' origins; shapes (m, n, 3).
 
     Attributes:
         axis: Unit vectors of the joint axes.
@@ -109,7 +109,7 @@ def pin_wrench(
 
 @dataclass(frozen=True, eq=False)
 class _Links:
-    """Where the base (entry 0) and the links are, and what their motion asks of the joints, base frame.
+    """Places of the base (entry 0) and the links, and the wrenches that their motion needs, base frame.
 
     Attributes:
         rotation: Shape (m, n + 1, 3, 3).

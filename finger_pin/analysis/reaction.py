@@ -1,4 +1,4 @@
-"""How good the joint reaction (17) is along a result: against the whole force on the pins, part by part.
+"""The error of the joint reaction (17) along a result: against the whole force on the pins, part by part.
 
 R_j is the length of the pin's force P_j. Beside it stand what (17) does not know at all: the part of P_j along the
 axis, the thrust, and the moment across the axis, the tilt, a pair of forces whose size depends on the distance of the
@@ -67,7 +67,7 @@ class JointReactions(BriefRepr):
 
 @dataclass(frozen=True)
 class Difference:
-    """How a reaction differs from (17) over a result, in parts of the mean of (17).
+    """Differences of a reaction from (17) over a result, in parts of the mean of (17).
 
     Attributes:
         mean: Of the signed difference.
@@ -86,7 +86,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class ReactionDifference:
-    """What (17) misses at one joint.
+    """The error of (17) at one joint.
 
     Attributes:
         joint: Its name.

@@ -1,4 +1,4 @@
-"""What motors and gears do to tensions in slow motion: how much of a command arrives, and how much they can pull.
+"""Limits of motors and gears in slow motion: the share of a command that arrives, and the largest tension.
 
 A gearbox at the edge of sliding carries N = |x r f - tau| and takes c + m N of the motor's torque tau, with c = c0 + c1
 and m = m0 + m1. It pulls while tau - r f >= c + m N, and lets go from r f - tau >= c + m N on. With the two signs that

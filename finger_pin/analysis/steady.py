@@ -18,7 +18,7 @@ from finger_pin.mechanism.tendons import Tendons
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SteadyState(BriefRepr):
-    """What tendons deliver and motors draw while a finger's actuated tendons slide evenly; m states.
+    """Tensions and currents while a finger's actuated tendons slide evenly; m states.
 
     Attributes:
         tension: f, shape (m, a), N.

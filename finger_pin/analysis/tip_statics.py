@@ -1,4 +1,4 @@
-"""What a fingertip can push with: the forces within tension limits, and the tensions that a force needs.
+"""Statics of a fingertip that pushes: forces within tension limits, and the tensions that a force needs.
 
 At rest at theta, with E = -F the force that the fingertip exerts on what it touches, (18) reads
 
@@ -46,7 +46,7 @@ _UNTURNED = 1e-9
 
 
 class Friction(Enum):
-    """How friction acts on a finger that pushes; see the module."""
+    """The part of friction in a finger that pushes; see the module."""
 
     NONE = "none"
     HELPING = "helping"

@@ -1,4 +1,4 @@
-"""What share of its command a tendon delivers, by posture: the capstan law that (9), (14) and (16) make.
+"""The share of its command that a tendon delivers, by posture: the capstan law that (9), (14) and (16) make.
 
 A tendon that slides at speed v settles where f = f^a - f^f, f^f = (f + f^a) M s + b v, with s the sign of v, so that
 
@@ -193,7 +193,7 @@ def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> Transmissi
 
 
 def _since_reversal(time: Array, speed: Array) -> Array:
-    """Return by how much each column has slid since its sign last changed, shape (m, t), m."""
+    """Return the distance that each tendon has slid since its velocity last changed sign, shape (m, t), m."""
     path = np.concatenate(
         [
             np.zeros((1, speed.shape[1])),

@@ -1,4 +1,4 @@
-"""What a command line does: one file per command, joined by `application`."""
+"""The commands of the command line: one file each, joined by `application`."""
 
 import gc
 import os

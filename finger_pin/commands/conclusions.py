@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What measures, judges and draws one conclusion; the name of its figure, its runs, and what refuses a scenario."""
+    """One conclusion: the functions that measure, judge and draw it, its figure, its runs, its check of scenarios."""
 
     measure: Callable[..., Any]
     judge: Callable[[Any], list[Finding]]
@@ -69,7 +69,7 @@ def conclusions(
 
 
 def experiments(chosen: str) -> list[Experiment]:
-    """Return what measures, judges and draws the chosen conclusions."""
+    """Return the chosen conclusions."""
     from finger_pin.studies import conclusions as e
     from finger_pin.views import plots as p
 

@@ -1,4 +1,4 @@
-"""What commands share that make a study of many runs: a bar, Ctrl-C, a figure, a summary."""
+"""The frame of commands that make a study of many runs: a bar, Ctrl-C, a figure, a summary."""
 
 from __future__ import annotations
 

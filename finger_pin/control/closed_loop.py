@@ -202,7 +202,7 @@ class ClosedLoop:
         return LoopSignals(reference, control, evaluate(x, *acting))
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
-        """Return what is desired and planned, and what acts: inputs of the mechanism, F, and how palm or objects move.
+        """Return reference and plan, and what acts: inputs of the mechanism, F, the motion of palm or objects.
 
         Inputs are tensions, voltages of motors in position drive, inputs of a tree.
         """

@@ -34,7 +34,7 @@ class Bindings:
     stepper: Stepper | None = None
 
     def evaluating(self, finger: Finger) -> CompiledFinger:
-        """Return what evaluates a finger."""
+        """Return the compiled evaluator of a finger."""
         if self.dynamics is None or not self.dynamics.renew(finger):
             self.dynamics = CompiledFinger(finger)
         return self.dynamics
@@ -50,7 +50,7 @@ class Bindings:
         rtol: float,
         atol_scale: float,
     ) -> Stepper:
-        """Return what steps a finger under inputs, from a packed state on.
+        """Return the stepper of a finger under inputs, from a packed state on.
 
         Args:
             finger: The finger.

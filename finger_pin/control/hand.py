@@ -59,7 +59,7 @@ class HandController(LoopController):
             controller.sense({name: readings[name][places] for name, places in of.items()}, elapsed)
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return what any of them follows."""
+        """Return the signals that any of them follows."""
         return tuple(signal for each in self.controllers for signal in each.signals())
 
     def without_memory(self) -> HandController | None:

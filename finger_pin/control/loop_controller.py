@@ -1,4 +1,4 @@
-"""What a loop asks of its controller, besides its commands."""
+"""The controller of a loop: its commands, and its answers to those who run it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class LoopController(ABC):
         """Take what sensors read, by their names, ``tendon_tension`` among them, and the time since the last, s."""
 
     def measured(self, name: str, times: Array) -> Array:
-        """Return what a sensor has read last at times (m,), shape (m,) or (m, k); of one that is sampled."""
+        """Return the last readings of a sensor at times (m,), shape (m,) or (m, k); of a sampled controller."""
         raise LookupError(name)
 
     def as_control(self, reference: LoopReference, finger: Finger) -> Control | None:
@@ -57,7 +57,7 @@ class LoopController(ABC):
         return ()
 
     def without_memory(self) -> LoopController | None:
-        """Return what answers alike however often it is asked, for the start; None if nothing does."""
+        """Return a controller without memory, which may be asked for the start; None if there is none."""
         return None
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What a sampled controller measures: sensors, read in order, sample by sample, and recorded."""
+"""Sensors of a sampled controller, read in order, sample by sample, and recorded."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """What a finger does at a sample, under the tensions that act until then.
+    """A finger at a sample, under the tensions that act until then.
 
     Attributes:
         loop: The finger under control.
@@ -71,7 +71,7 @@ class SampledSensor(ABC):
 
 
 def readings(sensors: Sequence[SampledSensor], now: Instant) -> dict[str, Array]:
-    """Return what sensors read, by their names.
+    """Return the readings of sensors, by their names.
 
     Raises:
         InputError: If two have the same name, or one reads another number of values than it has names for.

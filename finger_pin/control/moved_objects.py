@@ -16,7 +16,7 @@ from finger_pin.references.signal import Signal
 
 @dataclass(frozen=True, eq=False)
 class Guides:
-    """Where k objects are moved.
+    """The paths of k objects.
 
     Attributes:
         signal: Of each its displacement along x, y, z, m, and three turns, which are zero: 6 k functions of time.

@@ -15,7 +15,7 @@ from finger_pin.references.signal import Signal
 
 @dataclass(frozen=True, eq=False)
 class PalmPath:
-    """Where the palm is, and what its frame sees.
+    """The path of the palm, and the inertial forces in its frame.
 
     Attributes:
         signal: x, y, z, m, and roll, pitch, yaw, rad, over time.

@@ -26,7 +26,7 @@ from finger_pin.references.signal import Signal
 
 
 class DriveSignals(Protocol):
-    """What motors in position drive are given over time.
+    """The voltages of motors in position drive over time.
 
     Attributes:
         channels: The inputs that are voltages, shape (m,).
@@ -39,7 +39,7 @@ class DriveSignals(Protocol):
         """The loops as arrays that work the voltages out; None where these are given."""
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
-        """Return what is asked for."""
+        """Return the commands as they are recorded."""
 
     def voltages(self, time: Array | float) -> Array:
         """Return the voltages at one time, shape (m,), or at times (k,), shape (k, m), V."""
@@ -59,7 +59,7 @@ class GivenVoltages:
     compiled: None = None
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
-        """Return what is asked for."""
+        """Return the commands as they are recorded."""
         return control
 
     def voltages(self, time: Array | float) -> Array:
@@ -105,7 +105,7 @@ class PositionDrives:
         self.compiled = build_drives(finger, goals)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
-        """Return what is asked for, with what the goals are made of in place of what errors ask for."""
+        """Return the commands, in which the tensions of the goals replace those that errors ask for."""
         plan = self._controller.command(time, reference, reference.position, reference.velocity)
         if self._positioned.all():
             return plan
@@ -113,7 +113,7 @@ class PositionDrives:
         return replace(control, tension=np.where(chosen, plan.tension, control.tension))
 
     def voltages(self, time: Array | float) -> Array:
-        """Return what was held at one time, or at times (m,), by motor, V; an instant belongs to its sample."""
+        """Return the voltages held at one time, or at times (m,), by motor, V; an instant belongs to its sample."""
         index = np.floor(np.asarray(time) / self.compiled.period * (1.0 + 1e-12)).astype(int)
         held: Array = self.compiled.voltages[np.clip(index, 0, len(self.compiled.voltages) - 1)]
         return held

@@ -22,7 +22,7 @@ from finger_pin.references.reference import LoopReference, ReferenceSignals
 
 @dataclass(frozen=True, eq=False)
 class ControlSignals:
-    """What a controller asks for.
+    """The commands of a controller.
 
     Attributes:
         torque: tau^d, shape (..., n), N m.

@@ -74,7 +74,7 @@ class SampledController(LoopController):
         return ControlSignals(torques[index], tensions[index], shortfall)
 
     def measured(self, name: str, times: Array) -> Array:
-        """Return what a sensor has read last at times (m,), shape (m,) or (m, k)."""
+        """Return the last readings of a sensor at times (m,), shape (m,) or (m, k)."""
         found = np.array([each[name] for each in self._readings])
         held: Array = found[np.minimum(np.floor(times / self.period * (1.0 + 1e-12)).astype(int), len(found) - 1)]
         return held

@@ -1,1 +1,1 @@
-"""What a user writes: TOML files, read into frozen and checked data, and those that ship."""
+"""Descriptions: TOML files of a user's, read into frozen and checked data, and those that ship."""

@@ -24,7 +24,7 @@ from finger_pin.description.validation import (
 
 
 class DataSheet(Description):
-    """What a maker's sheet says; K_t, R and c0 follow, and both its ends come out exactly."""
+    """A maker's data sheet; K_t, R and c0 follow, and both its ends come out exactly."""
 
     stall_torque: Annotated[float, real(0.0, 1e4, above=True, hint=" N m (is it in kg cm?)")] = quantity(
         ..., unit="N m", source="maker's sheet", doc="T_s, at the voltage."
@@ -76,7 +76,7 @@ class GearFriction(Description):
 
 
 class Encoder(Description):
-    """What a position drive knows of its spool."""
+    """The encoder of a position drive, on its spool."""
 
     range: Annotated[tuple[float, float], vector(2, -1e6, 1e6)] = quantity(
         ..., unit="rad", source="maker's sheet", doc="Least and largest angle that it can be told to go to."
@@ -93,7 +93,7 @@ class Encoder(Description):
 
 
 class Winding(Description):
-    """How a winding warms up: C T' = R i^2 - (T - T_a) / R_th, with C = time_constant / R_th."""
+    """The thermal model of a winding: C T' = R i^2 - (T - T_a) / R_th, with C = time_constant / R_th."""
 
     thermal_resistance: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
         ..., unit="K/W", source="maker's sheet", doc="R_th, from the winding to what surrounds the motor."

@@ -1,4 +1,4 @@
-"""What a result says of its scenario, for those who draw it: the finger or hand, and the objects around it."""
+"""The scenario within a result, for those who draw it: the finger or hand, and the objects around it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from finger_pin.exceptions import InputError
 
 
 class Embedded(NamedTuple):
-    """What a result is of.
+    """The subject of a result.
 
     Attributes:
         finger: The finger, or all fingers of a hand together.
@@ -35,7 +35,7 @@ def embedded(scenario: Scenario) -> dict[str, str]:
 
 
 def described(attributes: Mapping[Any, Any]) -> Embedded:
-    """Return what a result is of, given its attributes.
+    """Return the subject of a result, given its attributes.
 
     Raises:
         InputError: If they do not say.

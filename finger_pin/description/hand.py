@@ -60,7 +60,7 @@ class PathSignal(SignalSettings):
 
 
 class Palm(Description):
-    """What the fingers stand on: the base frame of the hand, at rest or moved along a path."""
+    """The palm, on which fingers stand: the base frame of the hand, at rest or moved along a path."""
 
     size: Annotated[tuple[float, float, float], vector(3, 0.0, 2.0, _MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Sides of the box that is drawn; zero for none."

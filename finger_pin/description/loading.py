@@ -222,7 +222,7 @@ def _depth_limited(what: str) -> Iterator[None]:
 
 
 def _plain(value: Any, long: list[str]) -> Any:
-    """Return what TOML holds; long series are put aside, and their place says at which index.
+    """Return a value for TOML; long series are put aside, and their place says at which index.
 
     Times that a neighbour has already are that neighbour's name.
     """

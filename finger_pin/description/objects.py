@@ -104,7 +104,7 @@ class Object(Description):
 
     @property
     def pose(self) -> Array:
-        """Where it starts: x, y, z, m, and its quaternion, shape (7,)."""
+        """The pose at the start: x, y, z, m, and the quaternion, shape (7,)."""
         return np.append(self.position, self.quaternion)
 
     @property

@@ -124,7 +124,7 @@ class Joint(Description):
 
 
 class Crossing(Description):
-    """How a tendon crosses a joint: winding radius (3) and whether the joint bends its path (15)."""
+    """The crossing of a tendon over a joint: winding radius (3) and whether the joint bends its path (15)."""
 
     radius: Annotated[float, real(-0.5, 0.5, hint=_MILLIMETRES)] = quantity(
         ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."

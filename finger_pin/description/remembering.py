@@ -1,4 +1,4 @@
-"""What has been made of the same parts before: descriptions are frozen, so that the same object says the same."""
+"""A memory of things made of descriptions, which are frozen: the same object makes the same thing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Remembered(Generic[_Made]):
         self._lock = Lock()
 
     def of(self, parts: tuple[object, ...], make: Callable[[], _Made]) -> _Made:
-        """Return what is made of parts; anew only if it was not made of the same before, or long ago."""
+        """Return the thing made of parts; anew only if it was not made of the same before, or long ago."""
         key = tuple(id(part) if isinstance(part, BaseModel) else part for part in parts)
         found = self._known.get(key)
         if found is None:

@@ -71,7 +71,7 @@ class ReferenceSettings(Description):
 
 
 class EnvironmentSettings(Description):
-    """What acts on the finger from outside; of a hand on every finger, unless its table in ``fingers`` says otherwise.
+    """Forces and objects outside the finger; of a hand for every finger, unless ``fingers`` says otherwise.
 
     In a file, ``fingertip_force_file`` names a CSV file: its columns are ``time`` and some of ``x``, ``y``, ``z``, and
     become samples of ``fingertip_force_signal``.
@@ -93,7 +93,7 @@ class EnvironmentSettings(Description):
 
 
 class InitialSettings(Description):
-    """Where the joints start; the rest of the state follows: bristles relaxed, passive tendons taut in between."""
+    """The start of the joints; the rest of the state follows: bristles relaxed, passive tendons taut in between."""
 
     position: dict[FullName, Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)]] = quantity(
         {}, unit="rad", source="chosen", doc="theta(0) by joint; a joint left out starts on its reference."
@@ -107,7 +107,7 @@ class InitialSettings(Description):
 
 
 class SimulationSettings(Description):
-    """How long, how finely sampled and how accurately to integrate."""
+    """Duration, sample rate, integrator and tolerances of a run."""
 
     duration: Annotated[float, real(0.0, 1e6, above=True)] = quantity(8.0, unit="s", source="chosen", doc="Length.")
     sample_rate: Annotated[float, real(0.0, 1e7, above=True)] = quantity(

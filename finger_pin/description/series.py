@@ -30,7 +30,7 @@ class Series(Sequence[float]):
         return np.array(self._values, dtype=dtype, copy=copy)
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of samples."""
         return len(self._values)
 
     @overload

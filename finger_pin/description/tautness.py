@@ -1,4 +1,4 @@
-"""Whether springs at the joints keep all tendons taut in fingers without force closure."""
+"""Tautness of fingers without force closure, whose tendons springs at the joints keep taut."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from finger_pin.description.routing import Array, Routing
 
 @dataclass(frozen=True, eq=False)
 class Tautness:
-    """How far above their minimum all tendons can be where the springs help least.
+    """The least excess of all tensions over their minimum, where the springs help least.
 
     At rest the tendons balance the springs, H_c^T f = k (theta - theta_0); gravity is left out. The torques that
     tensions of at least f0 exert are a convex set, and the torque of the springs is affine in the posture. So the

@@ -34,7 +34,7 @@ Pair = tuple[float, float]
 
 
 class TreeSolid(Description):
-    """What is seen of a body."""
+    """A solid of a body, for pictures."""
 
     kind: Annotated[
         Literal["sphere", "capsule", "cylinder", "box", "mesh"], choice("sphere", "capsule", "cylinder", "box", "mesh")
@@ -91,7 +91,7 @@ class Body(Description):
 
 
 class TreeJoint(Description):
-    """How a body moves on its parent; a body with several joints has them one after the other."""
+    """A joint of a body on its parent; a body with several joints has them one after the other."""
 
     body: Name = Field(description="The body that moves.")
     kind: Annotated[Literal["hinge", "slide"], choice("hinge", "slide")] = quantity(
@@ -167,7 +167,7 @@ class Coupling(Description):
 
 
 class TreeActuator(Description):
-    """What drives a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length."""
+    """The drive of a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length."""
 
     joint: Name | None = Field(None, description="The joint that it drives.")
     tendon: Name | None = Field(None, description="The tendon that it drives.")

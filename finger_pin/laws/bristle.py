@@ -135,7 +135,7 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
 
 
 def bristle_account(speed: Any, stiction: Any, rate: Any, level: Any, stiffness: Any, viscous: Any, lag: Any) -> Any:
-    """Return what the bristles store, and what is lost by sliding, in viscous friction and in micro-damping."""
+    """Return the energy of the bristles, and the powers lost by sliding, in viscous friction and in micro-damping."""
     return (
         bristle_energy(stiction, stiffness),
         coulomb_loss(stiction, speed, level),

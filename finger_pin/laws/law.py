@@ -1,4 +1,4 @@
-"""What a law is: how a row of the mechanism turns its motion, its state and its load into a force.
+"""Laws: the force of a row of the mechanism as a function of its motion, its state and its load.
 
 The force acts along the row's arm: positive drives its length up. All functions of a law are pure functions of numbers
 or arrays; NumPy runs them as they are, and the compiler runs the same text.
@@ -14,7 +14,7 @@ import numpy as np
 
 
 class Row(NamedTuple):
-    """What a row sees: numbers, or arrays that broadcast.
+    """The arguments of a law: numbers, or arrays that broadcast.
 
     Attributes:
         length: l, along the path; excursion from a reference posture.
@@ -75,7 +75,7 @@ class Law:
     states: ClassVar[int] = 1
 
     def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Row:
-        """Return what rows see, shape (..., k) each."""
+        """Return the arguments of the law for rows, shape (..., k) each."""
         return Row(length, speed, state, load, command, curvature)
 
     def act(self, row: Row, p: Any) -> tuple[Any, Any, tuple[Any, ...]]:
@@ -89,7 +89,7 @@ class Law:
 
 
 class Touch(NamedTuple):
-    """What a contact of two bodies sees: numbers, or arrays that broadcast.
+    """The arguments of the law of a contact of two bodies: numbers, or arrays that broadcast.
 
     Attributes:
         gap: Signed distance of the surfaces, m; negative where they penetrate.
@@ -144,7 +144,7 @@ class ContactLaw:
     states: ClassVar[int] = 2
 
     def sees(self, length: Any, speed: Any, state: Any, load: Any, command: Any, curvature: Any) -> Touch:
-        """Return what contacts see; arms stand side by side, shape (..., 3 k), and so do states, shape (..., 2 k)."""
+        """Return the arguments for contacts; arms stand side by side, shape (..., 3 k), as states do, (..., 2 k)."""
         slips = (speed[..., each::3] for each in range(3))
         return Touch(length[..., ::3], *slips, *(state[..., each::2] for each in range(2)))
 

@@ -10,7 +10,7 @@ from finger_pin.laws.law import Law, Row, beyond
 
 
 def penetration(position: Any, lower: Any, upper: Any) -> Any:
-    """Return how far a joint is beyond its range, positive above the upper limit, negative below the lower one."""
+    """Return the depth of a joint beyond its range, positive above the upper limit, negative below the lower one."""
     return np.maximum(position - upper, 0.0) - np.maximum(lower - position, 0.0)
 
 

@@ -143,11 +143,11 @@ class Actuators:
 
     @property
     def held(self) -> NDArray[np.intp]:
-        """Which of the tendons hold a part of their tension, shape (h,)."""
+        """The tendons that hold a part of their tension, shape (h,)."""
         return np.flatnonzero(self.hysteresis)
 
     def _wired(self, weights: Array) -> dict[str, Array]:
-        """Return how later rows see the elastic tendons' tensions, by table, from weights of shape (..., k)."""
+        """Return weights of the elastic tendons' tensions in later rows, by table, from weights of shape (..., k)."""
         held = {"tendon_hysteresis": weights[..., self.held]} if self.held.size else {}
         return {"elastic_tendons": weights, **held}
 

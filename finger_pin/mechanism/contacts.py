@@ -1,4 +1,4 @@
-"""What may touch what: the table of contacts between the solids of a scene."""
+"""The table of contacts between the solids of a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What evaluating a mechanism gives."""
+"""Evaluations of a mechanism."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from finger_pin.mechanism.rows import RowSignals
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """What contacts do in space, base frame; zero where they are open. Shapes (..., c, 3).
+    """Contacts in space, base frame; zero where they are open. Shapes (..., c, 3).
 
     Attributes:
         force: On the second body of the pair, N.

@@ -1,4 +1,4 @@
-"""By how much tendons are drawn in at a posture: around pulleys by (3), along paths of a tree by their lengths."""
+"""Excursions of tendons at a posture: around pulleys by (3), along paths of a tree by their lengths."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Excursions:
             self._along = {k: names.index(tendon.along) for k, tendon in tendons if tendon.along is not None}
 
     def lengths(self, position: Array) -> Array:
-        """Return how far the tendons are drawn in at theta, shape (..., n): shape (..., t), m."""
+        """Return the excursions of the tendons at theta, shape (..., n): shape (..., t), m."""
         drawn = np.asarray(position @ self._coupling.T)
         if self._paths is not None:
             lengths = self._paths.length(self._rest) - self._paths.length(position)

@@ -1,4 +1,4 @@
-"""Where two bodies touch: the parts of one that meet the whole other one, either way round.
+"""Contacts of two bodies: the parts of one that meet the whole other one, either way round.
 
 A part is a convex piece of a body (a corner, an edge, a rim), and its contact is its distance from the other body: a
 distance of two convex bodies. So it depends smoothly on how both are placed and changes by no more than the material

@@ -280,7 +280,7 @@ class Finger:
         return self._excursions.lengths(position)[..., : self.routing.actuated]
 
     def _pulled_torque(self, x: Array, pulling: RowSignals) -> Array:
-        """Return what driven or elastic tendons exert, shape (..., n), N m."""
+        """Return the torque of driven or elastic tendons, shape (..., n), N m."""
         joints = len(self.routing.joints)
         if not pulling.rows.routed:
             return combined(pulling.force, pulling.rows.arm)[..., :joints]
@@ -296,7 +296,7 @@ class Finger:
         return np.stack(list(found.account()[1].values()), axis=-1), found.external
 
     def static_torque(self, position: Array) -> Array:
-        """Return what tendons have to exert at rest at theta, shape (n,): G and the springs' torque, N m."""
+        """Return the torque that holds the finger at rest at theta, shape (n,): G and the springs' torque, N m."""
         return self.rigid_body.gravity_torque(position) + self.springs.torque(position, np.zeros_like(position))
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:

@@ -1,4 +1,4 @@
-"""What a finger does at a state, by the names of the paper."""
+"""The signals of a finger at a state, by the names of the paper."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_frictio
 
 @dataclass(frozen=True, eq=False)
 class TendonForces:
-    """What the tendons do; shapes (..., t) unless said otherwise.
+    """Signals of the tendons; shapes (..., t) unless said otherwise.
 
     Attributes:
         curvature: phi, rad, (15).
@@ -46,7 +46,7 @@ class TendonForces:
 
 @dataclass(frozen=True, eq=False)
 class JointForces:
-    """What the joints' friction does; shapes (..., n).
+    """Signals of the joints' friction; shapes (..., n).
 
     Attributes:
         reaction: R, N, (17).
@@ -63,7 +63,7 @@ class JointForces:
 
 @dataclass(frozen=True, eq=False)
 class MotorForces:
-    """What the motors do; shapes (..., m).
+    """Signals of the motors; shapes (..., m).
 
     Attributes:
         current: i, A.

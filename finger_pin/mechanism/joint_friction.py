@@ -87,7 +87,7 @@ class JointFriction:
 
 
 def bristles(law: JointFrictionSettings | TendonFrictionSettings, size: int) -> dict[str, Array]:
-    """Return what friction of tendons and of joints has alike, by the laws' names, a number for each of ``size``."""
+    """Return the numbers that friction of tendons and of joints share, by the laws' names, one for each of ``size``."""
     names = ("stiffness", "viscous", "stribeck_velocity", "floor", "stribeck_exponent")
     found: dict[str, Array] = {name: expand(getattr(law, name), size) for name in names}
     return found | {"lag": expand(law.micro_damping, size) / found["stiffness"]}

@@ -1,4 +1,4 @@
-"""What a rigid body's positions and velocities give: tips, directions of links, energies."""
+"""Kinematics of a rigid body: tips, directions of links, energies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Kinematics:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Where the fingertip is and what energy the rigid body has; leading dimensions are kept.
+    """Place of the fingertip and energies of the rigid body; leading dimensions are kept.
 
     Attributes:
         tip: p, shape (..., 3), m; of several shape (..., t, 3).

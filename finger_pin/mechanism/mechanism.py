@@ -224,7 +224,7 @@ class Mechanism:
         return np.broadcast_to(given[..., None, :] if one else given, (*lead, tips, 3))
 
     def _routed(self, table: Rows, q: Array) -> Reach:
-        """Return what paths through space add to the rows of a table, shape (..., k) and (..., k, N)."""
+        """Return lengths, turns and arms of paths through space for a table, shape (..., k) and (..., k, N)."""
         if not table.routed:
             return Reach(*np.zeros((4, 1)))
         if q.ndim == 1:
@@ -233,7 +233,7 @@ class Mechanism:
         return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
 
     def _inertial(self, q: Array, v: Array, base: Array) -> Array:
-        """Return what a base that moves adds to the torques of one at rest under gravity, shape (..., n)."""
+        """Return the inertial torques of a base that moves, less those of one at rest under gravity, shape (..., n)."""
         if q.ndim > 1:
             return np.array([self._inertial(*each) for each in zip(q, v, base, strict=True)])
         still = np.zeros_like(v)
@@ -276,7 +276,7 @@ class Mechanism:
         return np.where(table.pins >= 0, magnitude, np.abs(load))
 
     def _passing(self, paths: Paths, pins: NDArray[np.int64]) -> Array:
-        """Return how often a force on the first body of every path, and its reaction, pass each pin, shape (k, m)."""
+        """Return how many times a force on the first body of every path, less its reaction, passes each pin, (k, m)."""
         supports = [set(each) for each in self.body.model.supports]
         pieces = [legs[0].piece for legs in paths]
         pairs = [[(pin + 1 in supports[p.ends[0].joint], pin + 1 in supports[p.joint]) for p in pieces] for pin in pins]

@@ -21,7 +21,7 @@ from finger_pin.mechanism.rigid_body import RigidBody
 
 
 class PieceShape(Protocol):
-    """What a piece is, seen from its own frame: a span of a tendon, or a gap between surfaces.
+    """The form of a piece, seen from its own frame: a span of a tendon, or a gap between surfaces.
 
     Attributes:
         parameters: Names of its numbers.
@@ -83,7 +83,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """What a piece adds to a row.
+    """The use of a piece by a row.
 
     Attributes:
         piece: The piece.
@@ -122,7 +122,7 @@ def moved(paths: Paths, shift: int) -> tuple[tuple[Leg, ...], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """What paths add to the rows of a table at one posture; k rows, N coordinates.
+    """Lengths, arms and turns of paths for the rows of a table at one posture; k rows, N coordinates.
 
     Attributes:
         length: Shape (k,).
@@ -138,7 +138,7 @@ class Reach:
 
 
 def reach(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> Reach:
-    """Return what paths add to their rows at q, shape (nq,): lengths, arms and turns."""
+    """Return lengths, arms and turns of paths for their rows at q, shape (nq,)."""
     width = int(body.model.nv)
     placements, twists = body.placements(q)
 
@@ -176,7 +176,7 @@ def reach(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> Reach:
 
 
 def _value(piece: Piece, frame: pin.SE3, points: Sequence[Array]) -> Array:
-    """Return what the shape says; out of reach, a gap that is open."""
+    """Return the value of the shape; out of reach, a gap that is open."""
     y = np.concatenate([frame.actInv(point) for point in points])
     out = np.zeros(16)
     beyond = np.linalg.norm(0.5 * (y[:3] + y[3:])) - piece.reach

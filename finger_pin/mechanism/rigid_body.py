@@ -81,7 +81,7 @@ class RigidBody:
         return self._own.data
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy has: not the memory of threads."""
+        """Return the contents of a copy: not the memory of threads."""
         return {name: value for name, value in vars(self).items() if name != "_own"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -197,7 +197,7 @@ class RigidBody:
         return self._of_tips([np.reshape(each, (6, -1))[:3] for each in found], 3, model.nv)
 
     def _of_tips(self, found: list[Array], *shape: int) -> Array:
-        """Return what was found at the tips, of the given shape each; of one tip without a dimension for it."""
+        """Return values at the tips, of the given shape each; of one tip without a dimension for it."""
         return np.array(found).reshape(shape if len(found) == 1 else (len(found), *shape))
 
     def mass_matrix(self, q: Array) -> Array:
@@ -223,7 +223,7 @@ class RigidBody:
         return np.array([self.forward_dynamics(*each) for each in zip(q, v, torque, strict=True)])
 
     def base_dynamics(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array]:
-        """Return what moves a base and the joints on it as given: a wrench and torques, by Newton-Euler.
+        """Return the wrench and the torques that move a base and the joints on it as given, by Newton-Euler.
 
         Args:
             q: Shape (n,).
@@ -266,7 +266,7 @@ class RigidBody:
         return np.outer(np.array(self._data.mass)[1:], self.model.gravity.linear)
 
     def kinematics(self, q: Array, v: Array, base: Array | None = None) -> Kinematics:
-        """Return what follows from position and velocity, for shapes (..., n).
+        """Return kinematics and energies at positions and velocities, for shapes (..., n).
 
         With a base that moves, (..., 15) or more numbers of `laws.palm`, energies are those of the motion in the world,
         where the base has no height; all else is as seen from the base.

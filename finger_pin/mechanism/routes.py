@@ -18,7 +18,7 @@ from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 
 @dataclass(frozen=True)
 class Placed:
-    """Where a body stands.
+    """The place of a body.
 
     Attributes:
         joint: Index of the joint that carries it in Pinocchio's model, 0 for the base.
@@ -35,7 +35,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """What a tendon's length is made of; L = coefficients q + the lengths of its legs.
+    """The parts of a tendon's length; L = coefficients q + the lengths of its legs.
 
     Attributes:
         coefficients: Shape (n,).
@@ -78,7 +78,7 @@ class Routes:
 
     @property
     def fixed(self) -> Array:
-        """What of dL/dq does not depend on the posture, shape (t, n)."""
+        """The part of dL/dq that does not depend on the posture, shape (t, n)."""
         rows = [route.coefficients for route in self.routes.values()]
         return np.array(rows).reshape(-1, int(self.body.model.nv))
 

@@ -139,7 +139,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class RowSignals:
-    """What the rows of one table do; every array has shape (..., k).
+    """Signals of the rows of one table; every array has shape (..., k).
 
     Attributes:
         rows: The table.

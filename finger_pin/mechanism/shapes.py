@@ -1,4 +1,4 @@
-"""What a finger looks like: phalanges, hinge pulleys, a soft fingertip and a palm, from primitives only.
+"""Shapes of a finger: phalanges, hinge pulleys, a soft fingertip and a palm, from primitives only.
 
 Sizes follow from the description, so that a finger of other links or tendons looks like itself. Frames are
 those of the URDF: a link starts at its joint, whose axis is z, and runs along x.

@@ -1,4 +1,4 @@
-"""What stands around a finger: objects, free ones as further bodies, and all contacts."""
+"""Surroundings of a finger: objects, free ones as further bodies, and all contacts."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Surroundings:
         return kinetic, -np.sum(places * gravity, axis=-1) @ self.mass
 
     def touching(self, state: State, force: Array) -> Touching:
-        """Return what contacts do in space.
+        """Return forces, points and normals of contacts in space.
 
         Args:
             state: m states.

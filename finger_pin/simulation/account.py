@@ -99,7 +99,7 @@ def _suspected(ends: Array, times: Array, residual: Array) -> NDArray[np.int64]:
 
 
 def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
-    """Return where to halve steps, and halves of them, until no work of one is wrong by more than is allowed, J."""
+    """Return steps halved, and halved again, until no work of one is wrong by more than is allowed, J."""
     (ends, power), found = part, []
     begin, length = ends[steps], np.diff(ends)[steps]
     for _ in range(_HALVINGS):
@@ -113,7 +113,7 @@ def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
 
 
 def _quadrature_error(power: Callable[[Array], Array], begin: Array, length: Array) -> Array:
-    """Return by how much the integral of any power over steps may be wrong, shape (steps,), J."""
+    """Return the error of the integral of any power over steps, shape (steps,), J."""
     one = np.tensordot(_WEIGHTS, _over(power, begin, length, _NODES), (0, 1))
     other = np.tensordot(_CHECK_WEIGHTS, _over(power, begin, length, _CHECKS), (0, 1))
     return np.asarray(np.max(np.abs(one - other), axis=1))

@@ -1,4 +1,4 @@
-"""What a user should know of a run before trusting it: its own error, what rings in it, whether it fits in memory."""
+"""Warnings about a run: its own error, masses that ring in it, and memory that it does not fit into."""
 
 from __future__ import annotations
 
@@ -238,7 +238,7 @@ def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
 
 
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
-    """Return what rings undamped where a run took many short steps, and at which frequency; else empty.
+    """Return the mass that rings undamped where a run took many short steps, with its frequency; else empty.
 
     The modes are those of the Jacobian of the whole at the last state.
     """

@@ -70,7 +70,7 @@ class Convergence:
 
     @property
     def verdict(self) -> str:
-        """What a user should know, in a sentence or two."""
+        """The outcome for a user, in a sentence or two."""
         repeated = f"repeated at rtol {self.rtol:g}, atol_scale {self.atol_scale:g}"
         if self.parting_time is None:
             return f"Converged: {repeated}, the motion is the same within {self.largest.max():.1e} rad."

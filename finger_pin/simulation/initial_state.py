@@ -1,4 +1,4 @@
-"""Where a simulation starts: a packed state, or the last saved state of a result; and what of it is a user's own."""
+"""The start of a simulation: a packed state, or the last saved state of a result; and the parts of a user's own."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PARTS = {
 def own_parts(
     controller: object, reference: object, fingertip_force: object, initial: object, finger: object = None
 ) -> str:
-    """Return what of a simulation is a user's own, such as ``controller, reference``; empty for nothing.
+    """Return the parts of a simulation that are a user's own, such as ``controller, reference``; empty for none.
 
     Args:
         controller: As for `simulate`.

@@ -56,7 +56,7 @@ class CtrlC:
 
 
 def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
-    """Return what a run returns, given what it asks whether it is to stop.
+    """Return the result of a run, which is given the question whether it is to stop.
 
     Raises:
         Interrupted: After Ctrl-C or such a stop, with what the run has computed.

@@ -56,17 +56,17 @@ class SampledMotion:
 
     @cached_property
     def reference(self) -> ReferenceSignals:
-        """What was desired."""
+        """The reference."""
         return self.loop.reference.at(self.times)
 
     @cached_property
     def control(self) -> ControlSignals:
-        """What was planned."""
+        """The commands."""
         return self.signals.control
 
     @cached_property
     def contacts(self) -> dict[str, Array]:
-        """What contacts and free objects do."""
+        """Signals of contacts and free objects."""
         return contact_values(self.loop.finger, self.finger)
 
     @cached_property
@@ -76,7 +76,7 @@ class SampledMotion:
 
     @property
     def finger(self) -> FingerSignals:
-        """What the finger does, by the names of the paper."""
+        """Signals of the finger, by the names of the paper."""
         return self.signals.finger
 
     @cached_property
@@ -91,7 +91,7 @@ class SampledMotion:
 
     @cached_property
     def powers(self) -> Flows:
-        """What comes in and what is lost, W."""
+        """Powers supplied and lost, W."""
         return powers(self.finger)
 
     @cached_property

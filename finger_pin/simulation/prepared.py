@@ -98,7 +98,7 @@ class Prepared:
 
     @property
     def values(self) -> tuple[Any, ...]:
-        """What the scenario itself has there."""
+        """The scenario's own values there."""
         return self.family.values
 
     def scenario(self, values: Sequence[Any] | None = None) -> Scenario:

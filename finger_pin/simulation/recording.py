@@ -1,4 +1,4 @@
-"""What is recorded of a motion: variables of it, as arrays or as a Dataset."""
+"""Records of a motion: variables of it, as arrays or as a Dataset."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def record(
 
 
 def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
-    """Return what a result says of its run: how far it went, by which method, and what it took."""
+    """Return the attributes of a result about its run: how far it went, by which method, at which cost."""
     statistics = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,

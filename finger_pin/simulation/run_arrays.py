@@ -1,4 +1,4 @@
-"""What a prepared run returns: arrays of what was asked for, and no more."""
+"""Arrays of a prepared run: those that were asked for, and no more."""
 
 from __future__ import annotations
 

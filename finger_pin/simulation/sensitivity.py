@@ -36,7 +36,7 @@ _Made = TypeVar("_Made")
 def changed(
     values: Sequence[float], sizes: Sequence[float], make: Callable[[list[float]], _Made]
 ) -> tuple[list[_Made], Array]:
-    """Return what is made of values with one of them changed each, and the changes.
+    """Return the things made of values with one of them changed each, and the changes.
 
     At the edge of what is allowed a number is changed the other way.
 

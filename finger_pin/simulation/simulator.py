@@ -233,7 +233,7 @@ class Simulator:
         return self.finger.layout.unpack(stepper.x)
 
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:
-        """Return what has been run so far, as `simulate` does: for figures, the viewer and `save`.
+        """Return the Dataset of all steps so far, as `simulate` does: for figures, the viewer and `save`.
 
         The record begins at the start, or where `x` was last set. It takes about as long as the steps did: they are
         kept as what was held during them, and repeated bit by bit. The attribute ``own`` marks the result.

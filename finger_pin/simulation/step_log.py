@@ -1,4 +1,4 @@
-"""What a simulator was told, step by step: little to keep, and enough to repeat its run and record it."""
+"""The log of a simulator's inputs, step by step: little to keep, and enough to repeat its run and record it."""
 
 from __future__ import annotations
 

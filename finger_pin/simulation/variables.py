@@ -216,7 +216,7 @@ def _of_passive(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return what sensors of a sampled controller read, each held until the next sample."""
+    """Return the readings of a sampled controller's sensors, each held until the next sample."""
 
     def held(of: SampledMotion, name: str) -> Array:
         return of.loop.controller.measured(name, of.times)
@@ -233,7 +233,7 @@ def _measured(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _of_further(tables: tuple[Rows, ...]) -> dict[str, Quantity]:
-    """Return what rows of a user's own see and show, by table."""
+    """Return the signals of rows of a user's own, by table."""
 
     def seen(of: SampledMotion, group: str, name: str) -> Array:
         found = of.finger.mechanism.rows[group]

@@ -1,4 +1,4 @@
-"""What results and analyses look like: figures (`plots`), the viewer, the summary. All of it only reads."""
+"""Views of results and analyses: figures (`plots`), the viewer, the summary. All of it only reads."""
 
 import lazy_loader
 

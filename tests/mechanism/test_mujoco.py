@@ -247,7 +247,7 @@ def test_a_joint_without_a_link_is_an_error_that_names_it():
 @pytest.mark.parametrize("export", [to_mjcf, to_urdf])
 def test_what_is_no_finger_of_links_is_refused_by_name(export):
     tree = fp.from_mujoco(mujoco.MjModel.from_xml_string(ROUTED))
-    for given, entry, value in (("ub", "description", "str"), (tree, "finger.tree", tree.name)):
+    for given, entry, value in ((5, "description", "int"), (tree, "finger.tree", tree.name)):
         with pytest.raises(InputError) as caught:
             export(given)
         assert (caught.value.entry, caught.value.value) == (entry, value) and "\n" not in str(caught.value)

@@ -160,7 +160,7 @@ class _Reader:
         }
 
     def _solids(self, body: int) -> Table:
-        """Return what MuJoCo's viewer shows of a body, where it hides all, all; meshes only of what moves."""
+        """Return the geoms of a body that MuJoCo's viewer shows, where it hides all, all; meshes only of what moves."""
         model, kinds, found = self.model, self.mujoco.mjtGeom, {}
         own = np.flatnonzero(model.geom_bodyid == body)
         shown = own[model.geom_group[own] < _HIDDEN]

@@ -1,4 +1,4 @@
-"""What a MuJoCo model's flags switch off, in the model itself, so that nobody else has to ask for them."""
+"""Flags of a MuJoCo model, carried out in the model itself, so that nobody else has to ask for them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _set(bits: Any, value: int) -> set[str]:
 
 
 def disabled(mujoco: Any, model: Any) -> set[str]:
-    """Return what flags of a model disable, by the names that its XML has for them."""
+    """Return the flags that a model disables, by the names that its XML has for them."""
     found = _set(mujoco.mjtDisableBit, model.opt.disableflags)
     return found | (_CONSTRAINTS if "constraint" in found else set())
 

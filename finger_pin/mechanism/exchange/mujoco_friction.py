@@ -65,7 +65,7 @@ class PluginFriction:
 
     @property
     def least(self) -> float:
-        """What it is without load, N or N m."""
+        """The level without load, N or N m."""
         return max(self.law[5], self.law[8])
 
     def elements(self) -> Iterator[tuple[str, str, float]]:

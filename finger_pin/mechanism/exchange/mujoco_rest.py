@@ -1,4 +1,4 @@
-"""What a MuJoCo model has that is not carried over: listed, element by element, or refused by name."""
+"""Elements of a MuJoCo model that are not carried over: listed, or refused by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from finger_pin.mechanism.exchange.mujoco_flags import disabled, without_counter
 
 
 class Rest:
-    """What is left out of a model.
+    """Elements left out of a model.
 
     Attributes:
         mujoco: The module.
@@ -56,7 +56,7 @@ class Rest:
                 self.add(f"{what}: {count}")
 
     def listed(self) -> list[str]:
-        """Return what is left out, a line each."""
+        """Return the elements left out, a line each."""
         return list(dict.fromkeys(self._listed))
 
     def add(self, line: str) -> None:

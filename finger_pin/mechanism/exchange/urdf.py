@@ -142,7 +142,7 @@ def _links(description: FingerDescription) -> dict[str, Link]:
 
 
 def _shapes(description: FingerDescription, links: dict[str, Link]) -> dict[str, list[Shape]]:
-    """Return what is drawn of the links, by joint, of the palm and of the fingertip, by frame."""
+    """Return the shapes of the links, by joint, of the palm and of the fingertip, by frame."""
     first, last = next(iter(links)), next(reversed(links.values()))
     palm, pad = palm_shapes(description, first, links[first]), pad_shapes(last)
     return {BASE_FRAME: palm, **link_shapes(description, links), TIP_FRAME: pad}

@@ -74,7 +74,7 @@ def _inverse(a: float, b: float, c: float, d: float, e: float, f: float) -> Any:
 
 
 def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
-    """Return how the nearest point is free to move, and the inverse of its stiffness.
+    """Return the directions in which the nearest point is free to move, and the inverse of its stiffness.
 
     The directions are e, a unit vector along r, and one across; those that are not free are zero.
     """

@@ -1,4 +1,4 @@
-"""What a gap is: how far a part of one body is from the shape of another."""
+"""Gaps: distances of parts of one body from the shape of another."""
 
 from __future__ import annotations
 

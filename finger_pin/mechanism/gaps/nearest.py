@@ -34,7 +34,7 @@ _ROUNDING = 1e-9
 
 
 def lowered(y: Any, p: Any, s: float, square: float) -> Any:
-    """Return what the pull to the middle adds to |w|, less its most; ``square`` is |r / R|^2."""
+    """Return the part of the pull to the middle in |w|, less its most; ``square`` is |r / R|^2."""
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     along = EPSILON * np.sqrt(a * a + b * b + c * c)
     return p[ALONG] * along * ((s - 0.5) * (s - 0.5) - 0.25) + 0.5 * EPSILON * p[DISC] * (square - 1.0)

@@ -1,4 +1,4 @@
-"""Where the tendons run: lanes beside each other, winding around the joints, and paths in space."""
+"""Paths of the tendons in space: lanes beside each other, and windings around the joints."""
 
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual

@@ -20,7 +20,7 @@ from finger_pin.mechanism.geometry.winding import Arc, WoundSpan
 
 
 class Groove(Enum):
-    """What the grooves around a joint are part of, and hence on which side of them a cut goes.
+    """The link that the grooves around a joint are part of, and so the side of them on which a cut goes.
 
     DISTAL: the link after the joint; tendons pull along the link before it, as in (17). PROXIMAL: the link before it;
     tendons that pass on pull along the link after it, and only those that end there stay as they are.

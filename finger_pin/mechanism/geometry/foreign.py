@@ -53,7 +53,7 @@ def chain(model: pin.Model, first: int, count: int) -> pin.Model:
 
 
 def width_of(description: FingerDescription) -> float:
-    """Return how wide a finger is about, m, from the radii of its tendons."""
+    """Return the width of a finger, m, about, from the radii of its tendons."""
     return _WIDTH * max(
         abs(each.radius) for tendon in description.tendons.values() for each in tendon.crossings.values()
     )
@@ -66,7 +66,7 @@ def placed_solids(solids: pin.GeometryModel, turns: list[Array]) -> Iterator[tup
 
 
 def _onwards(body: RigidBody, index: int) -> Array:
-    """Return where the finger goes on from a joint, in its frame: to the next joint, or to the tip."""
+    """Return the place where the finger goes on from a joint, in its frame: the next joint, or the tip."""
     model = body.model
     after = [joint for joint in range(index + 1, model.njoints) if int(model.parents[joint]) == index]
     if after:

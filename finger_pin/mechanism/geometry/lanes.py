@@ -73,7 +73,7 @@ def tendon_lanes(description: FingerDescription, model: pin.Model, widths: Seque
 
 
 def joint_axes(model: pin.Model) -> Array:
-    """Return what joints turn about at zero, shape (joints, 3), base frame: unit vectors, zero for those that slide."""
+    """Return the axes of the joints at zero, shape (joints, 3), base frame: unit vectors, zero for those that slide."""
     data, reference = model.createData(), pin.ReferenceFrame.WORLD
     pin.computeJointJacobians(model, data, pin.neutral(model))
     twists = [pin.getJointJacobian(model, data, joint, reference) for joint in range(1, model.njoints)]

@@ -114,7 +114,7 @@ class TendonGeometry:
         )
 
     def poses(self, joint_position: ArrayLike, base: LinkPoses | None = None) -> LinkPoses:
-        """Return where the links are at theta, shape (..., n), rad.
+        """Return the poses of the links at theta, shape (..., n), rad.
 
         Args:
             joint_position: theta.
@@ -157,7 +157,7 @@ class TendonGeometry:
         return tuple(paths)
 
     def cuts(self, groove: Groove = Groove.DISTAL) -> tuple[Cut, ...]:
-        """Return where and in which direction every tendon of a finger crosses the joints; see `cuts`."""
+        """Return the cuts of every tendon of a finger at the joints; see `cuts`."""
         found = (cuts(self.model, name, pieces, groove) for name, pieces in self._pieces.items())
         return tuple(cut for each in found for cut in each)
 

@@ -29,7 +29,7 @@ _SPACING, _WIDTH = 0.012, 0.06
 
 
 class TreeGeometry:
-    """What of a tree is drawn; see `TendonGeometry`.
+    """The geometry of a tree that is drawn; see `TendonGeometry`.
 
     Attributes:
         description: What it was built from.
@@ -83,7 +83,7 @@ class TreeGeometry:
         self.pulleys: tuple[Pulley, ...] = ()
 
     def poses(self, joint_position: ArrayLike, palm: LinkPoses | None = None) -> LinkPoses:
-        """Return where what every joint carries is at theta, shape (..., n), rad; a tree has no ``palm`` that moves."""
+        """Return the poses of the bodies at theta, shape (..., n), rad; a tree has no ``palm`` that moves."""
         assert palm is None
         q = np.asarray(joint_position, dtype=float)
         data, found = self.model.createData(), []
@@ -131,7 +131,7 @@ def _stretch(piece: Piece, rotations: Array, places: Array) -> Array:
 
 
 def _touch(piece: Piece, point: Array, direction: Array) -> Array:
-    """Return where the straight part from a point meets the wrap."""
+    """Return the point where the straight part from a point meets the wrap."""
     flat = np.array([1.0, 1.0, 0.0]) if piece.shape is CYLINDER else np.ones(3)
     a, d = point * flat, direction * flat
     square, half = d @ d, a @ d

@@ -1,4 +1,4 @@
-"""How one tendon winds: straight spans at rest in the links, and arcs around the joints between them.
+"""Windings of one tendon: straight spans at rest in the links, and arcs around the joints between them.
 
 Between two joints the common tangent of their pulleys is at rest in the link, so only the arcs change when a joint
 turns, by r theta, and the path obeys (3) for any constant radius. The signed radius r puts the path at y = r in the

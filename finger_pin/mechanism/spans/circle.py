@@ -17,7 +17,7 @@ _MOST_STEPS = 50
 
 
 def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: Any, has_side: Any, inside: Any) -> Any:
-    """Return which way the path goes.
+    """Return the way that the path goes.
 
     A path wraps if, on its way, the ends are further apart than where their tangents meet the circle. With a side
     point its way is through the direction of that point; without one it is the shorter. Inside, it has to be drawn to

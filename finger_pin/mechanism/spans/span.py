@@ -1,4 +1,4 @@
-"""What a span is: the piece of a tendon's path between two points, and how it changes when they move."""
+"""Spans: the piece of a tendon's path between two points, and its slopes by their motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run parts from its repetition at a tighter tolerance."""
+"""A run and its repetition at a tighter tolerance, and the time at which they part."""
 
 from __future__ import annotations
 

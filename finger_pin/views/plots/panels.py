@@ -124,7 +124,7 @@ def _wrap(text: str, letters: int) -> str:
 
 
 def _letters(part: Figure | SubFigure, share: float, size: str) -> int:
-    """Return how many letters a share of a part's width holds, in a size of the style."""
+    """Return the number of letters that a share of a part's width holds, in a size of the style."""
     points = _points(size)
     return max(12, int(72.0 * share * part.bbox.width / part.dpi / (_LETTER * points)))
 

@@ -1,4 +1,4 @@
-"""What a search found: the designs over each two objectives, their front, and the design that it began with."""
+"""Designs of a search over each two objectives, their front, and the design that it began with."""
 
 from __future__ import annotations
 

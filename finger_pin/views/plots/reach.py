@@ -1,4 +1,4 @@
-"""Where the fingertip can go: images of the joint ranges under (1), with the passive tendons' constraint (4)."""
+"""The reach of the fingertip: images of the joint ranges under (1), with the passive tendons' constraint (4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How good the joint reaction (17) is: along a motion, and under fingertip forces."""
+"""The error of the joint reaction (17): along a motion, and under fingertip forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sweep found: lines over one key, maps over two, parallel coordinates over more."""
+"""Metrics of a sweep: lines over one key, maps over two, parallel coordinates over more."""
 
 from __future__ import annotations
 

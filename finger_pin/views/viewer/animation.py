@@ -106,7 +106,7 @@ def posture_page(finger: FingerLike, forces: ForcePolytope, strands: ArrayLike |
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """What of a result is shown: the frames of a film.
+    """The frames of a film of a result.
 
     Attributes:
         scene: The finger, prepared for drawing.

@@ -40,12 +40,12 @@ class ForceSet:
 
     @property
     def corners(self) -> Array:
-        """Where the vertices stand, shape (v, 3), m, base frame."""
+        """The vertices, shape (v, 3), m, base frame."""
         return np.asarray(self.polytope.tip + self.scale * self.polytope.vertices)
 
     @property
     def note(self) -> str:
-        """What the drawing means, for the panel."""
+        """The legend of the drawing, for the panel."""
         return f"forces at the tip, {1e3 * self.scale:.4g} mm per N"
 
     def commands(self) -> Iterator[Command]:

@@ -1,4 +1,4 @@
-"""What the page receives: once the scene, then frames of poses, tendon paths and tensions."""
+"""Data of the page: once the scene, then frames of poses, tendon paths and tensions."""
 
 from __future__ import annotations
 

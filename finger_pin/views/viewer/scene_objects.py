@@ -1,4 +1,4 @@
-"""What a finger touches, for the page: objects, and of every closed contact its force and its friction cone."""
+"""Objects around a finger, for the page, and of every closed contact its force and its friction cone."""
 
 from __future__ import annotations
 
