@@ -1,9 +1,8 @@
 """Fingers, closed loops and states on which the compiled core is compared with the readable model."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
-import kernels
 import numpy as np
 import pinocchio as pin
 
@@ -11,7 +10,9 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import compiled_control
 from finger_pin.core.control import held_control
-from finger_pin.core.model import BoundModel
+from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call, call_at
+from finger_pin.core.model import MODEL, BoundModel
 from finger_pin.core.stepping import rosenbrock
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.tables import build_tables
@@ -153,6 +154,42 @@ def without_abduction_link(loop):
     return replace(loop, finger=finger, dynamics=finger)
 
 
+class Condensed(NamedTuple):
+    model: int
+    time: float
+    x: Vector
+    g: float
+    rate: Vector
+    r: Vector
+    columns: Matrix
+
+
+CONDENSED = Kind(Condensed)
+
+
+@Unit
+def _condensed(address, _number):
+    condensed = bound_at(address, CONDENSED)
+    model, x, r = bound_at(condensed.model, MODEL), condensed.x, condensed.r
+    for c in range(x.size):
+        model.state[c] = x[c]
+    call_at(model.evaluate, condensed.model, condensed.time)
+    for c in range(x.size):
+        condensed.rate[c] = model.rate[c]
+    call_at(model.linearise, condensed.model, condensed.time)
+    solved = call_at(model.condense, condensed.model, condensed.g)
+    for c in range(r.size):
+        r[c] = 1.0
+        solve(model.linear, r, condensed.columns[c])
+        r[c] = 0.0
+    return solved
+
+
+def condensed(*arguments):
+    """Fill the state rate, and the solutions of (g - J) u = r for unit vectors r; return false if there are none."""
+    return call(_condensed, Condensed(*arguments), CONDENSED) == 1
+
+
 class Bound:
     """A mechanism under inputs, compiled and bound to memory.
 
@@ -176,7 +213,7 @@ class Bound:
         """Return the rate, the matrix that solves (g - J) u = r + f_t s, by columns (r | s), and if there is one."""
         rate = np.zeros(len(x))
         columns = np.zeros((len(x) + 1, len(x)))
-        solved = kernels.condensed(self._bound.address, time, x, g, rate, np.zeros(len(x) + 1), columns)
+        solved = condensed(self._bound.address, time, x, g, rate, np.zeros(len(x) + 1), columns)
         return rate, np.ascontiguousarray(columns.T), solved
 
 

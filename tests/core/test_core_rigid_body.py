@@ -1,71 +1,65 @@
 """The compiled rigid body against Pinocchio: chains and a tree, turning and sliding joints."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
-import kernels
 import numpy as np
 import pinocchio as pin
 import pytest
-from core_cases import BODIES, relative
+from core_cases import BODIES, Bound, relative
 
 import finger_pin as fp
-from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.evaluation.rigid_body import BY_POSITION, BY_VELOCITY, MASS_MATRIX
-from finger_pin.core.tables import build_tables
-from finger_pin.core.work import build_work
+from finger_pin.core.compiled_finger import CompiledFinger, CompiledMechanism
+from finger_pin.core.control import held_control
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.mechanism import Mechanism
 
 STATES = 200
 
-
-@dataclass
-class Found:
-    """What a rigid body does at many states; leading dimension: states."""
-
-    mass: list
-    bias: list
-    torque: list
-    by_position: list
-    by_velocity: list
-    acceleration: list
+#: A torque that is given.
+TORQUE = fp.Law(
+    "torque",
+    (),
+    lambda row, p: (row.command, 0.0 * row.length),
+    lambda row, p, signals: ((0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+    lambda row, p, force, rate, signals: (0.0 * force, force * row.speed),
+    supplies=("motors",),
+)
 
 
-@pytest.fixture(scope="module", params=BODIES)
-def compared(request, bodies):
-    """The same quantities of one body, compiled and from Pinocchio."""
-    finger = bodies[request.param]
-    model, tables = finger.rigid_body.model, build_tables(finger.mechanism)
-    laws = [table.law for table in finger.mechanism.rows]
-    data, work, size = model.createData(), build_work(tables, laws, finger.mechanism.channels), model.nv
-    rng = np.random.default_rng(1)
-    ours, theirs = Found(*([] for _ in fields(Found))), Found(*([] for _ in fields(Found)))
-    for _ in range(STATES):
-        q, v = rng.uniform(-3.0, 3.0, size), 10.0 * rng.normal(size=size)
-        a, torque = 100.0 * rng.normal(size=size), 0.1 * rng.normal(size=size)
-        bias, needed, acceleration = np.zeros((3, size))
-        kernels.rigid(tables, q, v, a, torque, work, bias, needed, acceleration)
-        ours.mass.append(work.square[MASS_MATRIX].copy())
-        ours.by_position.append(work.square[BY_POSITION].copy())
-        ours.by_velocity.append(work.square[BY_VELOCITY].copy())
-        ours.bias.append(bias)
-        ours.torque.append(needed)
-        ours.acceleration.append(acceleration)
-        upper = np.triu(pin.crba(model, data, q, pin.Convention.WORLD))
-        theirs.mass.append(upper + np.triu(upper, 1).T)
-        theirs.bias.append(pin.nonLinearEffects(model, data, q, v).copy())
-        theirs.torque.append(pin.rnea(model, data, q, v, a).copy())
-        theirs.acceleration.append(pin.aba(model, data, q, v, torque).copy())
-        by_position, by_velocity, _ = pin.computeRNEADerivatives(model, data, q, v, a)
-        theirs.by_position.append(by_position.copy())
-        theirs.by_velocity.append(by_velocity.copy())
-    return ours, theirs
+def driven(body):
+    """A rigid body with a torque at every joint, and random states of it."""
+    size, rng = body.model.nv, np.random.default_rng(1)
+    names, numbers = tuple(body.joints), np.zeros((0, size))
+    rows = fp.Rows("torques", TORQUE, names, numbers, np.eye(size), channels=np.arange(size))
+    x = np.hstack([rng.uniform(-3.0, 3.0, (STATES, size)), 10.0 * rng.normal(size=(STATES, size))])
+    return Mechanism(body, [rows]), x, 0.1 * rng.normal(size=(STATES, size))
 
 
-@pytest.mark.parametrize("quantity", [field.name for field in fields(Found)])
-def test_mass_bias_torque_derivatives_and_acceleration_are_pinocchio_s(compared, quantity):
+@pytest.mark.parametrize("name", BODIES)
+def test_accelerations_under_given_torques_are_pinocchio_s(bodies, name):
     """To rounding: mass matrices here have condition numbers up to about 1e3, which multiplies 2e-16 at most."""
-    ours, theirs = (np.array(getattr(each, quantity)) for each in compared)
-    assert relative(ours, theirs) < 1e-12
+    body = bodies[name].rigid_body
+    mechanism, x, torque = driven(body)
+    found, data = CompiledMechanism(mechanism).evaluate(x, torque).acceleration, body.model.createData()
+    size = body.model.nv
+    expected = [pin.aba(body.model, data, *each).copy() for each in zip(x[:, :size], x[:, size:], torque, strict=True)]
+    assert relative(found, np.array(expected)) < 1e-12
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_derivatives_of_accelerations_are_pinocchio_s(bodies, name):
+    """Out of the solutions of (g - J) u = r, whose inverse costs digits."""
+    body = bodies[name].rigid_body
+    mechanism, x, torque = driven(body)
+    size, data = body.model.nv, body.model.createData()
+    control = held_control(size, size)
+    bound = Bound(mechanism, control)
+    for each, given in zip(x[:40], torque, strict=False):
+        control.tension[:] = given
+        jacobian = 1e4 * np.eye(2 * size) - np.linalg.inv(bound.solve(0.0, each, 1e4)[1][:, :-1])
+        by_position, by_velocity, _ = pin.computeABADerivatives(body.model, data, each[:size], each[size:], given)
+        expected = np.hstack([by_position, by_velocity])
+        np.testing.assert_allclose(jacobian[size:], expected, atol=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", BODIES)

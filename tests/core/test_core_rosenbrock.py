@@ -1,6 +1,5 @@
 """The Rosenbrock methods on a finger: convergence, and what steps leave behind."""
 
-import kernels
 import numpy as np
 import pytest
 from core_cases import Case
@@ -9,7 +8,7 @@ from validation.order import END, mean_order, smooth_motion, step_errors
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.core.stepping import rosenbrock
+from finger_pin.core.stepping import error_norm, rosenbrock
 from finger_pin.core.stepping.integrator import _Recorder
 from finger_pin.core.stepping.island_stepper import failure
 from finger_pin.core.stepping.stepper import TABLEAUS
@@ -96,13 +95,13 @@ def test_a_step_that_becomes_too_short_is_a_failure_that_keeps_the_state_and_nam
 
 def test_a_state_whose_error_is_no_number_is_named_before_any_that_is_only_large():
     """Wherever it stands; else the one with the largest error over its tolerance."""
-    x, atol = np.ones(5), np.array([1.0, 1.0, 1e-3, 1.0, 1.0])
+    x, atol, worst = np.ones(5), np.array([1.0, 1.0, 1e-3, 1.0, 1.0]), error_norm.worst
     difference = np.array([3.0, 9.0, 0.1, 1.0, 2.0])
-    assert kernels.worst(x, difference, 0.0, atol) == 2
+    assert worst(x, difference, 0.0, atol) == 2
     for place in range(5):
         broken = difference.copy()
         broken[place] = np.nan
-        assert kernels.worst(x, broken, 0.0, atol) == place
+        assert worst(x, broken, 0.0, atol) == place
 
 
 def test_an_integration_that_creeps_is_a_failure_that_goes_on_no_longer_and_names_the_culprit(cases, method):

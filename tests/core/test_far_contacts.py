@@ -1,8 +1,8 @@
 """What contacts that are open cost: nothing of the result, and no part of the linear systems."""
 
-import kernels
 import numpy as np
 import pytest
+from core_cases import condensed
 from test_contact_motion import G, plane, scene
 
 from finger_pin.core.control import held_control
@@ -59,7 +59,7 @@ def test_each_block_that_contacts_join_is_condensed_to_the_solution_of_the_dense
     columns, rate = np.zeros((size + 1, size)), np.zeros(size)
 
     def rates(x):
-        kernels.condensed(part.model.address, 0.0, x, g, rate, np.zeros(size + 1), columns)
+        condensed(part.model.address, 0.0, x, g, rate, np.zeros(size + 1), columns)
         return rate.copy()
 
     steps = 1e-7 * np.concatenate([np.full(part.model.model.linear.mass.shape[0] * 2, 1.0), part.x[48:] * 0.0 + 1e-2])

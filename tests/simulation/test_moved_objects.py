@@ -1,8 +1,8 @@
 """Objects moved along paths, and what they push and drag, in closed form."""
 
-import kernels
 import numpy as np
 import pytest
+from core_cases import condensed
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
@@ -127,7 +127,7 @@ def test_the_linear_system_knows_how_the_path_goes_on(scenes):
     columns, rate = np.zeros((size + 1, size)), np.zeros(size)
 
     def rates(at):
-        kernels.condensed(part.model.address, at, part.x, 1e3, rate, np.zeros(size + 1), columns)
+        condensed(part.model.address, at, part.x, 1e3, rate, np.zeros(size + 1), columns)
         return rate.copy()
 
     by_time = (rates(time + step) - rates(time - step)) / (2.0 * step)

@@ -21,7 +21,7 @@ from finger_pin.mechanism.exchange.mujoco_equalities import read_equalities
 from finger_pin.mechanism.exchange.mujoco_flags import obeyed
 from finger_pin.mechanism.exchange.mujoco_names import Names, Table, entry_name, quaternion
 from finger_pin.mechanism.exchange.mujoco_overlay import lay_tendons
-from finger_pin.mechanism.exchange.mujoco_rest import Rest
+from finger_pin.mechanism.exchange.mujoco_rest import ElementReader, Rest
 from finger_pin.mechanism.exchange.mujoco_shapes import Shapes
 from finger_pin.mechanism.exchange.mujoco_tendons import STOP, TendonReader
 from finger_pin.mechanism.routes import rotation
@@ -82,13 +82,14 @@ class _Reader:
         model = self.model
         self.rest = Rest(mujoco, model)
         self.names = Names.of(model)
-        self.shapes = Shapes(mujoco, model, self.names, self.rest)
+        self._read = ElementReader(mujoco, model, self.names, self.rest)
+        self.shapes = Shapes(self._read)
         kinds = mujoco.mjtJoint
         for i in np.flatnonzero(model.jnt_type == kinds.mjJNT_BALL):
             raise InputError(
                 f"joint {self.names.joints[i]}", "is a ball joint; joints have to turn or slide about one axis"
             )
-        self.actuators = ActuatorReader(mujoco, model, self.names, self.rest)
+        self.actuators = ActuatorReader(*vars(self._read).values())
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
 
     def table(self, name: str) -> Table:
@@ -98,11 +99,11 @@ class _Reader:
             raise InputError("model", "has no joints that turn or slide")
         dofs = model.jnt_dofadr[self.kept_joints]
         sliding = model.jnt_type[self.kept_joints] == self.mujoco.mjtJoint.mjJNT_SLIDE
-        reader = TendonReader(self.mujoco, model, self.names, self.rest)
+        reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
-        couplings, differences = read_equalities(self.mujoco, model, self.names, self.rest)
+        couplings, differences = read_equalities(self._read)
         return {
             "name": entry_name(name),
             "gravity": model.opt.gravity.tolist(),

@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from finger_pin.mechanism.exchange.mujoco_flags import undriven
-from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct
-from finger_pin.mechanism.exchange.mujoco_rest import Rest
+from finger_pin.mechanism.exchange.mujoco_names import Table, distinct
+from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
 
 # As `Crossing` has it, m.
 _LARGEST_RADIUS = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class ActuatorReader:
-    """Reads actuators.
-
-    Attributes:
-        mujoco: The module.
-        model: The compiled model.
-        names: Of its elements.
-        rest: Where what is left out is listed.
-    """
-
-    mujoco: Any
-    model: Any
-    names: Names
-    rest: Rest
+class ActuatorReader(ElementReader):
+    """Reads actuators."""
 
     @cached_property
     def laws(self) -> dict[int, tuple[float, float, float, float]]:

@@ -7,21 +7,15 @@ from typing import Any
 import numpy as np
 
 from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct
-from finger_pin.mechanism.exchange.mujoco_rest import Rest
+from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
 
 # Time constant with which what is coupled follows, critically damped, s.
 _COUPLED = 0.005
 
 
-def read_equalities(mujoco: Any, model: Any, names: Names, rest: Rest) -> tuple[Table, Table]:
-    """Return couplings of joints, and the tendons that take the place of equalities of tendons, both by name.
-
-    Args:
-        mujoco: The module.
-        model: The compiled model.
-        names: Of its elements.
-        rest: Where what is left out is listed.
-    """
+def read_equalities(read: ElementReader) -> tuple[Table, Table]:
+    """Return couplings of joints, and the tendons that take the place of equalities of tendons, both by name."""
+    mujoco, model, names, rest = read.mujoco, read.model, read.names, read.rest
     couplings: Table = {}
     tendons: Table = {}
     for i in (int(each) for each in np.flatnonzero(model.eq_active0)):

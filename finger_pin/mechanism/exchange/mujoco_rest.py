@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.exchange.mujoco_flags import disabled, without_counterpart
+from finger_pin.mechanism.exchange.mujoco_names import Names
 
 
 class Rest:
@@ -83,3 +85,20 @@ class Rest:
             index = self.model.dof_jntid[i] if by_dof else i
             name = getattr(self.model, what)(index).name or f"{what}_{index}"
             self.add(f"{what} {name}: {has}")
+
+
+@dataclass(frozen=True, eq=False)
+class ElementReader:
+    """The model that readers of its elements share.
+
+    Attributes:
+        mujoco: The module.
+        model: The compiled model.
+        names: Of its elements.
+        rest: Where what is left out is listed.
+    """
+
+    mujoco: Any
+    model: Any
+    names: Names
+    rest: Rest

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 from finger_pin.mechanism.exchange.mujoco_flags import disabled
-from finger_pin.mechanism.exchange.mujoco_names import Names, Table, quaternion
-from finger_pin.mechanism.exchange.mujoco_rest import Rest
+from finger_pin.mechanism.exchange.mujoco_names import Table, quaternion
+from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
 
 
 class Shapes:
     """Spheres, capsules, boxes and cylinders that collide; all else that does is listed by name."""
 
-    def __init__(self, mujoco: Any, model: Any, names: Names, rest: Rest) -> None:
+    def __init__(self, read: ElementReader) -> None:
         """Read the geoms of a model."""
-        self.mujoco, self.model, self.names, self.rest = mujoco, model, names, rest
+        mujoco, model = read.mujoco, read.model
+        self.mujoco, self.model, self.names, self.rest = mujoco, model, read.names, read.rest
         kinds = mujoco.mjtGeom
         self._kinds = {
             int(kinds.mjGEOM_SPHERE): "sphere",

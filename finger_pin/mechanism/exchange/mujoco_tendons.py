@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.description.waypoints import Waypoint, inside
-from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct, quaternion
-from finger_pin.mechanism.exchange.mujoco_rest import Rest
+from finger_pin.mechanism.exchange.mujoco_names import Table, distinct, quaternion
+from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
 
 #: Stiffness with which a range stops a joint, N m/rad, as the stroke limiters do; also the range of a tendon.
 STOP = 50.0
 
 
-@dataclass(frozen=True, eq=False)
-class TendonReader:
-    """Reads tendons.
-
-    Attributes:
-        mujoco: The module.
-        model: The compiled model.
-        names: Of its elements.
-        rest: Where what is left out is listed.
-    """
-
-    mujoco: Any
-    model: Any
-    names: Names
-    rest: Rest
+class TendonReader(ElementReader):
+    """Reads tendons."""
 
     def table(self, i: int) -> Table:
         """Return a tendon by its index."""
