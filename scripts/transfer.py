@@ -1,16 +1,18 @@
-"""What policies know of friction: trained without, at one friction, and with friction drawn anew; tried on others."""
+"""What policies know of friction, slack and servos: trained without, at one, and with them drawn anew; then tried."""
 
 from __future__ import annotations
 
+import csv
 import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
-from train import Policy
+from train import TRAININGS, Policy, Training
 
 from finger_pin.commands.application import run_function
 from finger_pin.commands.console import print_text
@@ -18,6 +20,19 @@ from finger_pin.commands.options import Output, Restart, wrong
 
 # No friction at all has no bristles to speak of; a thousandth has none that matter.
 _LEAST = 1e-3
+# mu_e of the canals; M^d and M^c of the joints, m.
+_FRICTION = {
+    "finger.tendon_friction.coulomb": 0.11,
+    "finger.joint_friction.coulomb": 2.5e-4,
+    "finger.joint_friction.stiction": 3.5e-4,
+}
+# Servos are told that their tendons are as short as this tension makes them, N; at 20 N/mm that is 2 mm.
+_TOLD, _STIFFNESS = 40.0, 20.0
+_PRETENSION = "finger.actuators.*.pretension"
+_GAIN, _PROPORTIONAL = "finger.actuators.*.position_loop.proportional", 9.2
+_VOLTAGE = "finger.actuators.*.motor.voltage"
+# Goals beyond the joints' ranges wind in what is slack, rad.
+_BEYOND = 0.4
 
 
 class _Together:
@@ -45,83 +60,183 @@ class _Scaled:
         return self.value * self.together.factor
 
 
-# mu_e of the canals; M^d and M^c of the joints, m.
-_FRICTION = {
-    "finger.tendon_friction.coulomb": 0.11,
-    "finger.joint_friction.coulomb": 2.5e-4,
-    "finger.joint_friction.stiction": 3.5e-4,
-}
-
-
 def friction(low: float, high: float) -> dict[str, Any]:
     """Return distributions of all frictions: one factor on the scenario's own, even in its logarithm."""
     together = _Together(max(low, _LEAST), max(high, _LEAST))
     return {key: _Scaled(together, value, index == 0) for index, (key, value) in enumerate(_FRICTION.items())}
 
 
-#: By name, what is drawn at every reset of a training.
-TRAINED = {
-    "without friction": friction(0.0, 0.0),
-    "at one friction": friction(1.0, 1.0),
-    "with friction drawn anew": friction(0.25, 3.0),
-}
-#: Factors on which all policies are tried.
-LEVELS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)
+def slack(low: float, high: float) -> dict[str, Any]:
+    """Return the distribution of how much longer tendons are than servos are told, mm."""
+    from finger_pin.learning import Uniform
+
+    return {_PRETENSION: Uniform(_TOLD - _STIFFNESS * high, _TOLD - _STIFFNESS * low)}
+
+
+def gain(low: float, high: float) -> dict[str, Any]:
+    """Return the distribution of the servos' gain: a factor on their own, even in its logarithm."""
+    from finger_pin.learning import LogUniform
+
+    return {_GAIN: LogUniform(_PROPORTIONAL * low, _PROPORTIONAL * high)}
+
+
+class Study(NamedTuple):
+    """Policies, and what they are tried on.
+
+    Attributes:
+        task: Fields of Reach, in place of its own.
+        training: Of every policy.
+        trained: By name, what is drawn at every reset of a training.
+        tried: By what is varied, the values, and what makes it one.
+    """
+
+    task: dict[str, Any]
+    training: Training
+    trained: dict[str, dict[str, Any]]
+    tried: dict[str, tuple[tuple[float, ...], Any]]
+
+
+_WITHOUT, _ONE, _ANEW = "without friction", "at one friction", "with all drawn anew"
+_FACTORS = "friction over its own", (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
+
+
+def studies() -> dict[str, Study]:
+    """Return the studies by how the finger is driven."""
+    from finger_pin.description.loading import load_scenario
+    from finger_pin.learning import Sensor, Uniform
+    from finger_pin.learning.tasks import COARSE, TASKS
+
+    own = TASKS["Reach-v0"]()
+    told = {f"finger.actuators.M{k}.pretension": _TOLD for k in range(1, 5)}
+    low, high = np.array([-0.175, 0.0, 0.0]), np.array([0.175, 1.571, 1.571])
+    servos = {
+        "scenario": load_scenario("servo_position", {**COARSE, **told}),
+        "action": "joint_position",
+        "limits": (low - _BEYOND, high + _BEYOND),
+        # Servos take 0.4 s to a goal; how far they have wound says what was asked before.
+        "period": 0.1,
+        "duration": 1.5,
+        "observation": {**own["observation"], "motor_position": Sensor()},
+    }
+    anew = {**friction(0.25, 3.0), **slack(0.0, 1.0), **gain(0.1, 2.0), _VOLTAGE: Uniform(3.5, 6.0)}
+    label, factors = _FACTORS
+    return {
+        "tensions": Study(
+            {},
+            TRAININGS["Reach"],
+            {_WITHOUT: friction(0.0, 0.0), _ONE: friction(1.0, 1.0), _ANEW: friction(0.25, 3.0)},
+            {label: (factors, friction)},
+        ),
+        "servos": Study(
+            servos,
+            Training(40_000, 30, -1.5),
+            {_WITHOUT: friction(0.0, 0.0), _ONE: friction(1.0, 1.0), _ANEW: anew},
+            {
+                label: (factors[::2], friction),
+                "slack (mm)": ((0.0, 0.25, 0.5, 0.75, 1.0), slack),
+                "gain over its own": ((0.1, 0.25, 1.0, 2.0), gain),
+            },
+        ),
+    }
+
+
+class Trial(NamedTuple):
+    """How a policy did: the study, what it was trained on, by which seed, what was varied, and what was solved."""
+
+    driven: str
+    trained: str
+    seed: int
+    varied: str
+    value: float
+    solved: float
 
 
 def transfer(
-    steps: Annotated[int, typer.Option(metavar="N", help="Control steps of each training.")] = 150_000,
-    seeds: Annotated[int, typer.Option(metavar="N", help="Trainings of each kind.")] = 2,
+    driven: Annotated[str, typer.Option(metavar="HOW", help="By tensions, servos or both.")] = "both",
+    steps: Annotated[int | None, typer.Option(metavar="N", help="Control steps of each training.")] = None,
+    seeds: Annotated[int, typer.Option(metavar="N", help="Trainings of each kind.")] = 1,
     episodes: Annotated[int, typer.Option(metavar="N", help="Episodes of each trial.")] = 100,
     restart: Restart = False,
     output: Output = Path("results/transfer"),
 ) -> None:
-    """Train Reach without friction, at one friction and with friction drawn anew, and try all three on other frictions.
+    """Train Reach without friction, at one friction and with all drawn anew; try each on other numbers.
 
     The same command goes on where it was interrupted.
     """
-    for name, value in (("--steps", steps), ("--seeds", seeds), ("--episodes", episodes)):
+    if driven not in ("tensions", "servos", "both"):
+        raise wrong("--driven", f"{driven}: must be tensions, servos or both")
+    for name, value in (("--steps", steps or 1), ("--seeds", seeds), ("--episodes", episodes)):
         if value < 1:
             raise wrong(name, "must be above 0")
-    solved = np.zeros((seeds, len(TRAINED), len(LEVELS)))
-    for seed in range(seeds):
-        for row, (name, drawn) in enumerate(TRAINED.items()):
-            place = output / f"{name.replace(' ', '_')}_{seed + 1}"
-            policy = Policy.trained(place, "Reach", steps, 32, seed + 1, restart=restart, randomise=drawn)
-            for column, level in enumerate(LEVELS):
-                solved[seed, row, column] = policy.evaluate("Reach", episodes, randomise=friction(level, level)).solved
-    table = np.column_stack([LEVELS, *np.concatenate(np.moveaxis(solved, 1, 0))])
-    header = ["friction", *(f"{name} {seed + 1}" for name in TRAINED for seed in range(seeds))]
-    np.savetxt(output / "transfer.csv", table, delimiter=",", header=",".join(header), comments="")
-    draw(solved, output / "transfer.png")
-    width = max(map(len, TRAINED))
-    lines = [f"{'friction over its own':{width}} " + " ".join(f"{level:5g}" for level in LEVELS)]
-    lines += [
-        f"{name:{width}} " + " ".join(f"{x:5.2f}" for x in row)
-        for name, row in zip(TRAINED, solved.mean(axis=0), strict=True)
-    ]
+    chosen = {name: study for name, study in studies().items() if driven in (name, "both")}
+    trials: list[Trial] = []
+    for seed in range(1, seeds + 1):
+        for name, study in chosen.items():
+            trials += _tried(name, study, steps, seed, episodes, output, restart=restart)
+    with open(output / "transfer.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerows([Trial._fields, *trials])
+    draw(chosen, trials, output / "transfer.png")
     ending = f"Part of {episodes} new episodes that end within 5 mm of the goal, mean of {seeds} trainings"
-    print_text("\n".join([*lines, f"{ending}. Results are in {output}"]))
+    print_text("\n".join([*_table(chosen, trials), f"{ending}. Results are in {output}"]))
 
 
-def draw(solved: Any, path: Path) -> None:
+def _tried(
+    name: str, study: Study, steps: int | None, seed: int, episodes: int, output: Path, *, restart: bool
+) -> Iterator[Trial]:
+    """Yield the trials of all policies of a study that a seed makes."""
+    training = study.training if steps is None else study.training._replace(steps=steps)
+    for trained, drawn in study.trained.items():
+        place = output / f"{name}_{trained.replace(' ', '_')}_{seed}"
+        policy = Policy.trained(
+            place, "Reach", training, 32, seed, restart=restart, **{**study.task, "randomise": drawn}
+        )
+        for varied, (values, make) in study.tried.items():
+            for value in values:
+                fields = {**study.task, "randomise": make(value, value)}
+                found = policy.evaluate("Reach", episodes, **fields)
+                yield Trial(name, trained, seed, varied, value, found.solved)
+
+
+def _solved(trials: list[Trial], *which: str) -> tuple[Any, Any]:
+    """Return values and what was solved there by each seed, shapes (k,) and (seeds, k)."""
+    own = [trial for trial in trials if (trial.driven, trial.varied, trial.trained) == which]
+    seeds = dict.fromkeys(trial.seed for trial in own)
+    rows = [[trial.solved for trial in own if trial.seed == seed] for seed in seeds]
+    return np.array([trial.value for trial in own if trial.seed == own[0].seed]), np.array(rows)
+
+
+def _table(chosen: Mapping[str, Study], trials: list[Trial]) -> Iterator[str]:
+    """Yield the means over seeds as text."""
+    width = max(map(len, (_WITHOUT, _ONE, _ANEW))) + len("trained ")
+    for name, study in chosen.items():
+        for varied, (values, _) in study.tried.items():
+            yield f"by {name}: {varied}"
+            yield f"{'':{width}} " + " ".join(f"{value:5g}" for value in values)
+            for trained in study.trained:
+                mean = _solved(trials, name, varied, trained)[1].mean(axis=0)
+                yield f"{'trained ' + trained:{width}} " + " ".join(f"{each:5.2f}" for each in mean)
+
+
+def draw(chosen: Mapping[str, Study], trials: list[Trial], path: Path) -> None:
     """Write the figure: the mean over trainings, and the best and the worst of them."""
     from finger_pin.views.plots import save_figure
     from finger_pin.views.plots.style import new_figure, styled
 
+    panels = [(name, varied) for name, study in chosen.items() for varied in study.tried]
+
     @styled
     def plot() -> Any:
-        figure = new_figure(6.4, 3.8)
-        axes = figure.subplots()
-        for name, rows in zip(TRAINED, np.moveaxis(solved, 1, 0), strict=True):
-            (line,) = axes.plot(LEVELS, rows.mean(axis=0), marker="o", label=f"trained {name}")
-            axes.fill_between(LEVELS, rows.min(axis=0), rows.max(axis=0), color=line.get_color(), alpha=0.2, lw=0)
-        axes.set(
-            xlabel="friction of canals and joints, over the scenario's own",
-            ylabel="episodes within 5 mm of the goal",
-            ylim=(0.0, 1.02),
-        )
-        axes.legend()
+        figure = new_figure(2.6 * len(panels) + 1.0, 3.4)
+        places = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+        for axes, (name, varied) in zip(places, panels, strict=True):
+            for trained in chosen[name].trained:
+                values, rows = _solved(trials, name, varied, trained)
+                (line,) = axes.plot(values, rows.mean(axis=0), marker="o", label=f"trained {trained}")
+                axes.fill_between(values, rows.min(axis=0), rows.max(axis=0), color=line.get_color(), alpha=0.2, lw=0)
+            axes.set(xlabel=varied, ylim=(0.0, 1.02), title=f"by {name}")
+        places[0].set_ylabel("episodes within 5 mm of the goal")
+        places[0].legend()
         return figure
 
     save_figure(plot(), path)

@@ -22,7 +22,7 @@ from finger_pin.references.signal import Signal
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.variables import RESIDUAL, Quantity, variables
 
-_NOTHING = Statistics(0, 0, 0, 0, 0.0)
+_NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
 # Of a reference and a controller, which do not act.
 _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", "torque_shortfall")
 
@@ -33,7 +33,7 @@ def instant(loop: ClosedLoop, time: float, x: Array) -> SampledMotion:
 
 
 def _motions(loop: ClosedLoop, times: Array, x: Array, names: Sequence[str] | None) -> SampledMotion:
-    return SampledMotion(loop, Trajectory(np.array([np.inf]), lambda _: x, _NOTHING), times, names)
+    return SampledMotion(loop, Trajectory(_EVER, lambda _: x, _NOTHING), times, names)
 
 
 def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:

@@ -51,6 +51,7 @@ class World:
         context: What the task has drawn of it.
         sensors: The sensors of the episode.
         reason: Why the motion cannot go on; empty if it can.
+        now: Simulated time that the motion has reached, s.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class World:
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
         self._nominal: tuple[Finger, PassiveCoupling] | None = None
-        self.reason, self._step, self._now = "", 0, 0.0
+        self.reason, self._step, self.now = "", 0, 0.0
         self._bindings = Bindings()
         self._build(family.scenario, origin)
         self.stepper = self._stepper_at(self.origin.initial_state(), self._bindings)
@@ -143,7 +144,7 @@ class World:
         Raises:
             InputError: If what is drawn is not allowed.
         """
-        self._random, self.reason, self._step, self._now = random, "", 0, 0.0
+        self._random, self.reason, self._step, self.now = random, "", 0, 0.0
         self.drawn = self._randomisation.draw(random)
         if self._randomisation.keys:
             self._build(self._family.at([self.drawn[key] for key in self._randomisation.keys]))
@@ -194,15 +195,15 @@ class World:
     def next_end(self) -> float:
         """Hold what acts now, and return until when, s; `RESTING` where the period is over."""
         end = (self._step + 1) * self.task.period
-        if self.reason or self._now >= end:
+        if self.reason or self.now >= end:
             return RESTING
-        return self.action.next_piece(self.stepper, self._now, end)
+        return self.action.next_piece(self.stepper, self.now, end)
 
     def reach(self, end: float, status: int) -> None:
         """Take note of how a stepper ended a piece."""
-        self._now = end
+        self.now = end
         if status:
-            self._now = self.stepper.time
+            self.now = self.stepper.time
             self.reason = self.stepper.failure(status, self.origin.finger.layout.names)
 
     def end_period(self) -> None:

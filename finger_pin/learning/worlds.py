@@ -101,21 +101,20 @@ class Worlds:
 
         Where actions arrive within the period, it has several pieces.
         """
-        going = [(i, self.each[i]) for i in places]
-        for i, world in going:
-            world.act(actions[i])
-        ends = np.full(len(self.each), RESTING)
+        each, ends = self.each, [RESTING] * len(self.each)
+        for i in places:
+            each[i].act(actions[i])
         while True:
-            for i, world in going:
-                ends[i] = world.next_end()
-            if ends.max() == RESTING:
+            for i in places:
+                ends[i] = each[i].next_end()
+            if max(ends) == RESTING:
                 break
             statuses = self._steppers.advance(ends).tolist()
-            for i, world in going:
+            for i in places:
                 if ends[i] != RESTING:
-                    world.reach(float(ends[i]), statuses[i])
-        for _, world in going:
-            world.end_period()
+                    each[i].reach(ends[i], statuses[i])
+        for i in places:
+            each[i].end_period()
 
     def observe(self, places: _Places) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return what policies see in some worlds, shape (k, o), and the truth in all by name, shapes (w, ...).
@@ -123,7 +122,7 @@ class Worlds:
         Raises:
             InputError: If a function that is observed returns another shape, or what is not finite.
         """
-        times = np.array([world.stepper.time for world in self.each])
+        times = np.array([world.now for world in self.each])
         motions = self._now.at(times, self._steppers.states())
         signals = {name: np.array(each.value(motions)) for name, each in self._variables.items()}
         count = len(places)

@@ -61,7 +61,8 @@ class Together:
         self._first = np.searchsorted(self._owners, np.arange(len(steppers)))
         ready = [part.ready() for part in parts]
         # What the addresses lead to lives as long as this.
-        self._steppers, self._parts, self._pieces = steppers, parts, dict[int, list[NDArray[np.uint8]]]()
+        self._steppers, self._parts = steppers, parts
+        self._pieces: dict[int, tuple[list[NDArray[np.uint8]], list[int]]] = {}
         self._batch = Batch(
             np.array([unit.address for _, unit in ready], dtype=np.int64),
             np.array([block for block, _ in ready], dtype=np.int64),
@@ -108,8 +109,9 @@ class Together:
             pieces = 1 if threads < 2 else min(_PIECES * threads, count)
             edges = np.linspace(0, count, pieces + 1).astype(int).tolist()
             parts = [self._part(slice(*each)) for each in pairwise(edges)]
-            self._pieces[threads] = [bound(part, BATCH) for part in parts]
-        return [int(piece.ctypes.data) for piece in self._pieces[threads]]
+            blocks = [bound(part, BATCH) for part in parts]
+            self._pieces[threads] = blocks, [int(block.ctypes.data) for block in blocks]
+        return self._pieces[threads][1]
 
     def _part(self, at: slice) -> Batch:
         batch = self._batch
