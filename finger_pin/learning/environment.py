@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from finger_pin.description.scenario import Scenario
-from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
-from finger_pin.learning.worlds import Worlds, read_actions
+from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,18 +70,18 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         Raises:
             InputError: Naming the argument, key or variable that is wrong.
         """
-        if render_mode not in (None, "rgb_array"):
-            raise InputError("render_mode", 'must be "rgb_array" or None', render_mode)
-        self.task, self.render_mode = Task(**task), render_mode
+        self.task, self.render_mode = Task(**task), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, 1)
         self.observation_space, self._actions = self._worlds.spaces()
         self.action_space = self._actions
+        self._begun = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Begin an episode with numbers, start and goal drawn anew; the same seed draws the same."""
         super().reset(seed=seed)
+        self._begun = True
         self._worlds.begin((0,), [self.np_random])
         observations, _ = self._worlds.observe(_ALONE)
         return observations[0], {"drawn": dict(self._worlds.each[0].drawn)}
@@ -91,7 +91,10 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
         Raises:
             InputError: If the action has another shape or is not finite, or the reward is wrong.
+            gymnasium.error.ResetNeeded: Before the first `reset`.
         """
+        if not self._begun:
+            raise ResetNeeded("there is no episode yet: call reset before step")
         worlds, world = self._worlds, self._worlds.each[0]
         worlds.act(read_actions(action, self._actions)[None], (0,))
         observations, signals = worlds.observe(_ALONE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.exceptions import InputError
-from finger_pin.learning.distributions import Distribution, Uniform
+from finger_pin.learning.distributions import Choice, Distribution, LogUniform, Normal, Uniform
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 
@@ -19,6 +19,8 @@ from finger_pin.learning.task import Task
 DELAY = "action.delay"
 _SENSOR = "observation."
 _OF_SENSOR = ("noise", "quantisation", "offset")
+# Of a scenario, what acts on an episode: its controller and its duration do not.
+_ACTING = ("finger.", "hand.", "environment.", "reference.", "simulation.initial.")
 
 
 class Randomisation:
@@ -36,6 +38,8 @@ class Randomisation:
         """
         given = task.randomise
         found = read_identified(given) if isinstance(given, str | os.PathLike) else given
+        if not isinstance(found, Mapping):
+            raise InputError("randomise", "must be distributions by key, or the path of an identified scenario", found)
         self._distributions: Mapping[str, Distribution] = dict(found)
         for key, distribution in self._distributions.items():
             if not callable(getattr(distribution, "draw", None)):
@@ -45,6 +49,14 @@ class Randomisation:
                 raise InputError("randomise", f"of the action only {DELAY} can be drawn", key)
             if key.startswith(_SENSOR):
                 self._check_sensor(key, task)
+                for end in _ends(distribution):
+                    Sensor(**{key.rpartition(".")[2]: end})
+            elif key == DELAY:
+                for end in _ends(distribution):
+                    self.delay({DELAY: end}, 0.0)
+            elif not key.startswith(_ACTING):
+                known = ", ".join([*_ACTING, _SENSOR, DELAY])
+                raise InputError("randomise", f"does not act on an episode; what does begins with {known}", key)
         other = (DELAY,)
         self.keys = tuple(key for key in self._distributions if key not in other and not key.startswith(_SENSOR))
 
@@ -58,6 +70,16 @@ class Randomisation:
     def draw(self, random: np.random.Generator) -> dict[str, Any]:
         """Return a value for every key."""
         return {key: each.draw(random) for key, each in self._distributions.items()}
+
+    def ends(self) -> Iterator[list[Any]]:
+        """Yield what stands at the keys where every distribution is at an end: all least ones, all largest ones.
+
+        Of a `Choice` all values follow each other; what another distribution may draw is not known.
+        """
+        ends = [_ends(self._distributions[key]) for key in self.keys]
+        if all(len(each) for each in ends):
+            for row in range(max(map(len, ends), default=0)):
+                yield [each[min(row, len(each) - 1)] for each in ends]
 
     def sensor(self, name: str, sensor: Sensor, drawn: Mapping[str, Any]) -> Sensor:
         """Return a sensor with the numbers that were drawn for it."""
@@ -75,6 +97,16 @@ class Randomisation:
         if not 0.0 <= found < np.inf:
             raise InputError(DELAY, "must be finite and not negative, s", found)
         return found
+
+
+def _ends(distribution: Distribution) -> Sequence[Any]:
+    """Return the least and the largest value that a distribution draws; of a normal one three deviations away."""
+    if isinstance(distribution, Choice):
+        return distribution.values
+    if isinstance(distribution, Normal):
+        mean, far = distribution.mean, 3.0 * distribution.deviation
+        return max(mean - far, distribution.low), min(mean + far, distribution.high)
+    return (distribution.low, distribution.high) if isinstance(distribution, Uniform | LogUniform) else ()
 
 
 def read_identified(path: str | os.PathLike[str]) -> dict[str, Distribution]:

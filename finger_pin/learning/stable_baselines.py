@@ -74,5 +74,5 @@ class StableBaselinesEnvironment(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[Any] | None]:
-        """Return no pictures: `Environment` draws them."""
-        return [None] * self.num_envs
+        """Return a picture of every world, if the worlds have a ``render_mode``."""
+        return self.worlds.render() or [None] * self.num_envs

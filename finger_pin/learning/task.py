@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -53,6 +53,12 @@ class Task:
             value = getattr(self, name)
             if not isinstance(value, int | float) or not 0.0 < value < np.inf:
                 raise InputError(name, "must be above 0 and finite, s", value)
+        for name in ("observation", "privileged"):
+            value = getattr(self, name)
+            if isinstance(value, str) or not isinstance(value, Sequence | Mapping):
+                raise InputError(name, "must be a list of names of variables", value)
+        if not (self.observation or self.draw):
+            raise InputError("observation", "must name at least one variable", [])
         for name, each in self._observed.items():
             if not (isinstance(each, Sensor) or callable(each)):
                 raise InputError(f"observation.{name}", "must be a Sensor or a function of what is observed", each)
@@ -89,7 +95,7 @@ class Task:
         for name, function in self._observed.items():
             if isinstance(function, Sensor):
                 continue
-            value = np.asarray(function(told), dtype=float)
+            value = _numbers(f"observation.{name}", _told(f"observation.{name}", function, told))
             if value.shape[:1] != (worlds,):
                 allowed = f"must return arrays with the worlds in front, shape ({worlds}, ...); see per_world"
                 raise InputError(f"observation.{name}", allowed, list(value.shape))
@@ -109,12 +115,15 @@ class Task:
         Raises:
             InputError: If a function returns another shape, or a reward is not finite.
         """
-        reward = _shaped("reward", self.reward(signals), worlds, float)
+        reward = _shaped("reward", self.reward, signals, worlds)
         if not np.isfinite(reward).all():
             raise InputError("reward", "must return finite numbers", reward.tolist())
         if self.done is None:
             return reward, np.zeros(worlds, dtype=bool)
-        return reward, _shaped("done", self.done(signals), worlds, bool)
+        done = _shaped("done", self.done, signals, worlds)
+        if np.isnan(done).any():
+            raise InputError("done", "must return whether the task has ended", done.tolist())
+        return reward, done != 0.0
 
 
 def per_world(function: Callable[[Signals], Any]) -> Function:
@@ -131,8 +140,28 @@ def per_world(function: Callable[[Signals], Any]) -> Function:
     return together
 
 
-def _shaped(name: str, value: Any, worlds: int, kind: type) -> Array:
-    found: NDArray[Any] = np.asarray(value, dtype=kind)
+def _told(name: str, function: Function, signals: Signals) -> ArrayLike:
+    """Return what a function makes of signals; refuse one that asks for what is not among them."""
+    try:
+        return function(signals)
+    except KeyError as error:
+        asked = error.args[0] if error.args else None
+        if asked in signals:
+            raise
+        allowed = f"asks for a signal that it is not told; there are {', '.join(signals)}"
+        raise InputError(name, allowed, asked) from None
+
+
+def _numbers(name: str, value: Any) -> Array:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(name, "must return numbers", value) from None
+
+
+def _shaped(name: str, function: Function, signals: Signals, worlds: int) -> Array:
+    """Return what a function makes of signals, one number per world."""
+    found = _numbers(name, _told(name, function, signals))
     if found.shape != (worlds,):
         allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front; see per_world"
         raise InputError(name, allowed, list(found.shape))

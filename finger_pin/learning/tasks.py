@@ -160,7 +160,7 @@ def make(name: str, render_mode: str | None = None, **task: Any) -> Environment:
 
 def make_vector(name: str, num_envs: int = 1, render_mode: str | None = None, **task: Any) -> VectorEnvironment:
     """Return many worlds of a task that ships."""
-    return VectorEnvironment(num_envs, **{**TASKS[name](), **task})
+    return VectorEnvironment(num_envs, render_mode=render_mode, **{**TASKS[name](), **task})
 
 
 def register() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
-from finger_pin.learning.worlds import Worlds, read_actions
+from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
 
 
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
@@ -25,12 +26,15 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     many threads there are. An episode that is over begins anew at the next step, whose action does not count.
     """
 
-    def __init__(self, num_envs: int, scenario: Scenario | str | Path, **task: Any) -> None:
+    def __init__(
+        self, num_envs: int, scenario: Scenario | str | Path, *, render_mode: str | None = None, **task: Any
+    ) -> None:
         """Prepare worlds.
 
         Args:
             num_envs: How many.
             scenario: As for `Environment`.
+            render_mode: As for `Environment`.
             task: As for `Environment`.
 
         Raises:
@@ -38,16 +42,18 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InputError("num_envs", "must be a whole number above 0", num_envs)
-        task.pop("render_mode", None)
-        self.task, self.num_envs = Task(**task), int(num_envs)
+        self.task, self.num_envs, self.render_mode = Task(**task), int(num_envs), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, self.num_envs)
         self.single_observation_space, self._single = self._worlds.spaces()
         self.single_action_space = self._single
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         low, high = (np.tile(each, (self.num_envs, 1)) for each in (self._single.low, self._single.high))
         self.action_space = self._actions = Box(low, high, dtype=np.float32)
-        self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_fps": round(1.0 / self.task.period)}
-        self.render_mode = None
+        self.metadata = {
+            "autoreset_mode": AutoresetMode.NEXT_STEP,
+            "render_modes": ["rgb_array"],
+            "render_fps": round(1.0 / self.task.period),
+        }
         self._randoms: list[np.random.Generator] = []
         self._ended, self._all = np.zeros(self.num_envs, dtype=bool), np.arange(self.num_envs)
         self._seen: NDArray[Any] = np.zeros(self.observation_space.shape or (), dtype=np.float32)
@@ -87,7 +93,10 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
         Raises:
             InputError: If the actions have another shape or are not finite, or the reward is wrong.
+            gymnasium.error.ResetNeeded: Before the first `reset`.
         """
+        if not self._randoms:
+            raise ResetNeeded("there are no episodes yet: call reset before step")
         commands, worlds = read_actions(actions, self._actions), self._worlds
         begun = self._ended.copy()
         at_start = np.flatnonzero(begun)
@@ -105,6 +114,12 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             if worlds.each[i].reason:
                 info = self._add_info(info, {"reason": worlds.each[i].reason}, i)
         return self._seen.copy(), rewards, done, over, info
+
+    def render(self) -> tuple[NDArray[Any], ...] | None:
+        """Return a picture of every world, shape (height, width, 3) each, of bytes."""
+        if self.render_mode is None:
+            return None
+        return tuple(world.picture() for world in self._worlds.each)
 
     def _drawn(self, begun: NDArray[np.int64]) -> dict[str, Any]:
         found: dict[str, Any] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -79,13 +80,18 @@ class World:
         if scenario.simulation.method not in TABLEAUS:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)
-        world = cls(Family(scenario, randomisation.keys), task, randomisation)
+        family = Family(scenario, randomisation.keys)
+        for values in randomisation.ends():
+            # What cannot be drawn is said now, not at the hundredth reset.
+            family.at(values)
+        world = cls(family, task, randomisation)
         known = known_variables(world.origin)
         for name in task.variables:
             if name not in known:
                 near = nearest(name, known)
                 hint = f"; did you mean {near}?" if near else ""
-                raise InputError("observation", f"no such variable; there are {', '.join(known)}{hint}", name)
+                entry = "observation" if name in task.sensors else "privileged"
+                raise InputError(entry, f"no such variable; there are {', '.join(known)}{hint}", name)
         return world
 
     def twin(self) -> World:
@@ -154,13 +160,28 @@ class World:
         else:
             self.stepper.restart(self._begun, time=0.0)
         task = self.task
-        context = {} if task.draw is None else task.draw(random)
-        self.context = {name: np.asarray(value, dtype=float) for name, value in context.items()}
+        self.context = self._context()
         self.drawn |= self.context
         self.sensors = {
             name: self._randomisation.sensor(name, sensor, self.drawn) for name, sensor in task.sensors.items()
         }
         self.action.begin(self._randomisation.delay(self.drawn, task.delay))
+
+    def _context(self) -> dict[str, Array]:
+        """Return what the task draws for an episode, by name."""
+        if self.task.draw is None:
+            return {}
+        drawn = self.task.draw(self._random)
+        if not isinstance(drawn, Mapping):
+            raise InputError("draw", "must return arrays by name", drawn)
+        found = {name: np.asarray(value, dtype=float) for name, value in drawn.items()}
+        shapes = {name: value.shape for name, value in self.context.items()}
+        for name, value in found.items():
+            if not np.isfinite(value).all():
+                raise InputError(f"draw.{name}", "must be finite", value.tolist())
+            if shapes.get(name, value.shape) != value.shape:
+                raise InputError(f"draw.{name}", f"must keep its shape {shapes[name]}", list(value.shape))
+        return found
 
     def _start(self) -> Array:
         """Return the packed state at the start."""

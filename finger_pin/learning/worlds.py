@@ -45,7 +45,6 @@ class Worlds:
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
         self._steppers = Together([world.stepper for world in self.each])
-        # What cannot be drawn is said now, not at the hundredth reset.
         self.begin(range(count), self._randoms)
 
     def _name_variables(self) -> None:
@@ -148,9 +147,23 @@ def read_actions(actions: Any, space: Box) -> Array:
     Raises:
         InputError: If they have another shape, or are not finite.
     """
-    found = np.asarray(actions, dtype=float)
+    try:
+        found = np.asarray(actions, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("action", "must be numbers", actions) from None
     if found.shape != space.shape:
         raise InputError("action", f"must have shape {space.shape}", list(found.shape))
     if not np.isfinite(found).all():
         raise InputError("action", "must be finite", found.tolist())
     return np.asarray(np.minimum(np.maximum(found, space.low), space.high), dtype=float)
+
+
+def read_render_mode(mode: str | None) -> str | None:
+    """Return how pictures are asked for.
+
+    Raises:
+        InputError: If there is no such way.
+    """
+    if mode not in (None, "rgb_array"):
+        raise InputError("render_mode", 'must be "rgb_array" or None', mode)
+    return mode

@@ -31,7 +31,7 @@ def tip_height(signals):
 @pytest.mark.filterwarnings("ignore:.*Box (action|observation) space")
 @pytest.mark.parametrize("name", ["Reach", "Press", "Grasp"])
 def test_gymnasium_accepts_what_ships(name):
-    environment = gymnasium.make(f"finger_pin/{name}-v0")
+    environment = gymnasium.make(f"finger_pin.learning:finger_pin/{name}-v0")
     check_env(environment.unwrapped, skip_render_check=True)
 
 
@@ -270,6 +270,14 @@ def test_intervals_of_an_identification_are_distributions(tmp_path):
         ({"randomise": {"finger.joints": Uniform(0, 1)}}, "finger.joints"),
         ({"randomise": {"finger.tendon_friction.coulomb": Normal(-1.0, 0.1)}}, "finger.tendon_friction.coulomb"),
         ({"randomise": {"observation.joint_angle.noise": Uniform(0, 1)}}, "observation.joint_position"),
+        ({"randomise": {"observation.joint_position.noise": Uniform(-0.1, 1)}}, "noise = -0.1"),
+        ({"randomise": {"finger.tendon_friction.coulomb": Uniform(-0.1, 1e9)}}, "coulomb = -0.1"),
+        ({"randomise": {"finger.tendon_friction.coulomb": Choice([0.1, -0.2])}}, "coulomb = -0.2"),
+        ({"randomise": {"controller.gain": Uniform(1, 2)}}, "does not act on an episode"),
+        ({"randomise": ["finger.tendon_friction.coulomb"]}, "distributions by key"),
+        ({"observation": []}, "at least one"),
+        ({"observation": "joint_position"}, "list of names"),
+        ({"draw": lambda random: {"goal": np.nan}}, "draw.goal"),
         ({"observation": ["joint_angle"]}, "joint_angle"),
         ({"action": "motor_position"}, "position drive"),
         ({"limits": (-1.0, 1.0)}, "negative"),
@@ -288,6 +296,22 @@ def test_a_wrong_task_is_refused_in_one_line(task, words):
 def test_wrong_actions_and_rewards_are_refused():
     environment = Environment(FIG6, reward=lambda signals: np.full(1, np.nan))
     environment.reset(seed=0)
-    for action, words in (([1.0, 1.0], "shape"), ([np.nan] * 4, "finite"), (PULLS[0], "reward")):
+    for action, words in (([1.0, 1.0], "shape"), ([np.nan] * 4, "finite"), ("pull", "numbers"), (PULLS[0], "reward")):
         with pytest.raises(fp.InputError, match=words):
             environment.step(action)
+    environment = Environment(FIG6, reward=tip_height)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        environment.step(PULLS[0])
+    environment.reset(seed=0)
+    with pytest.raises(fp.InputError, match="there are joint_position, joint_velocity, action"):
+        environment.step(PULLS[0])
+
+
+def test_pictures_of_worlds_are_those_of_each():
+    task = dict(reward=nothing, start="random", render_mode="rgb_array")
+    worlds, alone = VectorEnvironment(2, FIG6, **task), Environment(FIG6, **task)
+    worlds.reset(seed=4)
+    first, second = worlds.render()
+    alone.reset(seed=5)
+    np.testing.assert_array_equal(second, alone.render())
+    assert (first != second).any()
