@@ -33,6 +33,10 @@ _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
 # from so many times the expected error on.
 _DOUBTED = 3.0
 _TIGHTER = 10.0
+_BEYOND = (
+    "small errors grow beyond all bounds, as over many impacts; "
+    "try a shorter simulation.duration, or a smaller simulation.rtol and atol_scale"
+)
 # Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
 # is then beyond a linearised flow.
 _CLOSE_TO_LOCKING = 1.5
@@ -99,7 +103,7 @@ def close_account(
     result, settings = recorded(trajectory), scenario.simulation
     first = run = Attempt(scenario, trajectory, result, left_open(result))
     limit = max(_CLOSED * max(settings.rtol, settings.atol_scale), _WELL_CLOSED)
-    whole = np.isfinite(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
+    whole = not np.isnan(trajectory.estimated_error) and not trajectory.failure and not trajectory.interrupted
     for _ in range(_MOST_REPETITIONS):
         if not whole or run.trajectory.statistics.steps > _MOST_STEPS or not limit < run.left < np.inf:
             break
@@ -138,9 +142,11 @@ def estimate_error(
     """
     trajectory, other = run.trajectory, run.coarser
     expected, error = expected_error(scenario), trajectory.estimated_error
-    doubted = error > _DOUBTED * expected or (margin < _CLOSE_TO_LOCKING and np.isfinite(error))
+    doubted = error > _DOUBTED * expected or (margin < _CLOSE_TO_LOCKING and not np.isnan(error))
     if not doubted or trajectory.failure or trajectory.interrupted:
         return error, ""
+    if error == np.inf:
+        return np.nan, f"the error of the run cannot be judged: {_BEYOND}"
     rtol = run.scenario.simulation.rtol
     if other is None:
         tighter = with_tighter(run.scenario, _TIGHTER)
@@ -156,8 +162,7 @@ def estimate_error(
     if run.coarser is None and other.estimated_error > error:
         return np.nan, (
             f"the error of the run cannot be judged: repeated at rtol {rtol:g} it differs by {error:.1g} rad rms, "
-            "and that one is no more certain: small errors grow beyond all bounds, as over many impacts; "
-            "try a shorter simulation.duration, or a smaller simulation.rtol and atol_scale"
+            f"and that one is no more certain: {_BEYOND}"
         )
     return error, (
         f"the run errs by about {error:.1g} rad rms: repeated at rtol {rtol:g} it differs by that. "

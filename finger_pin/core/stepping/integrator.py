@@ -14,6 +14,7 @@ from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part, Record, failure
 from finger_pin.core.stepping.stepper import Stepper, in_threads
 from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
+from finger_pin.core.stepping.twin import Twin
 from finger_pin.description.routing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
@@ -44,13 +45,14 @@ class Moving(Protocol):
 class _Recorder:
     """Carries one island forward and keeps its steps."""
 
-    def __init__(self, stepper: Stepper, index: int, chunk: int) -> None:
+    def __init__(self, stepper: Stepper, index: int, chunk: int, judged: bool) -> None:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
         self.kept = [part.room(0)]
         self.room = part.room(chunk)
         self.taken = 0
+        self.twin = Twin(part) if judged else None
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
 
     def advance(self, end: float, chunks: int = -1) -> int:
@@ -60,6 +62,8 @@ class _Recorder:
             status, steps = part.advance(end, self.room)
             self.kept.append(self.room.first(steps))
             self.taken += steps
+            if self.twin is not None:
+                self.twin.look()
             chunks -= 1
             if status != core.FULL or self.taken >= self.most:
                 return status
@@ -112,7 +116,9 @@ def integrate_compiled(
     # Advancing by nothing compiles, which is no part of an integration's cost.
     stepper.advance(stepper.time)
     began = time.perf_counter()
-    recorders = [_Recorder(stepper, index, chunk) for index in range(len(stepper.parts))]
+    # Of a controller that acts in between, the linearised flow knows nothing.
+    judged = held is None and not stepper.driven
+    recorders = [_Recorder(stepper, index, chunk, judged) for index in range(len(stepper.parts))]
     alone = len(recorders) == 1
     reason, interrupted = "", False
     while stepper.time < duration and not reason and not interrupted:
@@ -149,11 +155,16 @@ def integrate_compiled(
         ),
         failure=reason,
         interrupted=interrupted,
-        # Of a controller that acts in between, the linearised flow knows nothing.
-        estimated_error=np.nan if held is not None or stepper.driven else stepper.estimated_error,
+        estimated_error=_error(stepper, recorders) if judged else np.nan,
         # Inputs that are held in between are not the core's own.
-        islands=() if held is not None or stepper.driven or stepper.held else tuple(steps),
+        islands=() if not judged or stepper.held else tuple(steps),
     )
+
+
+def _error(stepper: Stepper, recorders: Sequence[_Recorder]) -> float:
+    """Return the error of a run as it estimates it, rad or m rms; infinite where it has grown beyond all bounds."""
+    lost = any(recorder.twin is not None and recorder.twin.lost for recorder in recorders)
+    return np.inf if lost else stepper.estimated_error
 
 
 def joined(stepper: Stepper, steps: Sequence[Moving]) -> Callable[[Array], Array]:

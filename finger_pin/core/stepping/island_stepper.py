@@ -133,6 +133,16 @@ class Part:
         return Record.of(count, len(self.x), len(self.attitude), len(self.tableau.dense))
 
     @property
+    def rtol(self) -> float:
+        """Relative tolerance."""
+        return float(self._bound.rtol)
+
+    @property
+    def drift(self) -> Array:
+        """Estimate of the error of its state, carried along, shape (size,); no copy."""
+        return self._bound.drift
+
+    @property
     def time(self) -> float:
         """Time reached, s."""
         return float(self.memory[core.TIME])
