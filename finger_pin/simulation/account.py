@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -29,11 +29,13 @@ _CHUNK = 4096
 # A power may bend inside a step where no force does, as that which a limiter loses where it would have to pull; and
 # an impact may be one step. Where more than this stays open, of all energy exchanged and in J, steps are halved, so
 # often at most, until no work of one is wrong by a thousandth of it: of so many steps those where it opens most.
-_CLOSED, _NOTHING = 1e-5, 1e-12
+_CLOSED, _NOTHING, _SMALL = 1e-5, 1e-12, 1e-3
 _HALVINGS, _MOST_SUSPECTED = 8, 20_000
 
 # The ends of steps, and what maps times to powers there.
 _Part = tuple[Array, Callable[[Array], Array]]
+# Where steps begin, and how long they are, s.
+_Steps = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,43 +75,76 @@ def account(
     stored = energies(loop.finger, signals.finger, motion)
     total = np.sum(list(stored.values()), axis=0)
     parts, done = _parts(loop, trajectory), np.zeros((len(times), len(booked.booked)))
-    found = [_works(part, times, done.shape[1]) for part in parts]
-    done += np.sum(found, axis=0)
+    for ends, power in parts:
+        done += _works(power, ends[:-1], np.diff(ends), times, done.shape[1])
     works = Flows(done, booked.booked)
     gained = total - total[0]
     residual = gained - works.net
     allowed = max(_CLOSED * float(np.sum(np.max(np.abs(done), axis=0, initial=0.0))), _NOTHING)
     if allowed < float(np.max(np.abs(residual))) < np.inf:
-        for (ends, power), own in zip(parts, found, strict=True):
-            finer = _halved((ends, power), _suspected(ends, times, residual), 1e-3 * allowed)
-            if len(finer):
-                done += _works((np.union1d(ends, finer), power), times, done.shape[1]) - own
-        works = Flows(done, booked.booked)
-        residual = gained - works.net
+        opened = np.abs(np.diff(residual))
+        seen = [np.zeros(0, dtype=np.int64) for _ in parts]
+        for spans in _worst(opened, allowed):
+            for index, (ends, power) in enumerate(parts):
+                steps = np.setdiff1d(_steps(ends, times, spans), seen[index])
+                seen[index] = np.union1d(seen[index], steps)
+                coarse, fine = _halved(power, ends[steps], np.diff(ends)[steps], _SMALL * allowed)
+                if len(coarse[0]):
+                    done += _works(power, *fine, times, done.shape[1]) - _works(power, *coarse, times, done.shape[1])
+            works = Flows(done, booked.booked)
+            residual = gained - works.net
+            if np.sum(np.abs(np.diff(residual))[spans]) > 0.5 * np.sum(opened[spans]):
+                break
     return Account(stored=stored, powers=booked, works=works, residual=residual)
 
 
-def _suspected(ends: Array, times: Array, residual: Array) -> NDArray[np.int64]:
-    """Return in which steps the account opens most, at most so many: those between saved times where it does."""
-    first = np.searchsorted(ends[1:-1], times[:-1], side="right")
-    last = np.searchsorted(ends[1:-1], times[1:], side="left") + 1
-    worst = np.argsort(-np.abs(np.diff(residual)))
-    worst = worst[np.cumsum(last[worst] - first[worst]) <= _MOST_SUSPECTED]
-    return np.unique(np.concatenate([np.zeros(0, int), *(np.arange(first[i], last[i]) for i in worst)]))
+def _worst(opened: Array, allowed: float) -> Iterator[NDArray[np.int64]]:
+    """Yield where the account opens most, as spans between saved times: first half of it all, then the rest.
+
+    What it opens elsewhere is less than half of what is allowed, J. What stays open where halving steps does not help
+    is no error of the quadrature.
+
+    Args:
+        opened: By how much it opens in each span, shape (m - 1,), J.
+        allowed: How much may stay open, J.
+    """
+    order = np.argsort(-opened)
+    sums = np.cumsum(opened[order])
+    half, most = np.searchsorted(sums, (0.5 * sums[-1], sums[-1] - 0.5 * allowed)) + 1
+    yield order[:half]
+    yield order[half:most]
 
 
-def _halved(part: _Part, steps: NDArray[np.int64], allowed: float) -> Array:
-    """Return steps halved, and halved again, until no work of one is wrong by more than is allowed, J."""
-    (ends, power), found = part, []
-    begin, length = ends[steps], np.diff(ends)[steps]
+def _steps(ends: Array, times: Array, spans: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the steps in spans between saved times; of more than so many those in the first spans."""
+    first = np.searchsorted(ends[1:-1], times[spans], side="right")
+    last = np.searchsorted(ends[1:-1], times[spans + 1], side="left") + 1
+    few = np.cumsum(last - first) <= _MOST_SUSPECTED
+    chosen = zip(first[few], last[few], strict=True)
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(*each) for each in chosen)]))
+
+
+def _halved(power: Callable[[Array], Array], begin: Array, length: Array, allowed: float) -> tuple[_Steps, _Steps]:
+    """Return the steps, as begins and lengths, of which a work is wrong by more than is allowed, J, and those in place.
+
+    They are halved until none is.
+    """
+    coarse: _Steps | None = None
+    fine: list[_Steps] = []
     for _ in range(_HALVINGS):
         chunks = [slice(first, first + _CHUNK) for first in range(0, len(begin), _CHUNK)]
         errors = [_quadrature_error(power, begin[chunk], length[chunk]) for chunk in chunks]
         bent = np.concatenate([np.zeros(0), *errors]) > allowed
+        if coarse is None:
+            coarse = begin[bent], length[bent]
+        else:
+            fine.append((begin[~bent], length[~bent]))
         begin, length = begin[bent], 0.5 * length[bent]
-        found.append(begin + length)
         begin, length = np.concatenate([begin, begin + length]), np.tile(length, 2)
-    return np.concatenate(found)
+    fine.append((begin, length))
+    begin, length = (np.concatenate(each) for each in zip(*fine, strict=True))
+    order = np.argsort(begin)
+    return coarse or fine[0], (begin[order], length[order])
 
 
 def _quadrature_error(power: Callable[[Array], Array], begin: Array, length: Array) -> Array:
@@ -137,31 +172,25 @@ def _powers_apart(loop: ClosedLoop, island: Apart, times: Array) -> Array:
     return island.powers(times, loop.force(times), loop.base(times))
 
 
-def _works(part: _Part, times: Array, count: int) -> Array:
-    """Return the integrals of all powers up to the saved times, in order, shape (m, count), J.
+def _works(power: Callable[[Array], Array], begin: Array, length: Array, times: Array, count: int) -> Array:
+    """Return the integrals of all powers over steps, in order, up to the saved times, shape (m, count), J.
 
     Inside a step the power is taken for the parabola through its values at the nodes: over whole steps that is the
     quadrature, and what it errs by inside a step does not add up.
     """
-    ends, power = part
     works, reached = np.zeros((len(times), count)), np.zeros(count)
-    for first in range(0, len(ends) - 1, _CHUNK):
-        chunk = ends[first : first + _CHUNK + 1]
-        begin, length = chunk[:-1], np.diff(chunk)
-        values = _over(power, begin, length, _NODES)
+    for first in range(0, len(begin), _CHUNK):
+        chunk = slice(first, first + _CHUNK)
+        values = _over(power, begin[chunk], length[chunk], _NODES)
         before = np.vstack([reached, reached + np.cumsum(np.tensordot(_WEIGHTS, values, (0, 1)), axis=0)])
-        rows = _saved(times, chunk)
-        step = np.clip(np.searchsorted(begin, times[rows], side="right") - 1, 0, None)
-        share = np.vander((times[rows] - begin[step]) / length[step], 4)[:, :3] @ _PARABOLAS
-        works[rows] = before[step] + np.einsum("mn,mnp->mp", share, values[step])
+        until = np.append(begin, np.inf)[min(first + _CHUNK, len(begin))]
+        rows = slice(*(int(at) for at in np.searchsorted(times, (begin[first], until))))
+        step = np.searchsorted(begin[chunk], times[rows], side="right") - 1
+        share = np.minimum((times[rows] - begin[chunk][step]) / length[chunk][step], 1.0)
+        parts = np.vander(share, 4)[:, :3] @ _PARABOLAS
+        works[rows] = before[step] + np.einsum("mn,mnp->mp", parts, values[step])
         reached = before[-1]
     return works
-
-
-def _saved(times: Array, ends: Array) -> slice:
-    """Return the slice of the saved times that lie in steps, those at their ends among them."""
-    first, last = np.searchsorted(times, ends[0]), np.searchsorted(times, ends[-1] * (1.0 + 1e-12), side="right")
-    return slice(int(first), int(last))
 
 
 def _over(power: Callable[[Array], Array], begin: Array, length: Array, nodes: Array) -> Array:
