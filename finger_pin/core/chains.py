@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from finger_pin.mechanism.solids import WORLD
 
 # Less of a unit axis is rounding.
 _STILL = 1e-8
+_UPPER = np.triu_indices(3)
 # Farther than anything slides, m, but for what is led.
 _ANYWHERE = 1e3
 
@@ -48,6 +50,12 @@ class Chains(NamedTuple):
     chart_frames: Array
     last: list[int]
     turns: list[Array]
+
+    def geometry(self) -> bytes:
+        """Return all of it that does not say how heavy bodies are."""
+        places = self.bodies[:, ROTATION:MASS]
+        parts = (self.parents, self.kinds, places, self.slides, self.charts, np.array(self.last), *self.turns)
+        return b"".join(np.ascontiguousarray(each).tobytes() for each in parts)
 
 
 class _Body(NamedTuple):
@@ -80,7 +88,7 @@ def read_chains(model: pin.Model) -> Chains:
             charts.append(first)
             frames.append(rotation)
         for i, part in enumerate(chain, start=first):
-            turned = _frame_along(part.axis)
+            turned = _frame_along(tuple(part.axis.tolist()))
             parents[i], kinds[i] = above, part.kind
             bodies[i, ROTATION : ROTATION + 9] = (rotation @ turned).ravel()
             bodies[i, TRANSLATION : TRANSLATION + 3] = translation
@@ -90,7 +98,7 @@ def read_chains(model: pin.Model) -> Chains:
         bodies[above, MASS] = inertia.mass
         bodies[above, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
         moments = turn.T @ inertia.inertia @ turn
-        bodies[above, INERTIA : INERTIA + 6] = moments[np.triu_indices(3)]
+        bodies[above, INERTIA : INERTIA + 6] = moments[_UPPER]
         last.append(above)
         turns.append(turn)
     roots: NDArray[np.int64] = np.arange(size)
@@ -117,7 +125,8 @@ def _coordinates(model: pin.Model, index: int) -> list[_Body]:
     raise InputError(f"joint {model.names[index]}", "must turn about or slide along a fixed axis", joint.shortname())
 
 
-def _frame_along(axis: Array) -> Array:
+@lru_cache
+def _frame_along(axis: tuple[float, float, float]) -> Array:
     """Return a rotation whose third column is a unit axis."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.chains import Chains
-from finger_pin.core.evaluation.rigid_body import PRISMATIC, ROTATION, TRANSLATION
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.description.routing import Array
+from finger_pin.core.levers import Carrying, levers
 from finger_pin.mechanism.pieces import Leg, Piece
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
@@ -151,11 +150,8 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
-    levers, against = [], []
-    for piece, (at, moves) in zip(pieces, entries, strict=True):
-        found, others = _levers(piece, at, moves, chains)
-        levers.append(found)
-        against.append(others)
+    carrying = Carrying.of(chains)
+    found = [levers(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
     halves = [0.5 * float(np.linalg.norm(row[3:] - row[:3])) for row in points]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
@@ -175,8 +171,8 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
-        levers=np.concatenate([np.zeros(0), *levers]),
-        against=np.concatenate([np.zeros(0, dtype=np.int64), *against]),
+        levers=np.concatenate([np.zeros(0), *(each for each, _ in found)]),
+        against=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in found)]),
         cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
         extents=np.array([piece.extent for piece in pieces], dtype=float),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
@@ -209,45 +205,6 @@ def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[ND
             at = int(parents[at])
     moved = np.flatnonzero(moves.any(axis=1))
     return moved, np.ascontiguousarray(moves[moved])
-
-
-def _levers(
-    piece: Piece, coordinates: NDArray[np.int64], moves: NDArray[np.int64], chains: Chains
-) -> tuple[Array, NDArray[np.int64]]:
-    """Return `levers` and `against` of the coordinates that move a gap's bodies."""
-    found, against = np.zeros(len(chains.parents)), np.full(len(chains.parents), -1, dtype=np.int64)
-    first = max(float(np.linalg.norm(end.point)) for end in piece.ends) + piece.breadth
-    # Of what has no end, how far the first body is counts: `far` is added.
-    second = float(np.linalg.norm(piece.frame.translation)) + (piece.extent if np.isfinite(piece.extent) else 0.0)
-    for joint, reach in ((piece.ends[0].joint, first), (piece.joint, second)):
-        at = chains.last[joint]
-        while at >= 0:
-            slides = chains.kinds[at] == PRISMATIC
-            found[at] = 1.0 if slides else reach
-            distance = float(np.linalg.norm(chains.bodies[at, TRANSLATION : TRANSLATION + 3]))
-            reach += float(chains.slides[at]) if slides else distance
-            at = int(chains.parents[at])
-    for at, (one, _, two) in zip(coordinates, moves, strict=True):
-        if one and two:
-            found[at] = 0.0
-    ones, twos = coordinates[moves[:, 0] > moves[:, 2]], coordinates[moves[:, 2] > moves[:, 0]]
-    for one in ones:
-        for two in twos:
-            first_axis, second_axis = _sliding(int(one), chains), _sliding(int(two), chains)
-            if np.any(first_axis) and np.array_equal(first_axis, second_axis):
-                against[one], found[two] = two, 0.0
-    return found[coordinates], against[coordinates]
-
-
-def _sliding(at: int, chains: Chains) -> Array:
-    """Return the axis along which a body slides, in the base frame; zero if something turns it."""
-    rotation = np.eye(3)
-    while at >= 0:
-        if chains.kinds[at] != PRISMATIC:
-            return np.zeros(3)
-        rotation = chains.bodies[at, ROTATION : ROTATION + 9].reshape(3, 3) @ rotation
-        at = int(chains.parents[at])
-    return np.asarray(rotation[:, 2])
 
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:

@@ -12,6 +12,7 @@ from finger_pin.core.chains import Chains, read_chains
 from finger_pin.core.evaluation.law_code import SIGNALS, addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import Paths, reached, read_paths
+from finger_pin.description.remembering import Remembered
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 
@@ -118,6 +119,7 @@ class Tables(NamedTuple):
 
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
+_PATHS: Remembered[Paths] = Remembered()
 _CHAINS: WeakKeyDictionary[RigidBody, Chains] = WeakKeyDictionary()
 
 
@@ -143,7 +145,8 @@ def _read(mechanism: Mechanism) -> Tables:
     if body not in _CHAINS:
         _CHAINS[body] = read_chains(body.model)
     chains, count = _CHAINS[body], sum(table.count for table in rows)
-    paths = read_paths([path for table in rows for path in table.paths], chains)
+    legs = tuple(table.paths for table in rows)
+    paths = _PATHS.of((legs, chains.geometry()), lambda: read_paths([path for each in legs for path in each], chains))
     return Tables(
         guided=mechanism.guided,
         lumps=mechanism.inertia,
@@ -219,8 +222,12 @@ def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
     for wiring in ("inputs", "loads"):
         starts.append([len(terms)])
         for table in rows:
+            weighted = getattr(table, wiring)
+            if not weighted:
+                starts[-1] += [len(terms)] * table.count
+                continue
             for k in range(table.count):
-                for group, matrix in getattr(table, wiring).items():
+                for group, matrix in weighted.items():
                     found = np.flatnonzero(matrix[k])
                     terms.extend(first_row[group] + found)
                     weights.extend(matrix[k, found])

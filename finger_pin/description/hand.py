@@ -175,9 +175,16 @@ class HandDescription(Description):
         return _JOINED.of((self,), self._joined)
 
     def _joined(self) -> FingerDescription:
+        # Of hands whose palms differ all else is the same.
+        fingers = (self.name, self.title, self.gravity, *self.fingers, *self.fingers.values())
+        joined = _JOINED.of(fingers, self._put_together).model_copy()
+        joined._hand = self
+        return joined
+
+    def _put_together(self) -> FingerDescription:
         parts = self.built()
         tendons = {f"{name}.{own}": tendon for name, part in parts.items() for own, tendon in part.tendons.items()}
-        joined = FingerDescription.model_construct(
+        return FingerDescription.model_construct(
             name=self.name,
             title=self.title,
             gravity=self.gravity,
@@ -200,8 +207,6 @@ class HandDescription(Description):
                 for own, actuator in part.actuators.items()
             },
         )
-        joined._hand = self
-        return joined
 
     def _built(self, name: str, placed: PlacedFinger) -> FingerDescription:
         own = placed.rotation.T @ np.array(self.gravity)

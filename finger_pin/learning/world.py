@@ -106,7 +106,10 @@ class World:
 
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
         """Build what moves, under inputs that are held."""
-        self._scenario, self.origin = scenario, origin or ClosedLoop.from_scenario(scenario).compiled(self._bindings)
+        if origin is None:
+            known = self._nominal and self._nominal[0].changed(scenario.finger, scenario.environment.objects)
+            origin = ClosedLoop.from_scenario(scenario, finger=known).compiled(self._bindings)
+        self._scenario, self.origin = scenario, origin
         finger, family = self.origin.finger, self._family.scenario
         # Drives know what the scenario says, not what was drawn.
         self._nominal = self._nominal or (finger, family.coupling(finger.routing))

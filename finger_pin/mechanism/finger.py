@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
@@ -186,16 +187,23 @@ class Finger:
         finger.visuals = shown
         return finger
 
-    def changed(self, description: FingerDescription) -> Finger:
-        """Return the finger that another description makes, with the rigid body, rows and objects that were given."""
-        rigid_body, rows, objects = self.made_of
+    def changed(self, description: FingerDescription, objects: Mapping[str, Object] | None) -> Finger:
+        """Return the finger that another description and other objects make, with the body and rows that were given."""
+        (rigid_body, rows, known), around = self.made_of, self.surroundings
+        led = objects is known or (around is not None and around.same_but_for_paths(objects))
+        if led and _same_but_for_path(self.description, description):
+            # The mechanism does not know where its palm and objects are led.
+            finger = copy.copy(self)
+            finger.description, finger.made_of = description, (rigid_body, rows, objects)
+            finger.surroundings = around and around.with_objects(objects or {})
+            return finger
         finger = Finger(description, rigid_body, rows, objects)
         finger.visuals = self.visuals
         return finger
 
     def fitted(self, known: Scenario, other: Scenario) -> Finger:
         """Return this finger where two scenarios describe theirs alike, else it with the numbers of the other one."""
-        return self if known.finger == other.finger else self.changed(other.finger)
+        return self if known.finger == other.finger else self.changed(other.finger, self.made_of[2])
 
     @property
     def coupling(self) -> Array:
@@ -310,6 +318,15 @@ class Finger:
     def rhs(self, time: float, x: Array, inputs: Array, fingertip_force: Array | None = None) -> Array:
         """Return the time derivative of the packed state, for a solver of one's own; ``time`` is not used."""
         return self.mechanism.evaluate(x, inputs, fingertip_force).rate
+
+
+def _same_but_for_path(one: FingerDescription, other: FingerDescription) -> bool:
+    """Return whether two descriptions have the same parts, and hands with palms that both move or both rest."""
+    if one.hand is None or other.hand is None:
+        return one == other
+    parts = all(getattr(one, name) is getattr(other, name) for name in FingerDescription.model_fields)
+    moving = (one.hand.palm.path is None) == (other.hand.palm.path is None)
+    return parts and moving and one.hand.fingers_touch == other.hand.fingers_touch
 
 
 #: A hand is a finger whose joints form a tree.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription, Link
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
@@ -25,6 +27,7 @@ from finger_pin.mechanism.state import State
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
+_CONTACTS: Remembered[Rows] = Remembered()
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
@@ -41,11 +44,13 @@ class Surroundings:
     """Objects around a finger.
 
     Attributes:
-        free: The objects that move, free or along paths, by name.
+        objects: All objects, by name.
+        free: Those that move, free or along paths.
         body: The finger's rigid body, and the free objects after its joints.
         contacts: Between links and objects, links of different fingers, and objects.
     """
 
+    objects: Mapping[str, Object]
     free: Mapping[str, Object]
     body: RigidBody
     contacts: Rows
@@ -69,8 +74,33 @@ class Surroundings:
         Raises:
             InputError: If an object has the name of a joint or a shape, or a link has no size.
         """
-        hand, tree = description.hand, description.tree
+        hand = description.hand
         extended = add_free_objects(mechanism.body, objects, hand.palm if hand and mechanism.moved else None)
+        free = {name: each for name, each in objects.items() if extended.model.existJointName(f"{name}_attitude")}
+        for name, each in free.items():
+            if each.path and mechanism.moved:
+                raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
+        width = int(extended.model.nv) + len(mechanism.lumps)
+        # How heavy objects are, and where they move, is nothing to their contacts.
+        forms = [
+            (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.pose.tobytes(), each.surface)
+            for name, each in objects.items()
+        ]
+        links = (joint.link for joint in description.joints.values())
+        touching = hand and hand.fingers_touch, description.touches_itself, width
+        make = partial(cls._contacts, objects, description, extended, width, placed)
+        return cls(objects, free, extended, _CONTACTS.of((mechanism.body, *touching, *links, *forms), make))
+
+    @staticmethod
+    def _contacts(
+        objects: Mapping[str, Object],
+        description: FingerDescription,
+        extended: RigidBody,
+        width: int,
+        placed: Mapping[str | None, Placed] | None,
+    ) -> Rows:
+        """Return the contacts of links and objects."""
+        hand, tree = description.hand, description.tree
         if tree is not None and placed is not None:
             own = tree_solids(tree, placed, extended)
         else:
@@ -81,13 +111,22 @@ class Surroundings:
             for what, taken in (("joint", description.joints), ("shape", [each.name for each in own])):
                 if name in taken:
                     raise InputError(f"environment.objects.{name}", f"a {what} has this name; choose another")
-        solids = [*own, *object_solids(objects, extended)]
-        free = {name: each for name, each in objects.items() if extended.model.existJointName(f"{name}_attitude")}
-        for name, each in free.items():
-            if each.path and mechanism.moved:
-                raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
-        width = int(extended.model.nv) + len(mechanism.lumps)
-        return cls(free, extended, contact_rows(solids, width, pairs_within(description)))
+        return contact_rows([*own, *object_solids(objects, extended)], width, pairs_within(description))
+
+    def same_but_for_paths(self, objects: Mapping[str, Object] | None) -> bool:
+        """Return whether some objects are the same but for the paths along which they, or the palm, are moved."""
+        # A world that a moving palm sees has to be as wide as the palm's path.
+        if self.world or objects is None or [*objects] != [*self.objects]:
+            return False
+        pairs = [(each, objects[name]) for name, each in self.objects.items()]
+        return all(
+            one is two or (one.moves == two.moves and one.model_copy(update={"path": two.path}) == two)
+            for one, two in pairs
+        )
+
+    def with_objects(self, objects: Mapping[str, Object]) -> Surroundings:
+        """Return the same around a finger with such objects."""
+        return replace(self, objects=objects, free={name: objects[name] for name in self.free})
 
     def around(self, mechanism: Mechanism) -> Mechanism:
         """Return the finger with its surroundings: free objects after the joints, contacts before all other rows.

@@ -217,12 +217,13 @@ class Prepared:
 
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
         """Return the loop of one of the family."""
-        known, finger = self.family.scenario, self._given
+        known, given = self.family.scenario, self._given
         if scenario.finger == known.finger and scenario.environment.objects == known.environment.objects:
             # Nothing of it changes in a run: all share it, also in threads.
             finger = self._finger
-        elif finger is not None:
-            finger = finger.changed(scenario.finger)
+        else:
+            objects = scenario.environment.objects if given is None else given.made_of[2]
+            finger = self._finger.changed(scenario.finger, objects)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
 

@@ -157,7 +157,7 @@ class Simulator:
         """
         if self._family is None or self._family.keys != tuple(values):
             self._family = Family.of_finger(self.finger.description, tuple(values))
-        changed = self.finger.changed(self._family.at([*values.values()]).finger)
+        changed = self.finger.changed(self._family.at([*values.values()]).finger, self.finger.made_of[2])
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
         x, time = self.x, self.time

@@ -1,0 +1,86 @@
+"""How far the coordinates of a mechanism move the two bodies of a gap against each other."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.chains import Chains
+from finger_pin.core.evaluation.rigid_body import PRISMATIC, ROTATION, TRANSLATION
+from finger_pin.description.routing import Array
+from finger_pin.mechanism.pieces import Piece
+
+
+class Carrying(NamedTuple):
+    """What the bodies of chains do to those that they carry.
+
+    Attributes:
+        parents: Of each body, -1 for the base.
+        slides: Whether it slides, and how far at most, m; None of one that turns.
+        distances: From the body before it, m.
+        axes: Along which it slides, base frame; None if something turns it.
+    """
+
+    parents: list[int]
+    slides: list[float | None]
+    distances: list[float]
+    axes: list[tuple[float, ...] | None]
+
+    @classmethod
+    def of(cls, chains: Chains) -> Carrying:
+        """Read chains."""
+        parents, sliding = chains.parents.tolist(), (chains.kinds == PRISMATIC).tolist()
+        slides = [float(most) if each else None for each, most in zip(sliding, chains.slides, strict=True)]
+        distances = [float(np.linalg.norm(body[TRANSLATION : TRANSLATION + 3])) for body in chains.bodies]
+        axes: list[tuple[float, ...] | None] = []
+        for at in range(len(parents)):
+            rotation, above = np.eye(3), at
+            while above >= 0 and sliding[above]:
+                rotation = chains.bodies[above, ROTATION : ROTATION + 9].reshape(3, 3) @ rotation
+                above = parents[above]
+            axes.append(None if above >= 0 else tuple(rotation[:, 2].tolist()))
+        return cls(parents, slides, distances, axes)
+
+
+def levers(
+    piece: Piece, coordinates: NDArray[np.int64], moves: NDArray[np.int64], last: list[int], carrying: Carrying
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return `levers` and `against` of `Paths` for the coordinates that move a gap's bodies.
+
+    Args:
+        piece: The gap.
+        coordinates: Those that move its bodies, shape (k,).
+        moves: Which of the bodies of both points and of the frame each moves, shape (k, 3).
+        last: Of every joint its last body.
+        carrying: What the bodies do.
+    """
+    parents, slides, distances, axes = carrying
+    found, against = dict[int, float](), dict[int, int]()
+    first = max(_length(end.point) for end in piece.ends) + piece.breadth
+    # Of what has no end, how far the first body is counts: `far` is added.
+    second = _length(piece.frame.translation) + (piece.extent if math.isfinite(piece.extent) else 0.0)
+    for joint, reach in ((piece.ends[0].joint, first), (piece.joint, second)):
+        at = last[joint]
+        while at >= 0:
+            most = slides[at]
+            found[at] = reach if most is None else 1.0
+            reach += distances[at] if most is None else most
+            at = parents[at]
+    movers = list(zip(coordinates.tolist(), moves.tolist(), strict=True))
+    for at, (one, _, two) in movers:
+        if one and two:
+            found[at] = 0.0
+    twos = [at for at, (one, _, two) in movers if two > one and axes[at]]
+    for one in (at for at, (one, _, two) in movers if one > two and axes[at]):
+        for two in twos:
+            if axes[one] == axes[two]:
+                against[one], found[two] = two, 0.0
+    others = np.array([against.get(at, -1) for at, _ in movers], dtype=np.int64)
+    return np.array([found.get(at, 0.0) for at, _ in movers]), others
+
+
+def _length(vector: Array) -> float:
+    return float(np.linalg.norm(vector))
