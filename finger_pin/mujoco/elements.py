@@ -1,4 +1,4 @@
-"""Level, load and turn of every kind of friction, from MuJoCo's model and its state."""
+"""Speed, load and turn of every kind of friction, from MuJoCo's model and its state."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.laws.bristle import friction_coefficient, friction_level
-from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.exchange.mujoco_friction import (
-    COULOMB,
     DRAG,
-    EXPONENT,
     FLOOR,
     HEAD,
     KIND,
@@ -21,21 +17,17 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     OFFSET,
     RATIO,
     SHARE,
-    STATIC,
-    STRIBECK,
     VISCOUS,
 )
 from finger_pin.mujoco.loads import between, spring, turn_of_path
 from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, numbers
-
-_coefficient, _capstan, _least = compiled(friction_coefficient), compiled(capstan_coefficient), compiled(friction_level)
 
 
 @compiled
 def tendon(
     m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
 ) -> Any:
-    """Return speed, level, the most that holds it back, tension and turn of a tendon, by (9b), (14), (16)."""
+    """Return speed, tension, what presses, the most that holds it back, and turn of a tendon: (14)."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)
@@ -48,19 +40,14 @@ def tendon(
     speed = number_in(d, of.ten_velocity, tendon)
     loss = way * (force + p[VISCOUS] * speed)
     delivered = max(tension - loss, 0.0)
-    bend, level = p[OFFSET], max(p[DRAG], p[FLOOR])
-    if tension + delivered > 0.0:
+    bend, pressing = p[OFFSET], tension + delivered
+    if pressing > 0.0:
         bend += _turn(m, d, at, of, kinds, e, tendon)
-        least = _capstan(p[COULOMB], bend)
-        coefficient = least
-        if p[STATIC] > 1.0:
-            coefficient = _coefficient(speed, least, p[STATIC] * least, p[STRIBECK], p[EXPONENT])
-        level = max(_least(tension + delivered, coefficient, 0.0) + p[DRAG], p[FLOOR])
     for k in range(HEAD, int(p[LENGTH])):
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
     # What holds the tendon back takes no more than there is.
     most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf
-    return speed, level, most, tension, bend
+    return speed, tension, pressing, most, bend
 
 
 @compiled
@@ -78,7 +65,7 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
 
 @compiled
 def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -> Any:
-    """Return speed, level, most, load and turn of a slide that is a passive tendon's mass: (14c), (16)."""
+    """Return speed, load, what presses, most and turn of a slide that is a passive tendon's mass: (14c)."""
     p, objects, types = (
         numbers(m, at.tuple_objprm, e),
         integers(m, at.tuple_objid, e),
@@ -94,15 +81,13 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
             # The joints that the half just named crosses.
             reactions[dofs[objects[k]]] += tension
     bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)
-    least = _capstan(p[COULOMB], bend)
-    coefficient = _coefficient(speed, least, p[STATIC] * least, p[STRIBECK], p[EXPONENT])
-    return speed, max(_least(load, coefficient, 0.0) + p[DRAG], p[FLOOR]), np.inf, load, bend
+    return speed, load, load, np.inf, bend
 
 
 @compiled
 def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> Any:
-    """Return speed, level, most, load and turn of a joint's pin: (9b), (17)."""
-    p, joint = numbers(m, at.tuple_objprm, e), integer_in(m, at.tuple_objid, e)
+    """Return speed, load, what presses, most and turn of a joint's pin: (17)."""
+    joint = integer_in(m, at.tuple_objid, e)
     dof = integer_in(m, at.jnt_dofadr, joint)
     speed, load = number_in(d, of.qvel, dof), reactions[dof]
     outside = numbers(d, of.act, held)
@@ -110,10 +95,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> 
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)
         load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
-    coefficient = p[COULOMB]
-    if p[STATIC] > coefficient:
-        coefficient = _coefficient(speed, p[COULOMB], p[STATIC], p[STRIBECK], p[EXPONENT])
-    return speed, _least(load, coefficient, p[FLOOR]) + p[DRAG], np.inf, load, 0.0
+    return speed, load, load, np.inf, 0.0
 
 
 @compiled

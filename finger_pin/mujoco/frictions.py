@@ -44,7 +44,8 @@ def frictions(
         numbers = _tendon_law(model, name, law)
         # What neither bends it nor has a pin that it loads would be passed over at every step.
         crossed = tuple(each for each in _crossed(model, name, law) if each[2] or each[1] in joints)
-        found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio)))
+        held = _limited_or_coupled(model, model.tendon(name).id)
+        found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), held))
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
@@ -73,9 +74,13 @@ def _held(model: Any, tendon: int) -> bool:
     """Return whether a tendon has an actuator, a spring, a limit or an equality of its own."""
     kinds = mujoco.mjtTrn
     driven = (model.actuator_trntype == kinds.mjTRN_TENDON) & (model.actuator_trnid[:, 0] == tendon)
+    return bool(driven.any() or model.tendon_stiffness[tendon] > 0.0 or _limited_or_coupled(model, tendon))
+
+
+def _limited_or_coupled(model: Any, tendon: int) -> bool:
     coupled = model.eq_type == mujoco.mjtEq.mjEQ_TENDON
     held = coupled & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))
-    return bool(driven.any() or held.any() or model.tendon_stiffness[tendon] > 0.0 or model.tendon_limited[tendon])
+    return bool(held.any() or model.tendon_limited[tendon])
 
 
 def _share(model: Any, tendon: int, names: list[str]) -> float:

@@ -11,28 +11,39 @@ this speed and level.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from finger_pin.mechanism.exchange.mujoco_friction import (
+    DRAG,
     FORCE,
     KIND,
     LENGTH,
     LEVEL,
-    LINK,
     LOAD,
     LOADS,
     MASS,
-    MICRO,
     PIN,
     RATIO,
     SIGNALS,
     STIFFNESS,
-    TENDON,
     TURN,
-    VISCOUS,
 )
 from finger_pin.mujoco.elements import mass, pin, tendon
+from finger_pin.mujoco.lanes import (
+    BEARS,
+    BENDS,
+    BRISTLE,
+    LEVELS,
+    MOST,
+    PRESSES,
+    PULLS,
+    ROW,
+    SIZE,
+    SPEED,
+    WIDTH,
+    exerted,
+    moved_on,
+)
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
     compiled,
@@ -41,7 +52,6 @@ from finger_pin.mujoco.memory import (
     integer_in,
     integers,
     number,
-    number_in,
     numbers,
     numbers_at,
     scratch,
@@ -49,9 +59,8 @@ from finger_pin.mujoco.memory import (
     words,
     zeros,
 )
+from finger_pin.mujoco.rows import row_forces, write_rows
 
-# What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
-_NOTHING = 1e-12
 # The floor that keeps (9a) finite where nothing is pressed, N: higher ones are friction that users have asked for.
 _NUMERICAL = 1e-4
 _LOW = 0xFFFFFFFF
@@ -119,49 +128,42 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
     act, rate, dt = numbers(d, of.act), numbers(d, of.act_dot), number(m, at.timestep)
     count = width + size(m, at.ntendon)
     # Of every degree of freedom, then of every tendon: what drives it, what presses pins, and three of its row.
-    room = zeros(scratch(5 * count), 5 * count)
+    room, block = zeros(scratch(width + count), width + count), numbers_at(scratch(SIZE))
     about, along, reactions = numbers_at(room), numbers_at(room + 8 * width), numbers_at(room + 8 * count)
-    rows = numbers_at(room + 16 * count)
+    rows = numbers_at(zeros(scratch(3 * count), 3 * count))
     driven(m, d, at, of, kinds, along, about)
     # Tendons load pins: the table has pins last.
     while e < end:
-        kind, ratio, row = int(values[e + KIND]), values[e + RATIO], objects[e + 1]
-        row = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
-        if kind == PIN:
-            found = pin(m, d, at, of, e, x, reactions)
-        elif kind == MASS:
-            found = mass(m, d, at, of, kinds, e, reactions)
-        else:
-            found = tendon(m, d, at, of, kinds, e, act[z], act[x], along, about, reactions)
-        speed, level, most, load, bend = found
-        states[place + LEVEL], states[place + LOAD], states[place + TURN] = level, load, bend
-        # `advance` moves the bristles, with the speed that the step ends with.
-        rate[z] = 0.0
-        for k in range(x, x + LOADS[kind]):
-            rate[k] = 0.0
-        force, drag, limit = _exerted(numbers(m, at.tuple_objprm, e), act[z], speed, level, load, dt)
-        rows[row] += ratio * force
-        rows[row + 1] += ratio * ratio * (values[e + STIFFNESS] * dt + drag)
-        rows[row + 2] += abs(ratio) * min(limit, most)
-        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
-    _write(m, d, at, of, kinds, rows, dt)
-
-
-@compiled
-def _exerted(p: Any, force: Any, speed: Any, level: Any, load: Any, dt: Any) -> Any:
-    """Return F - x, b and what micro-damping adds to it, and the most that a friction exerts."""
-    stiffness, viscous, micro = p[STIFFNESS], p[VISCOUS], p[MICRO]
-    if load == 0.0 and force == 0.0:
-        return 0.0, viscous + micro, level + viscous * abs(speed)
-    moved = stiffness * dt * speed
-    decay, steady = math.exp(-abs(moved) / level), level if speed > 0.0 else -level
-    later = steady + (force - steady) * decay
-    # The micro-damping's sigma_1 z', as z goes at this speed; it may help the motion.
-    if micro > 0.0 and speed != 0.0:
-        micro *= (later - force) / moved
-    excess = (force + moved - later) * decay
-    limit = max(level, abs(later)) + (viscous + micro) * abs(speed)
-    return force - excess + min(micro, 0.0) * speed, viscous + max(micro, 0.0), limit
+        lanes = 0
+        while e < end and lanes < WIDTH:
+            kind, loads, row = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1]
+            if kind == PIN:
+                found = pin(m, d, at, of, e, x, reactions)
+            elif kind == MASS:
+                found = mass(m, d, at, of, kinds, e, reactions)
+            else:
+                held = act[x] if loads > 0 else 0.0
+                found = tendon(m, d, at, of, kinds, e, act[z], held, along, about, reactions)
+            for field in range(RATIO, DRAG + 1):
+                block[WIDTH * field + lanes] = values[e + field]
+            block[WIDTH * SPEED + lanes], block[WIDTH * BEARS + lanes], block[WIDTH * PRESSES + lanes] = found[:3]
+            block[WIDTH * MOST + lanes], block[WIDTH * BENDS + lanes] = found[3:]
+            block[WIDTH * BRISTLE + lanes] = act[z]
+            block[WIDTH * ROW + lanes] = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
+            # `advance` moves the bristles, with the speed that the step ends with.
+            rate[z] = 0.0
+            for k in range(x, x + loads):
+                rate[k] = 0.0
+            e, z, x, lanes = e + int(values[e + LENGTH]), z + 1, x + loads, lanes + 1
+        exerted(block, dt)
+        for i in range(lanes):
+            row = int(block[WIDTH * ROW + i])
+            for k in range(3):
+                rows[row + k] += block[WIDTH * (PULLS + k) + i]
+            states[place + LEVEL], states[place + LOAD] = block[WIDTH * LEVELS + i], block[WIDTH * BEARS + i]
+            states[place + TURN] = block[WIDTH * BENDS + i]
+            place += SIGNALS
+    write_rows(m, d, at, of, kinds, rows, dt)
 
 
 @compiled
@@ -180,54 +182,6 @@ def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
 
 
 @compiled
-def _slid(force: Any, speed: Any, level: Any, stiffness: Any, dt: Any) -> Any:
-    """Return F^s after dt by (9a) at this speed and level, exactly."""
-    steady = level if speed > 0.0 else -level
-    return steady + (force - steady) * math.exp(-stiffness * abs(speed) * dt / level)
-
-
-@compiled
-def _write(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> None:
-    """Write the solver's rows: of islands their copies too, and where it is a dual one the diagonal of its matrix."""
-    width, ne, nefc = size(m, at.nv), integer(d, of.ne), integer(d, of.nefc)
-    kind, which = integers(d, of.efc_type), integers(d, of.efc_id)
-    aref, most = numbers(d, of.efc_aref), numbers(d, of.efc_frictionloss)
-    weight, resistance = numbers(d, of.efc_D), numbers(d, of.efc_R)
-    islands = integer(d, of.nisland) > 0
-    dual = integer(m, at.solver) == kinds.pgs or integer(m, at.noslip_iterations) > 0
-    for r in range(ne, ne + integer(d, of.nf)):
-        of_dof = kind[r] == kinds.friction_dof
-        row = which[r] if of_dof else width + which[r]
-        if rows[3 * row + 1] == 0.0:
-            continue
-        speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
-        before, stiff = resistance[r], rows[3 * row + 1] * dt
-        held = 1.0 / stiff
-        aref[r] = -speed / dt - held * rows[3 * row]
-        resistance[r], weight[r] = held, stiff
-        most[r] = max(rows[3 * row + 2], _NOTHING)
-        if islands:
-            s = integer_in(d, of.map_efc2iefc, r)
-            numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, stiff
-            numbers(d, of.iefc_frictionloss)[s] = most[r]
-        if dual:
-            numbers(d, of.efc_AR)[_diagonal(m, d, at, of, kinds, r, nefc)] += held - before
-
-
-@compiled
-def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -> Any:
-    """Return where the diagonal of the dual solver's matrix is, in its dense or its sparse form."""
-    how = integer(m, at.jacobian)
-    # As mj_isSparse: automatic is sparse from 60 degrees of freedom on.
-    if how == kinds.dense or (how != kinds.sparse and size(m, at.nv) < 60):
-        return r * (nefc + 1)
-    k = integer_in(d, of.efc_AR_rowadr, r)
-    while integer_in(d, of.efc_AR_colind, k) != r:
-        k += 1
-    return k
-
-
-@compiled
 def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds: Any) -> None:
     """Move bristles by (9a), and note what the solver has found: the force of each friction, what will load it next."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
@@ -239,23 +193,29 @@ def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds
     room, pins = zeros(scratch(2 * count), 2 * count), False
     forces, places, held = numbers_at(room), numbers_at(room + 8 * count), numbers_at(room + 8 * (count + width))
     held_tensions(m, d, at, of, kinds, held)
-    _row_forces(m, d, at, of, kinds, width, forces)
+    row_forces(m, d, at, of, kinds, width, forces)
+    blocks, k = (x - z + WIDTH - 1) // WIDTH, 0
+    moved = numbers_at(scratch(3 * WIDTH * blocks))
     while e < end:
-        kind, row = int(values[e + KIND]), objects[e + 1]
-        row = integer_in(m, at.jnt_dofadr, row) if types[e + 1] == kinds.of_joint else width + row
+        kind, loads, row, bristle = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1], act[z + k]
+        of_joint, level = types[e + 1] == kinds.of_joint, states[place + LEVEL]
+        speed = _speed(m, d, at, of, row, of_joint) * values[e + RATIO]
+        row = integer_in(m, at.jnt_dofadr, row) if of_joint else width + row
         states[place + FORCE] = forces[row] / values[e + RATIO]
-        if kind != PIN and states[place + LOAD] == 0.0 and max(states[place + LEVEL], abs(act[z])) <= _NUMERICAL:
+        if kind != PIN and states[place + LOAD] == 0.0 and max(level, abs(bristle)) <= _NUMERICAL:
             # A tendon that is slack: its bristles stand up, so that the next step need not ask for them.
-            act[z] = 0.0
-        else:
-            speed = _speed(m, d, at, of, objects[e + 1], types[e + 1] == kinds.of_joint) * values[e + RATIO]
-            act[z] = _slid(act[z], speed, states[place + LEVEL], values[e + STIFFNESS], dt)
-        if kind == TENDON or kind == LINK:
-            act[x] = held[objects[e]]
-        elif kind == PIN:
+            bristle = speed = 0.0
+        moved[k], moved[WIDTH * blocks + k] = bristle, level
+        moved[2 * WIDTH * blocks + k] = speed * values[e + STIFFNESS] * dt
+        if kind == PIN:
             places[objects[e]], pins = x, True
             act[x], act[x + 1], act[x + 2] = 0.0, 0.0, 0.0
-        e, z, x, place = e + int(values[e + LENGTH]), z + 1, x + LOADS[kind], place + SIGNALS
+        elif loads > 0:
+            act[x] = held[objects[e]]
+        e, x, place, k = e + int(values[e + LENGTH]), x + loads, place + SIGNALS, k + 1
+    moved_on(moved, WIDTH * blocks)
+    for i in range(k):
+        act[z + i] = moved[i]
     if pins:
         contact_loads(m, d, at, of, contact, kinds, places, act)
 
@@ -271,13 +231,3 @@ def _speed(m: Any, d: Any, at: Any, of: Any, element: Any, is_joint: Any) -> Any
     for k in range(first, first + integer_in(m, at.ten_J_rownnz, element)):
         found += arms[k] * speeds[columns[k]]
     return found
-
-
-@compiled
-def _row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any, found: Any) -> None:
-    """Note what the solver's rows of friction take, by degree of freedom and tendon."""
-    ne = integer(d, of.ne)
-    for r in range(ne, ne + integer(d, of.nf)):
-        row = integer_in(d, of.efc_id, r)
-        row += 0 if integer_in(d, of.efc_type, r) == kinds.friction_dof else width
-        found[row] = -numbers(d, of.efc_force)[r]

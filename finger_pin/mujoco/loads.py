@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numba
+
 from finger_pin.mujoco.memory import (
     compiled,
     flags,
@@ -17,9 +19,6 @@ from finger_pin.mujoco.memory import (
     numbers_at,
     size,
 )
-
-# A product of lengths is scaled up from here on, before it underflows.
-_TINY = 1e-200
 
 
 @compiled
@@ -65,33 +64,33 @@ def between(points: Any, first: Any, second: Any) -> Any:
     )
 
 
-@compiled
+@numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
 def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     """Return the sum of the angles by which a spatial tendon's path turns, rad.
 
     Of a wrap both tangent points are in the path. The chord between them makes half the arc's angle with either
     tangent. Angles add up as the complex numbers dot + i |cross| multiply, half turns being counted: one arc tangent.
+    Over the square of the later length they grow and shrink with no more than the first length over the last.
     """
     first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
-    point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0
+    point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
     x0, y0, z0, known, real, imaginary = 0.0, 0.0, 0.0, False, 1.0, 0.0
     for k in range(first, first + count - 1):
         if of_wrap[k] == -2 or of_wrap[k + 1] == -2:
             known = False
             continue
         x, y, z = between(point, k, k + 1)
-        if x * x + y * y + z * z < 1e-24:
+        square = x * x + y * y + z * z
+        if square < 1e-24:
             continue
         if known:
             cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
-            across, along = math.sqrt(cx * cx + cy * cy + cz * cz), x * x0 + y * y0 + z * z0
+            across, along = math.sqrt(cx * cx + cy * cy + cz * cz) / square, (x * x0 + y * y0 + z * z0) / square
             real, imaginary = real * along - imaginary * across, real * across + imaginary * along
             if imaginary < 0.0:
-                real, imaginary, halves = -real, -imaginary, halves + 1
-            if abs(real) + imaginary < _TINY:
-                real, imaginary = real / _TINY, imaginary / _TINY
+                real, imaginary, halves = -real, -imaginary, halves + math.pi
         x0, y0, z0, known = x, y, z, True
-    return halves * math.pi + math.atan2(imaginary, real)
+    return halves + math.atan2(imaginary, real)
 
 
 @compiled

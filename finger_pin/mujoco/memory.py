@@ -55,6 +55,18 @@ def scratch(typing_context: Any, count: Any) -> Any:
     return _types.intp(_types.intp), generate
 
 
+@_intrinsic
+def two_to_the(typing_context: Any, rounded: Any) -> Any:
+    """Return 2^n of what has the integer n in its last bits, as bits of a number's exponent."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = context.get_value_type(_types.int64)
+        exponent = builder.shl(builder.bitcast(arguments[0], word), word(52))
+        return builder.bitcast(builder.add(exponent, word(1023 << 52)), context.get_value_type(_types.float64))
+
+    return _types.float64(_types.float64), generate
+
+
 _load_number, _load_int, _load_word = (_loader(each) for each in (_types.float64, _types.int32, _types.int64))
 _load_flag = _loader(_types.uint8)
 

@@ -84,7 +84,7 @@ def test_a_batch_of_simulations_on_threads_moves_as_one_does_to_the_last_bit(mod
 
 def test_xml_keeps_the_friction_and_the_number_of_controls(model):
     again = mujoco.MjModel.from_xml_string(spec().to_xml())
-    assert (again.nu, again.na) == (model.nu, model.na) == (3, 18)
+    assert (again.nu, again.na) == (model.nu, model.na) == (3, 6 + 3 * 3)
     np.testing.assert_allclose(motion(again, steps=50), motion(model, steps=50), atol=1e-4)
     data = mujoco.MjData(again)
     motion(again, data, steps=50)

@@ -25,9 +25,7 @@ LEAST_LOSS = 1e-6
 TENDON, PIN, MASS, LINK = range(4)
 #: What elements of a friction carry, in order.
 LENGTH, RATIO, KIND, COULOMB, STATIC, STIFFNESS, VISCOUS, STRIBECK = range(8)
-FLOOR, EXPONENT, MICRO, DRAG, OFFSET, SHARE, HEAD = range(8, 15)
-#: Entries of `act`: first the bristles of all, then, by kind, as many with which the solver's last forces load each.
-LOADS = (1, 3, 0, 1)
+FLOOR, EXPONENT, MICRO, DRAG, OFFSET, SHARE, LOADS, HEAD = range(8, 16)
 #: What of each friction stands in `plugin_state`.
 LEVEL, FORCE, LOAD, TURN, SIGNALS = range(5)
 
@@ -47,6 +45,7 @@ class PluginFriction:
         more: What bends or loads it: whether it is a joint, its name, and a number.
         share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
             same way; negative where another one pulls the other way, so that it is slack while that is driven.
+        held: Whether a tendon has a limit or an equality, which pull it too.
     """
 
     kind: int
@@ -57,6 +56,7 @@ class PluginFriction:
     law: tuple[float, ...]
     more: tuple[tuple[bool, str, float], ...] = ()
     share: float = 0.0
+    held: bool = False
 
     @property
     def of_joint(self) -> bool:
@@ -73,12 +73,17 @@ class PluginFriction:
         own = "joint" if self.of_joint else "tendon"
         yield own, self.name, float(HEAD + len(self.more))
         yield ("joint" if self.row_of_joint else "tendon"), self.row, self.ratio
-        for value in (float(self.kind), *self.law, self.share):
+        for value in (float(self.kind), *self.law, self.share, float(self.loads)):
             yield own, self.name, value
         for of_joint, name, value in self.more:
             yield ("joint" if of_joint else "tendon"), name, value
 
     @property
+    def loads(self) -> int:
+        """Number of entries of `act`, after the bristles of all, with which the solver's last forces load it."""
+        return 3 if self.kind == PIN else int(self.held)
+
+    @property
     def states(self) -> int:
         """Number of entries of `act`."""
-        return 1 + LOADS[self.kind]
+        return 1 + self.loads

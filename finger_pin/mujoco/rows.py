@@ -1,0 +1,61 @@
+"""The solver's rows of friction: what is written into them, and what the solver has found of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from finger_pin.mujoco.memory import compiled, integer, integer_in, integers, number_in, numbers, size
+
+# What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
+_NOTHING = 1e-12
+
+
+@compiled
+def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> None:
+    """Write the solver's rows: of islands their copies too, and where it is a dual one the diagonal of its matrix."""
+    width, ne, nefc = size(m, at.nv), integer(d, of.ne), integer(d, of.nefc)
+    kind, which = integers(d, of.efc_type), integers(d, of.efc_id)
+    aref, most = numbers(d, of.efc_aref), numbers(d, of.efc_frictionloss)
+    weight, resistance = numbers(d, of.efc_D), numbers(d, of.efc_R)
+    islands = integer(d, of.nisland) > 0
+    dual = integer(m, at.solver) == kinds.pgs or integer(m, at.noslip_iterations) > 0
+    for r in range(ne, ne + integer(d, of.nf)):
+        of_dof = kind[r] == kinds.friction_dof
+        row = which[r] if of_dof else width + which[r]
+        if rows[3 * row + 1] == 0.0:
+            continue
+        speed = number_in(d, of.qvel, row) if of_dof else number_in(d, of.ten_velocity, which[r])
+        before, stiff = resistance[r], rows[3 * row + 1] * dt
+        held = 1.0 / stiff
+        aref[r] = -speed / dt - held * rows[3 * row]
+        resistance[r], weight[r] = held, stiff
+        most[r] = max(rows[3 * row + 2], _NOTHING)
+        if islands:
+            s = integer_in(d, of.map_efc2iefc, r)
+            numbers(d, of.iefc_R)[s], numbers(d, of.iefc_D)[s] = held, stiff
+            numbers(d, of.iefc_frictionloss)[s] = most[r]
+        if dual:
+            numbers(d, of.efc_AR)[_diagonal(m, d, at, of, kinds, r, nefc)] += held - before
+
+
+@compiled
+def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -> Any:
+    """Return where the diagonal of the dual solver's matrix is, in its dense or its sparse form."""
+    how = integer(m, at.jacobian)
+    # As mj_isSparse: automatic is sparse from 60 degrees of freedom on.
+    if how == kinds.dense or (how != kinds.sparse and size(m, at.nv) < 60):
+        return r * (nefc + 1)
+    k = integer_in(d, of.efc_AR_rowadr, r)
+    while integer_in(d, of.efc_AR_colind, k) != r:
+        k += 1
+    return k
+
+
+@compiled
+def row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any, found: Any) -> None:
+    """Note what the solver's rows of friction take, by degree of freedom and tendon."""
+    ne = integer(d, of.ne)
+    for r in range(ne, ne + integer(d, of.nf)):
+        row = integer_in(d, of.efc_id, r)
+        row += 0 if integer_in(d, of.efc_type, r) == kinds.friction_dof else width
+        found[row] = -numbers(d, of.efc_force)[r]
