@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.axes import along
 from finger_pin.core.evaluation.time_functions import SignalTable, no_signal
 from finger_pin.core.jit import Indices, Matrix, Vector
 from finger_pin.description.routing import Array
@@ -45,33 +46,33 @@ class Control(NamedTuple):
     """
 
     kind: int
-    tension: Vector
-    gain: Vector
-    minimum: Vector
-    inverse: Matrix
-    internal: Vector
-    loop: Indices
-    channel: Indices
+    tension: Annotated[Vector, along("channel")]
+    gain: Annotated[Vector, along("coordinate")]
+    minimum: Annotated[Vector, along("planned")]
+    inverse: Annotated[Matrix, along("planned", "coordinate")]
+    internal: Annotated[Vector, along("planned")]
+    loop: Annotated[Indices, along("planned", of="loop")]
+    channel: Annotated[Indices, along("planned", of="channel")]
     reference: SignalTable
-    coupling: Matrix
-    offset: Vector
+    coupling: Annotated[Matrix, along("coordinate", "r")]
+    offset: Annotated[Vector, along("coordinate")]
     schedule: SignalTable
     force: SignalTable
-    damping: Vector
+    damping: Annotated[Vector, along("coordinate")]
     damped: bool
     guide: SignalTable
     palm: SignalTable
-    desired: Vector
-    rate: Vector
-    acceleration: Vector
-    planned: Vector
-    active: Indices
-    level: Vector
+    desired: Annotated[Vector, along("coordinate")]
+    rate: Annotated[Vector, along("coordinate")]
+    acceleration: Annotated[Vector, along("coordinate")]
+    planned: Annotated[Vector, along("planned")]
+    active: Annotated[Indices, along("loop")]
+    level: Annotated[Vector, along("loop")]
     base: Vector
     slope: Vector
-    by_position: Matrix
-    by_velocity: Matrix
-    by_time: Vector
+    by_position: Annotated[Matrix, along("channel", "coordinate")]
+    by_velocity: Annotated[Matrix, along("channel", "coordinate")]
+    by_time: Annotated[Vector, along("channel")]
 
 
 def planned_control(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
@@ -50,29 +51,29 @@ class Paths(NamedTuple):
         weights: Of each leg in the arm and in the length, shape (L, 2).
     """
 
-    carriers: IndexTable
-    points: Matrix
-    rotation: Layers
-    origin: Matrix
-    shapes: IndexTable
-    columns: Indices
-    parameters: Matrix
-    reach: Vector
-    start: Indices
-    at: Indices
-    moves: IndexTable
-    levers: Vector
-    against: Indices
-    cores: Vector
-    extents: Vector
-    row: Indices
-    carries: IndexTable
-    rows: Indices
-    leg_start: Indices
-    piece: Indices
-    column: Indices
-    follows: Indices
-    weights: Matrix
+    carriers: Annotated[IndexTable, along("piece", "x", of="body")]
+    points: Annotated[Matrix, along("piece", "x")]
+    rotation: Annotated[Layers, along("piece", "x", "y")]
+    origin: Annotated[Matrix, along("piece", "x")]
+    shapes: Annotated[IndexTable, along("piece", "x")]
+    columns: Annotated[Indices, along("piece")]
+    parameters: Annotated[Matrix, along("piece", "c")]
+    reach: Annotated[Vector, along("piece")]
+    start: Annotated[Indices, along("piece", starts="mover")]
+    at: Annotated[Indices, along("mover", of="body")]
+    moves: Annotated[IndexTable, along("mover", "x")]
+    levers: Annotated[Vector, along("mover")]
+    against: Annotated[Indices, along("mover", of="body")]
+    cores: Annotated[Vector, along("piece")]
+    extents: Annotated[Vector, along("piece")]
+    row: Annotated[Indices, along("piece", of="row")]
+    carries: Annotated[IndexTable, along("body", "body")]
+    rows: Annotated[Indices, along("path", of="row")]
+    leg_start: Annotated[Indices, along("path", starts="leg")]
+    piece: Annotated[Indices, along("leg", of="piece")]
+    column: Annotated[Indices, along("leg")]
+    follows: Annotated[Indices, along("leg")]
+    weights: Annotated[Matrix, along("leg", "x")]
 
 
 class PathWork(NamedTuple):
@@ -237,52 +238,4 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         slopes=np.zeros(SLOPES),
         turn_slope=np.zeros(entries),
         wrench_slope=np.zeros((entries, COLUMNS, WRENCH)),
-    )
-
-
-def select_paths(
-    paths: Paths,
-    rows: NDArray[np.int64],
-    bodies: NDArray[np.int64],
-    body: Callable[[Any], NDArray[np.int64]],
-    entries: Callable[..., tuple[NDArray[np.int64], NDArray[np.int64]]],
-) -> Paths:
-    """Return the paths of some rows.
-
-    Args:
-        paths: Of all.
-        rows: Indices of those that are kept, in order.
-        bodies: Those that are kept, in order.
-        body: Gives bodies, which are the first coordinates, their new indices.
-        entries: (start, kept) -> where the entries of those kept begin, and which they are.
-    """
-    kept = np.flatnonzero(np.isin(paths.rows, rows))
-    leg_start, legs = entries(paths.leg_start, kept)
-    pieces = np.unique(paths.piece[legs])
-    start, at = entries(paths.start, pieces)
-    return Paths(
-        carriers=body(paths.carriers[pieces].ravel()).reshape(-1, 3),
-        points=paths.points[pieces],
-        rotation=paths.rotation[pieces],
-        origin=paths.origin[pieces],
-        shapes=paths.shapes[pieces],
-        columns=paths.columns[pieces],
-        parameters=paths.parameters[pieces],
-        reach=paths.reach[pieces],
-        start=start,
-        at=body(paths.at[at]),
-        moves=paths.moves[at],
-        levers=paths.levers[at],
-        # What an entry's coordinate is compared with moves the same piece, so it is of the same island.
-        against=body(paths.against[at]),
-        cores=paths.cores[pieces],
-        extents=paths.extents[pieces],
-        row=np.searchsorted(rows, paths.row[pieces]),
-        carries=np.ascontiguousarray(paths.carries[np.ix_(bodies, bodies)]),
-        rows=np.searchsorted(rows, paths.rows[kept]),
-        leg_start=leg_start,
-        piece=np.searchsorted(pieces, paths.piece[legs]),
-        column=paths.column[legs],
-        follows=paths.follows[legs],
-        weights=paths.weights[legs],
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains, read_chains
 from finger_pin.core.evaluation.law_code import SIGNALS, addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
@@ -73,48 +74,48 @@ class Tables(NamedTuple):
         paths: Pieces of paths through space.
     """
 
-    parents: Indices
-    roots: Indices
-    kinds: Indices
-    bodies: Matrix
-    charts: Indices
-    chart_frames: Layers
-    guided: Indices
+    parents: Annotated[Indices, along("body", of="body")]
+    roots: Annotated[Indices, along("body", of="body")]
+    kinds: Annotated[Indices, along("body")]
+    bodies: Annotated[Matrix, along("body", "c")]
+    charts: Annotated[Indices, along("chart", of="body")]
+    chart_frames: Annotated[Layers, along("chart", "x", "y")]
+    guided: Annotated[Indices, along("coordinate")]
     gravity: Vector
-    lumps: Vector
-    tip_body: Indices
-    tip_offset: Matrix
-    tip_force: Matrix
+    lumps: Annotated[Vector, along("lump")]
+    tip_body: Annotated[Indices, along("tip", of="body")]
+    tip_offset: Annotated[Matrix, along("tip", "x")]
+    tip_force: Annotated[Matrix, along("tip", "x")]
     loaded: bool
-    carriers: Indices
-    directions: Matrix
+    carriers: Annotated[Indices, along("body", of="body")]
+    directions: Annotated[Matrix, along("body", "x")]
     groups: IndexTable
-    laws: IndexTable
-    books: IndexTable
-    parameters: Matrix
-    offset: Vector
-    arm_start: Indices
-    arm_at: Indices
-    arm_row: Indices
-    arm: Vector
-    measure: Vector
-    state: Indices
-    state_row: Indices
-    touch: Indices
+    laws: Annotated[IndexTable, along("group", "c")]
+    books: Annotated[IndexTable, along("group", "c")]
+    parameters: Annotated[Matrix, along("c", "row")]
+    offset: Annotated[Vector, along("row")]
+    arm_start: Annotated[Indices, along("row", starts="arm")]
+    arm_at: Annotated[Indices, along("arm", of="coordinate")]
+    arm_row: Annotated[Indices, along("arm", of="row")]
+    arm: Annotated[Vector, along("arm")]
+    measure: Annotated[Vector, along("arm")]
+    state: Annotated[Indices, along("row", of="state")]
+    state_row: Annotated[Indices, along("state", of="row")]
+    touch: Annotated[Indices, along("row")]
     touching: int
-    channel: Indices
-    fed_row: Indices
-    input_start: Indices
-    load_start: Indices
-    terms: Indices
-    weights: Vector
-    pins: Indices
-    carried: Matrix
-    bend_start: Indices
-    bend_at: Indices
-    bend_row: Indices
-    bend: Vector
-    curvature_offset: Vector
+    channel: Annotated[Indices, along("row", of="channel")]
+    fed_row: Annotated[Indices, along("fed", of="row")]
+    input_start: Annotated[Indices, along("row", starts="term")]
+    load_start: Annotated[Indices, along("row", starts="term")]
+    terms: Annotated[Indices, along("term", of="row")]
+    weights: Annotated[Vector, along("term")]
+    pins: Annotated[Indices, along("row", of="body")]
+    carried: Annotated[Matrix, along("tip", "body")]
+    bend_start: Annotated[Indices, along("row", starts="bend")]
+    bend_at: Annotated[Indices, along("bend", of="coordinate")]
+    bend_row: Annotated[Indices, along("bend", of="row")]
+    bend: Annotated[Vector, along("bend")]
+    curvature_offset: Annotated[Vector, along("row")]
     paths: Paths
 
 

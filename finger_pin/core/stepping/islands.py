@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.axes import Part
 from finger_pin.core.control import PLANNED, Control
 from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.jit import indices
-from finger_pin.core.path_tables import select_paths
 from finger_pin.core.tables import Tables
 
 Indices = NDArray[np.int64]
@@ -96,65 +96,28 @@ def _reads(control: Control) -> NDArray[np.bool_]:
 
 def select(tables: Tables, island: Island) -> Tables:
     """Return the tables of an island."""
-    coordinates, rows = island.coordinates, island.rows
-    size = len(tables.parents)
-    bodies, lumps = coordinates[coordinates < size], coordinates[coordinates >= size]
-    body = _renumbered(bodies, size)
-    row = _renumbered(rows, len(tables.state))
-    channel = _renumbered(island.channels, int(np.concatenate([tables.channel, island.channels, [0]]).max()) + 1)
-    charts = np.isin(tables.charts, bodies)
+    rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.parents) + len(tables.lumps)
+    bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
     present, groups = _groups(tables, rows)
-    state = tables.state[rows]
-    state[state >= 0] = np.arange(np.count_nonzero(state >= 0))
-    coordinate = _renumbered(coordinates, size + len(tables.lumps))
-    input_start, inputs = _entries(tables.input_start, rows)
-    load_start, loads = _entries(tables.load_start, rows)
-    arm_start, arms = _entries(tables.arm_start, rows)
-    bend_start, bends = _entries(tables.bend_start, rows)
-    terms = np.concatenate([inputs, loads])
-    return tables._replace(
-        parents=_mapped(body, tables.parents[bodies]),
-        roots=body[tables.roots[bodies]],
-        kinds=tables.kinds[bodies],
-        bodies=tables.bodies[bodies],
-        charts=body[tables.charts[charts]],
-        chart_frames=tables.chart_frames[charts],
-        guided=tables.guided[coordinates],
-        lumps=tables.lumps[lumps - size],
-        tip_body=_mapped(body, tables.tip_body[island.tips]),
-        tip_offset=tables.tip_offset[island.tips],
-        tip_force=tables.tip_force[island.tips],
-        carriers=_mapped(body, tables.carriers[bodies]),
-        directions=tables.directions[bodies],
-        groups=groups,
-        laws=tables.laws[present],
-        books=tables.books[present],
-        parameters=np.ascontiguousarray(tables.parameters[:, rows]),
-        offset=tables.offset[rows],
-        arm_start=arm_start,
-        arm_at=coordinate[tables.arm_at[arms]],
-        arm_row=row[tables.arm_row[arms]],
-        arm=tables.arm[arms],
-        measure=tables.measure[arms],
-        state=state,
-        state_row=row[tables.state_row[island.states]],
-        touch=tables.touch[rows],
-        touching=int(np.count_nonzero(tables.touch[rows])),
-        channel=_mapped(channel, tables.channel[rows]),
-        fed_row=row[np.intersect1d(tables.fed_row, rows)],
-        input_start=input_start,
-        load_start=len(inputs) + load_start,
-        terms=row[tables.terms[terms]],
-        weights=tables.weights[terms],
-        pins=_mapped(body, tables.pins[rows]),
-        carried=np.ascontiguousarray(tables.carried[np.ix_(island.tips, bodies)]),
-        bend_start=bend_start,
-        bend_at=coordinate[tables.bend_at[bends]],
-        bend_row=row[tables.bend_row[bends]],
-        bend=tables.bend[bends],
-        curvature_offset=tables.curvature_offset[rows],
-        paths=select_paths(tables.paths, rows, bodies, lambda old: _mapped(body, old), _entries),
-    )
+    part = Part()
+    part.keep("coordinate", island.coordinates, width)
+    part.keep("body", bodies, size)
+    part.keep("lump", lumps - size, width - size)
+    part.keep("chart", np.flatnonzero(np.isin(tables.charts, bodies)), len(tables.charts))
+    part.keep("tip", island.tips, len(tables.tip_body))
+    part.keep("row", rows, len(tables.state))
+    part.keep("group", present, len(tables.groups))
+    part.keep("state", island.states, len(tables.state_row))
+    part.keep("fed", np.flatnonzero(np.isin(tables.fed_row, rows)), len(tables.fed_row))
+    part.keep("channel", island.channels, 1 + max(tables.channel.max(initial=-1), island.channels.max(initial=-1)))
+    for entries in ("arm", "bend", "term"):
+        part.keep_entries(tables, entries)
+    part.keep("path", np.flatnonzero(np.isin(paths.rows, rows)), len(paths.rows))
+    part.keep_entries(paths, "leg")
+    part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
+    part.keep_entries(paths, "mover")
+    touching = int(np.count_nonzero(tables.touch[rows]))
+    return part.of(tables)._replace(groups=groups, touching=touching, paths=part.of(paths))
 
 
 def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -167,34 +130,14 @@ def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64],
 
 def select_control(control: Control, island: Island) -> Control:
     """Return the inputs of an island."""
-    coordinates, planned, channels = island.coordinates, island.planned, island.channels
-    loops = np.unique(control.loop[planned])
-    channel = _renumbered(channels, len(control.tension))
-    return control._replace(
-        tension=control.tension[channels],
-        gain=control.gain[coordinates],
-        minimum=control.minimum[planned],
-        inverse=np.ascontiguousarray(control.inverse[np.ix_(planned, coordinates)]),
-        internal=control.internal[planned],
-        loop=np.searchsorted(loops, control.loop[planned]),
-        channel=_mapped(channel, control.channel[planned]),
-        coupling=np.ascontiguousarray(control.coupling[coordinates]),
-        offset=control.offset[coordinates],
-        schedule=_chosen(control.schedule, channels),
-        force=_chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel()),
-        damping=control.damping[coordinates],
-        desired=np.zeros(len(coordinates)),
-        rate=np.zeros(len(coordinates)),
-        acceleration=np.zeros(len(coordinates)),
-        planned=np.zeros(len(planned)),
-        active=np.zeros(len(loops), dtype=np.int64),
-        level=np.zeros(len(loops)),
-        base=np.zeros(len(control.base)),
-        slope=np.zeros(len(control.slope)),
-        by_position=np.zeros((len(channels), len(coordinates))),
-        by_velocity=np.zeros((len(channels), len(coordinates))),
-        by_time=np.zeros(len(channels)),
-    )
+    part = Part()
+    part.keep("coordinate", island.coordinates, len(control.gain))
+    part.keep("channel", island.channels, len(control.tension))
+    part.keep("planned", island.planned, len(control.minimum))
+    part.keep("loop", np.unique(control.loop[island.planned]), len(control.level))
+    schedule = _chosen(control.schedule, island.channels)
+    force = _chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel())
+    return part.of(control)._replace(schedule=schedule, force=force)
 
 
 def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:
@@ -216,21 +159,3 @@ def _connected(first: Indices, second: Indices, count: int) -> Indices:
         labels = labels[labels]
         if np.array_equal(labels, before):
             return labels
-
-
-def _entries(start: Indices, rows: Indices) -> tuple[Indices, Indices]:
-    """Return the starts of some rows' entries among themselves, and the entries' places."""
-    kept = np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(start[k], start[k + 1]) for k in rows)])
-    return np.append(0, np.cumsum(np.diff(start)[rows])), kept
-
-
-def _renumbered(kept: Indices, size: int) -> Indices:
-    """Return the new index of every old one, -1 where it is not kept."""
-    new = np.full(size, -1, dtype=np.int64)
-    new[kept] = np.arange(len(kept))
-    return new
-
-
-def _mapped(new: Indices, old: Indices) -> Indices:
-    """Return new indices, with -1 as it was."""
-    return np.where(old >= 0, new[old], -1) if len(new) else np.full(len(old), -1, dtype=np.int64)
