@@ -14,10 +14,14 @@ from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import FingerLike, as_finger
 
-# The descent: its length, s2, and the acceleration, in parts of the first, at which it has arrived.
-_LONGEST, _ARRIVED = 1e4, 1e-6
 # Of an angle, rad, for differences.
 _SHIFT = 1e-7
+# The longest step of the descent, in the joints' and masses' scales: none leads over a ridge into another valley.
+_LONGEST_STEP = 0.2
+# The slope, in parts of the first, and the number of steps at which the descent ends; a few of Newton's follow.
+_ARRIVED, _MOST_STEPS = 1e-7, 500
+# Stiffness to the start, N m, without which the descent would wander where a finger may rest anywhere.
+_TETHER = 1e-6
 # Largest acceleration that is rest, in parts of the joints' and masses' scales over a square second.
 _REST = 1e-4
 
@@ -50,7 +54,7 @@ def equilibrium(
 
     With friction there are many states at rest around it; this is the one in which no bristle is bent: tau = G, and
     the state's derivative is zero with friction and without. It lies where the potential energy falls to from a
-    posture, along theta'' at theta' = 0, so that it is stable.
+    posture, in short steps of Newton's method, so that it is stable.
 
     Args:
         finger: One finger, with ideal sources of tension.
@@ -81,20 +85,29 @@ def equilibrium(
         state.position[:], state.passive_position[:] = places[:joints], places[joints:]
         return x
 
-    def acceleration(places: Array) -> Array:
-        rates = layout.unpack(finger.rhs(0.0, placed(places), command, pushed))
-        return np.concatenate([rates.velocity, rates.passive_velocity])
+    def energy(y: Array) -> float:
+        theta = (scale * y)[:joints]
+        stored, _ = finger.evaluate(placed(scale * y), command, pushed).mechanism.account()
+        raised = finger.motion(theta, np.zeros(joints)).potential_energy
+        given = command @ finger.excursion(theta) + pushed @ finger.rigid_body.tip_position(theta)
+        return float(sum(stored.values()) + raised - given)
+
+    def acceleration(y: Array) -> Array:
+        rates = layout.unpack(finger.rhs(0.0, placed(scale * y), command, pushed))
+        return np.asarray(np.concatenate([rates.velocity, rates.passive_velocity]) / scale)
+
+    def slope(y: Array) -> Array:
+        inertia = scipy.linalg.block_diag(
+            finger.rigid_body.mass_matrix((scale * y)[:joints]), np.diag(finger.tendons.mass)
+        )
+        return np.asarray(-scale * (inertia @ (scale * acceleration(y))))
 
     state = layout.unpack(rest)
     places = np.concatenate([state.position, state.passive_position])
     scale = np.concatenate([np.ones(joints), np.full(len(places) - joints, 1e-3)])
-
-    def slope(y: Array) -> Array:
-        return np.asarray(acceleration(scale * y) / scale)
-
-    begun = float(np.max(np.abs(slope(places / scale))))
-    y = _downhill(slope, places / scale, _ARRIVED * begun) if begun > _REST else places / scale
-    if not float(np.max(np.abs(slope(y)))) < max(_REST, 1e-9 * begun):
+    begun = float(np.max(np.abs(acceleration(places / scale))))
+    y = places / scale if begun < _REST else _downhill(energy, slope, acceleration, places / scale)
+    if not float(np.max(np.abs(acceleration(y)))) < max(_REST, 1e-9 * begun):
         raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
     places = scale * y
     x = placed(places)
@@ -102,23 +115,43 @@ def equilibrium(
     return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
 
 
-def _downhill(slope: Callable[[Array], Array], start: Array, enough: float) -> Array:
-    """Return the place of no slope that a slope leads to from a start, shape (k,)."""
+def _downhill(
+    energy: Callable[[Array], float],
+    slope: Callable[[Array], Array],
+    acceleration: Callable[[Array], Array],
+    start: Array,
+) -> Array:
+    """Return the place at rest, shape (k,), to which an energy falls from a start.
 
-    def arrived(_: float, y: Array) -> float:
-        return float(np.max(np.abs(slope(y)))) - enough
+    Args:
+        energy: At a place.
+        slope: Its derivative, shape (k,).
+        acceleration: Zero where that is, with the digits that the slopes of heavy joints take from those of light ones.
+        start: Shape (k,).
+    """
 
-    arrived.terminal = True  # type: ignore[attr-defined]
-
-    def slopes(y: Array) -> Array:
+    def by_place(of: Callable[[Array], Array], y: Array) -> Array:
         # Angles on limiters are tiny: steps that are parts of them would be lost in rounding.
         shifts = _SHIFT * np.eye(len(y))
-        return np.transpose([slope(y + each) - slope(y - each) for each in shifts]) / (2.0 * _SHIFT)
+        return np.transpose([of(y + each) - of(y - each) for each in shifts]) / (2.0 * _SHIFT)
 
-    descent = scipy.integrate.solve_ivp(
-        lambda _, y: slope(y), (0.0, _LONGEST), start, "Radau", events=arrived, rtol=1e-6, atol=1e-9
-    )
+    def curvature(y: Array) -> Array:
+        found = by_place(slope, y)
+        return 0.5 * (found + found.T) + _TETHER * np.eye(len(y))
+
+    enough = _ARRIVED * float(np.max(np.abs(slope(start))))
+    radii = {"initial_trust_radius": 0.5 * _LONGEST_STEP, "max_trust_radius": _LONGEST_STEP}
+    options = {**radii, "gtol": enough, "maxiter": _MOST_STEPS}
+    fallen = scipy.optimize.minimize(
+        lambda y: energy(y) + 0.5 * _TETHER * float(np.sum((y - start) ** 2)),
+        start,
+        method="trust-exact",
+        jac=lambda y: slope(y) + _TETHER * (y - start),
+        hess=curvature,
+        options=options,
+    ).x
     # Damped, so that it stays where the finger may rest anywhere.
-    polished = scipy.optimize.least_squares(slope, descent.y[:, -1], slopes, method="lm", xtol=1e-15)
-    ends: tuple[Array, Array] = (descent.y[:, -1], polished.x)
-    return min(ends, key=lambda y: float(np.max(np.abs(slope(y)))))
+    polished = scipy.optimize.least_squares(
+        acceleration, fallen, lambda y: by_place(acceleration, y), method="lm", xtol=1e-15
+    ).x
+    return min((fallen, polished), key=lambda y: float(np.max(np.abs(acceleration(y)))))

@@ -109,19 +109,26 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     return found
 
 
-def check_motors(finger: Finger, x: Array) -> None:
+def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
     """Refuse a packed state in which a motor turns faster than its supply and its current limit can stand.
 
     What it induces is then more than the supply and what the greatest current takes away at its resistance.
 
+    Args:
+        finger: With motors or without.
+        x: The packed state, shape (size,).
+        name: Of the argument, for messages.
+
     Raises:
         InputError: Naming the motor and its speed.
     """
+    if not finger.actuators.names:
+        return
     speed, actuators = finger.layout.unpack(x).motor_velocity, finger.actuators
     assert speed is not None
     constant, resistance, supply, limit = actuators.motor[:4]
     most = (supply + resistance * limit) / constant
-    for name, own, greatest in zip(actuators.names, speed, most, strict=True):
+    for motor, own, greatest in zip(actuators.names, speed, most, strict=True):
         if abs(own) > greatest:
-            allowed = f"motor {name} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
-            raise InputError("initial", allowed, float(own))
+            allowed = f"motor {motor} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
+            raise InputError(name, allowed, float(own))

@@ -25,7 +25,7 @@ from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
-from finger_pin.simulation.initial_state import numbers
+from finger_pin.simulation.initial_state import check_motors, numbers
 from finger_pin.simulation.step_log import Told
 
 if TYPE_CHECKING:
@@ -133,7 +133,8 @@ class Simulator:
                 default where the simulator began.
 
         Raises:
-            InputError: If it has another size, or a number is not finite; nothing has changed then.
+            InputError: If it has another size, a number is not finite, or a motor turns faster than its supply can
+                hold; nothing has changed then.
         """
         if isinstance(initial, State):
             initial = self.finger.layout.pack(initial)
@@ -143,6 +144,7 @@ class Simulator:
             x = self._at(numbers("initial", initial, self._posture.shape))
         else:
             x = numbers("initial", initial, (self.finger.layout.size,))
+            check_motors(self.finger, x)
         self._begin(x, 0.0)
         return self.state
 
@@ -161,6 +163,7 @@ class Simulator:
         if changed.layout.names != self.finger.layout.names:
             raise InputError("values", "make a finger with another state: make another simulator of it")
         x, time = self.x, self.time
+        check_motors(changed, x, "values")
         self._build(changed)
         self._begin(x, time)
 
@@ -179,7 +182,9 @@ class Simulator:
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
-        self._stepper.restart(numbers("x", value, (self.finger.layout.size,)))
+        x = numbers("x", value, (self.finger.layout.size,))
+        check_motors(self.finger, x, "x")
+        self._stepper.restart(x)
         self._told = Told(self._stepper)
 
     @property

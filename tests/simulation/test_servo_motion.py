@@ -155,13 +155,19 @@ def test_a_start_at_which_a_motor_would_leave_its_supply_is_refused():
     """At its limit of 1.5 A a motor of 5 V, 3 Ohm and 0.4 N m/A induces 9.5 V at most: 23.75 rad/s."""
     made = finger(SMOOTH, drive="position")
     x = made.rest_state([0.0])
-    short = scenario(made, 0.005)
+    short, sim = scenario(made, 0.005), fp.Simulator(made)
     for speed, refused in ((23.7, False), (-23.8, True)):
         made.layout.unpack(x).motor_velocity[:] = speed
         if refused:
             with pytest.raises(fp.InputError, match=r"motor servo must turn by at most 23.75 rad/s"):
                 fp.simulate(short, initial=x)
+            with pytest.raises(fp.InputError, match=r"x = -23.8: motor servo must turn by at most 23.75 rad/s"):
+                sim.x = x
+            with pytest.raises(fp.InputError, match=r"motor servo must turn by at most 23.75 rad/s"):
+                sim.reset(x)
+            assert made.layout.unpack(sim.x).motor_velocity[0] == 23.7
         else:
+            sim.x = x
             assert float(abs(fp.simulate(short, initial=x).motor_voltage).max()) <= 5.0 * (1.0 + 1e-9)
 
 
