@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -12,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.spatial
 import xarray as xr
+from matplotlib import rc_context, rcParams
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
@@ -48,7 +51,7 @@ _FEW = 25
 def write_video(
     result: xr.Dataset, path: str | os.PathLike[str], *, speed: float = 1.0, rate: float | None = None
 ) -> Path:
-    """Write a result as a film: MP4, which needs the program ffmpeg, or GIF.
+    """Write a result as a film: MP4, which needs the program ffmpeg or the package imageio-ffmpeg that has it, or GIF.
 
     The file appears whole or not at all; an earlier one is replaced.
 
@@ -73,11 +76,17 @@ def write_video(
     for name, value in (("speed", speed), ("rate", rate)):
         if not 0.0 < value < np.inf:
             raise InputError(name, "must be a number above 0", value)
-    writer = _writer(gif, rate)
+    found = find_ffmpeg()
+    if not gif and not found:
+        wanted = "the program ffmpeg, which is not found (the package imageio-ffmpeg has it, too)"
+        raise FingerPinError(f"an MP4 needs {wanted}; a GIF does without")
+    writer: AbstractMovieWriter = (FFMpegWriter if found else PillowWriter)(fps=rate)  # type: ignore[arg-type]
     motion = Playback.of(result, rate / speed)
     figure = new_figure(*_INCHES, layout=None)
     film = _Film(figure, motion)
-    with replacing(target) as temporary, writer.saving(figure, temporary, (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]):
+    resolution = (_GIF_WIDTH if gif else _WIDTH) / _INCHES[0]
+    shown = rc_context({"animation.ffmpeg_path": found})
+    with shown, replacing(target) as temporary, writer.saving(figure, temporary, resolution):
         step, last = speed / rate, motion.time[-1]
         for due in np.arange(motion.time[0], last + 0.5 * step, step):
             film.show(int(np.argmin(np.abs(motion.time - due))))
@@ -103,12 +112,15 @@ def draw_picture(result: xr.Dataset, stage: Array) -> NDArray[np.uint8]:
     return np.array(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
 
 
-def _writer(gif: bool, rate: float) -> AbstractMovieWriter:
-    if FFMpegWriter.isAvailable():
-        return FFMpegWriter(fps=rate)  # type: ignore[arg-type]
-    if gif:
-        return PillowWriter(fps=rate)  # type: ignore[arg-type]
-    raise FingerPinError("an MP4 needs the program ffmpeg, which is not found; a GIF does without")
+def find_ffmpeg() -> str:
+    """Return the path of the program ffmpeg: matplotlib's, or that of the package imageio-ffmpeg; empty without any."""
+    found = shutil.which(rcParams["animation.ffmpeg_path"])
+    if found is None:
+        with contextlib.suppress(ImportError, RuntimeError):
+            import imageio_ffmpeg
+
+            found = imageio_ffmpeg.get_ffmpeg_exe()
+    return found or ""
 
 
 @dataclass(frozen=True, eq=False)

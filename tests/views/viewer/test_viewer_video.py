@@ -1,15 +1,16 @@
 """A result as a film."""
 
 import subprocess
+import sys
 
 import numpy as np
 import pytest
-from matplotlib.animation import FFMpegWriter
 from motion import fingertip, joint_position
 from PIL import Image
 
 import finger_pin as fp
 from finger_pin.views import write_video
+from finger_pin.views.viewer import video
 
 
 def pictures(path):
@@ -24,8 +25,8 @@ def pictures(path):
 @pytest.mark.parametrize("tool", ["ffmpeg", "pillow"])
 def test_a_gif_lasts_as_long_as_the_motion_and_traces_the_fingertip(result, tmp_path, monkeypatch, tool):
     if tool == "pillow":
-        monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    elif not FFMpegWriter.isAvailable():
+        monkeypatch.setattr(video, "find_ffmpeg", str)
+    elif not video.find_ffmpeg():
         pytest.skip("needs ffmpeg")
     part = result.sel(time=slice(0.0, 0.6))
     frames, duration = pictures(write_video(part, tmp_path / "film.gif", rate=10.0))
@@ -40,16 +41,17 @@ def test_a_gif_lasts_as_long_as_the_motion_and_traces_the_fingertip(result, tmp_
     assert np.all(np.diff(tops) < 0)
 
 
-@pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="needs ffmpeg")
+@pytest.mark.skipif(not video.find_ffmpeg(), reason="needs ffmpeg")
 def test_an_mp4_in_slow_motion_has_frames_for_all_of_its_time(result, tmp_path):
     path = write_video(result.sel(time=slice(0.0, 0.2)), tmp_path / "film.mp4", speed=0.25, rate=20.0)
-    command = ["ffmpeg", "-i", str(path), "-f", "null", "-"]
+    command = [video.find_ffmpeg(), "-i", str(path), "-f", "null", "-"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stderr
     assert "frame=   17" in said and "1200x720" in said
 
 
 def test_what_cannot_be_filmed_is_said_before_anything_is_written(result, tmp_path, monkeypatch):
-    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(fp.exceptions.FingerPinError, match="ffmpeg"):
         write_video(result, tmp_path / "film.mp4")
     with pytest.raises(fp.InputError, match=r"\.mp4 or \.gif"):
