@@ -27,7 +27,7 @@ from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, 
 def tendon(
     m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
 ) -> Any:
-    """Return speed, tension, what presses, the most that holds it back, and turn of a tendon: (14)."""
+    """Return speed, tension, what presses, the most that holds it back, and turn of a tendon: (14). See `lanes`."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)
@@ -40,19 +40,19 @@ def tendon(
     speed = number_in(d, of.ten_velocity, tendon)
     loss = way * (force + p[VISCOUS] * speed)
     delivered = max(tension - loss, 0.0)
-    bend, pressing = p[OFFSET], tension + delivered
+    bend, real, imaginary, pressing = 0.0, 1.0, 0.0, tension + delivered
     if pressing > 0.0:
-        bend += _turn(m, d, at, of, kinds, e, tendon)
+        bend, real, imaginary = _turn(m, d, at, of, kinds, e, tendon)
     for k in range(HEAD, int(p[LENGTH])):
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
     # What holds the tendon back takes no more than there is.
     most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf
-    return speed, tension, pressing, most, bend
+    return speed, tension, pressing, most, p[OFFSET] + bend, real, imaginary
 
 
 @compiled
 def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> Any:
-    """Return the angle by which a path turns besides its offset, (15) or along its points, rad."""
+    """Return the angle by which a path turns besides its offset, (15) or along its points: see `turn_of_path`."""
     if tendon >= 0 and integer_in(d, of.ten_wrapnum, tendon) > 0:
         return turn_of_path(d, of, tendon)
     p, objects, found = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e), 0.0
@@ -60,7 +60,7 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
     for k in range(HEAD, int(p[LENGTH])):
         if types[k] == kinds.of_joint:
             found += p[k] * abs(numbers(d, of.qpos)[places[objects[k]]])
-    return found
+    return found, 1.0, 0.0
 
 
 @compiled
@@ -80,8 +80,8 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
         else:
             # The joints that the half just named crosses.
             reactions[dofs[objects[k]]] += tension
-    bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)
-    return speed, load, load, np.inf, bend
+    bend = p[OFFSET] + _turn(m, d, at, of, kinds, e, -1)[0]
+    return speed, load, load, np.inf, bend, 1.0, 0.0
 
 
 @compiled
@@ -95,7 +95,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> 
     if x * x + y * y + z * z > 0.0:
         ex, ey, ez = _proximal(m, d, at, of, joint)
         load = math.sqrt((x - load * ex) ** 2 + (y - load * ey) ** 2 + (z - load * ez) ** 2)
-    return speed, load, load, np.inf, 0.0
+    return speed, load, load, np.inf, 0.0, 1.0, 0.0
 
 
 @compiled

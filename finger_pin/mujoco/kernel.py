@@ -33,14 +33,17 @@ from finger_pin.mujoco.lanes import (
     BEARS,
     BENDS,
     BRISTLE,
+    IMAGINARY,
     LEVELS,
     MOST,
     PRESSES,
     PULLS,
+    REAL,
     ROW,
     SIZE,
     SPEED,
     WIDTH,
+    bent,
     exerted,
     moved_on,
 )
@@ -134,7 +137,7 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
     driven(m, d, at, of, kinds, along, about)
     # Tendons load pins: the table has pins last.
     while e < end:
-        lanes = 0
+        lanes, winds = 0, 0
         while e < end and lanes < WIDTH:
             kind, loads, row = int(values[e + KIND]), int(values[e + LOADS]), objects[e + 1]
             if kind == PIN:
@@ -147,7 +150,9 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
             for field in range(RATIO, DRAG + 1):
                 block[WIDTH * field + lanes] = values[e + field]
             block[WIDTH * SPEED + lanes], block[WIDTH * BEARS + lanes], block[WIDTH * PRESSES + lanes] = found[:3]
-            block[WIDTH * MOST + lanes], block[WIDTH * BENDS + lanes] = found[3:]
+            block[WIDTH * MOST + lanes], block[WIDTH * BENDS + lanes] = found[3:5]
+            block[WIDTH * REAL + lanes], block[WIDTH * IMAGINARY + lanes] = found[5:]
+            winds = WIDTH if found[6] != 0.0 else winds
             block[WIDTH * BRISTLE + lanes] = act[z]
             block[WIDTH * ROW + lanes] = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
             # `advance` moves the bristles, with the speed that the step ends with.
@@ -155,6 +160,7 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
             for k in range(x, x + loads):
                 rate[k] = 0.0
             e, z, x, lanes = e + int(values[e + LENGTH]), z + 1, x + loads, lanes + 1
+        bent(block, winds)
         exerted(block, dt)
         for i in range(lanes):
             row = int(block[WIDTH * ROW + i])

@@ -24,20 +24,28 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STRIBECK,
     VISCOUS,
 )
-from finger_pin.mujoco.exponential import compiled_law, exponential
+from finger_pin.mujoco.elementary import angle, compiled_law, exponential
 from finger_pin.mujoco.memory import compiled
 
 #: How many frictions a block has, and how many numbers it is.
 WIDTH = 8
 #: What stands beside a friction's parameters: speed, F^s, tension or other load, what presses, the most that it takes,
-#: turn, and the number of its row; then what the law gives: level, and what it adds to the three numbers of its row.
-SPEED, BRISTLE, BEARS, PRESSES, MOST, BENDS, ROW = range(DRAG + 1, DRAG + 8)
-LEVELS, PULLS, DAMPS, LIMITS, FIELDS = range(DRAG + 8, DRAG + 13)
+#: turn, that of a path as a complex number besides, and the number of its row; then what the law gives: level, and what
+#: it adds to the three numbers of its row.
+SPEED, BRISTLE, BEARS, PRESSES, MOST, BENDS, REAL, IMAGINARY, ROW = range(DRAG + 1, DRAG + 10)
+LEVELS, PULLS, DAMPS, LIMITS, FIELDS = range(DRAG + 10, DRAG + 15)
 SIZE = WIDTH * FIELDS
 
 _coefficient, _capstan, _least = (
     compiled_law(each) for each in (friction_coefficient, capstan_coefficient, friction_level)
 )
+
+
+@compiled
+def bent(x: Any, count: Any) -> None:
+    """Add the angles of complex numbers to the turns of as many lanes as are said: none, or `WIDTH`."""
+    for i in range(count):
+        x[WIDTH * BENDS + i] += angle(x[WIDTH * REAL + i], x[WIDTH * IMAGINARY + i])
 
 
 @compiled

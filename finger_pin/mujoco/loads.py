@@ -17,6 +17,7 @@ from finger_pin.mujoco.memory import (
     number_in,
     numbers,
     numbers_at,
+    power_over,
     size,
 )
 
@@ -66,31 +67,35 @@ def between(points: Any, first: Any, second: Any) -> Any:
 
 @numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
 def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
-    """Return the sum of the angles by which a spatial tendon's path turns, rad.
+    """Return half turns, rad, and the complex number whose angle is the rest by which a spatial tendon's path turns.
 
     Of a wrap both tangent points are in the path. The chord between them makes half the arc's angle with either
-    tangent. Angles add up as the complex numbers dot + i |cross| multiply, half turns being counted: one arc tangent.
-    Over the square of the later length they grow and shrink with no more than the first length over the last.
+    tangent. Angles add up as the complex numbers dot + i |cross| multiply, half turns being counted.
+    With about the square of the later length out, products stay about as large as the first length over the last.
     """
     first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
     point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
     x0, y0, z0, known, real, imaginary = 0.0, 0.0, 0.0, False, 1.0, 0.0
-    for k in range(first, first + count - 1):
-        if of_wrap[k] == -2 or of_wrap[k + 1] == -2:
-            known = False
+    px, py, pz, apart = 0.0, 0.0, 0.0, True
+    for k in range(first, first + count):
+        qx, qy, qz = point[3 * k], point[3 * k + 1], point[3 * k + 2]
+        x, y, z = qx - px, qy - py, qz - pz
+        px, py, pz, square = qx, qy, qz, x * x + y * y + z * z
+        if of_wrap[k] == -2 or apart:
+            # A pulley, and what comes after it.
+            known, apart = False, of_wrap[k] == -2
             continue
-        x, y, z = between(point, k, k + 1)
-        square = x * x + y * y + z * z
         if square < 1e-24:
             continue
         if known:
             cx, cy, cz = y * z0 - z * y0, z * x0 - x * z0, x * y0 - y * x0
-            across, along = math.sqrt(cx * cx + cy * cy + cz * cz) / square, (x * x0 + y * y0 + z * z0) / square
+            scale = power_over(square)
+            across, along = math.sqrt(cx * cx + cy * cy + cz * cz) * scale, (x * x0 + y * y0 + z * z0) * scale
             real, imaginary = real * along - imaginary * across, real * across + imaginary * along
             if imaginary < 0.0:
                 real, imaginary, halves = -real, -imaginary, halves + math.pi
         x0, y0, z0, known = x, y, z, True
-    return halves + math.atan2(imaginary, real)
+    return halves, real, imaginary
 
 
 @compiled

@@ -67,6 +67,18 @@ def two_to_the(typing_context: Any, rounded: Any) -> Any:
     return _types.float64(_types.float64), generate
 
 
+@_intrinsic
+def power_over(typing_context: Any, value: Any) -> Any:
+    """Return the power of two from 1 / x to 2 / x, by the bits of a positive number's exponent."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = context.get_value_type(_types.int64)
+        exponent = builder.and_(builder.bitcast(arguments[0], word), word(2047 << 52))
+        return builder.bitcast(builder.sub(word(2046 << 52), exponent), context.get_value_type(_types.float64))
+
+    return _types.float64(_types.float64), generate
+
+
 _load_number, _load_int, _load_word = (_loader(each) for each in (_types.float64, _types.int32, _types.int64))
 _load_flag = _loader(_types.uint8)
 

@@ -14,7 +14,7 @@ from numba import cfunc, types
 from finger_pin.exceptions import InputError
 from finger_pin.laws import bristle, capstan
 from finger_pin.mechanism.exchange import mujoco_friction as table
-from finger_pin.mujoco import elements, exponential, kernel, lanes, loads, memory, rows
+from finger_pin.mujoco import elementary, elements, kernel, lanes, loads, memory, rows
 from finger_pin.mujoco.layout import layout
 
 _CALLBACKS = (
@@ -38,7 +38,7 @@ class _Plugin(ctypes.Structure):
 
 def _fingerprint() -> str:
     """Return what the callbacks are compiled from: numba sees the file that they stand in, and not what they call."""
-    modules = (kernel, elements, exponential, lanes, loads, memory, rows, table, bristle, capstan)
+    modules = (kernel, elements, elementary, lanes, loads, memory, rows, table, bristle, capstan)
     texts = (Path(str(each.__file__)).read_bytes() for each in modules)
     return hashlib.sha256(b"".join(texts)).hexdigest()
 
