@@ -45,7 +45,7 @@ class Moving(Protocol):
 class _Recorder:
     """Carries one island forward and keeps its steps."""
 
-    def __init__(self, stepper: Stepper, index: int, chunk: int, judged: bool) -> None:
+    def __init__(self, stepper: Stepper, index: int, chunk: int, judged: bool = False) -> None:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
