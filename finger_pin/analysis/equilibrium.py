@@ -12,7 +12,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import FingerLike, as_finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 
 # Of an angle, rad, for differences.
 _SHIFT = 1e-7

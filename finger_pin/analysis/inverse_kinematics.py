@@ -14,7 +14,7 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
-from finger_pin.mechanism.finger import FingerLike, as_finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 
 # A fingertip this close, m, is there.
 _THERE = 1e-6

@@ -26,7 +26,8 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import as_finger
 
 if TYPE_CHECKING:
     import xarray as xr

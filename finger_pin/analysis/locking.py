@@ -17,7 +17,8 @@ from finger_pin.description.loading import describe
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger, FingerLike
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.mechanism.tendons import Tendons
 
 

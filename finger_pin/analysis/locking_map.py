@@ -15,7 +15,8 @@ from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,7 +28,8 @@ import pinocchio as pin
 
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.geometry import Groove, TendonGeometry
 
 

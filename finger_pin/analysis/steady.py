@@ -12,7 +12,7 @@ from finger_pin.laws.bristle import friction_coefficient
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import loss_share, stribeck_share
 from finger_pin.mechanism.actuators import Actuators
-from finger_pin.mechanism.finger import FingerLike, description_of
+from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.mechanism.tendons import Tendons
 
 

@@ -20,7 +20,7 @@ from finger_pin.analysis.tip_statics import (
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import FingerLike, as_finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 
 
 @dataclass(frozen=True, eq=False, repr=False)

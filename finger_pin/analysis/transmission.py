@@ -26,7 +26,8 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
-from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.tendons import Tendons
 
 if TYPE_CHECKING:

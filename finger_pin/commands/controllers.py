@@ -32,7 +32,7 @@ def controllers(output: Output = Path("results/controllers"), format: Format = N
     from finger_pin.files import replacing
     from finger_pin.studies.comparison import compare, to_csv
     from finger_pin.views.plots import save_figure
-    from finger_pin.views.plots.controllers import plot_controllers
+    from finger_pin.views.plots.experiments.controllers import plot_controllers
 
     rows: list[Comparison] = []
     drawn: dict[str, xr.Dataset] = {}

@@ -14,8 +14,8 @@ import numpy as np
 from finger_pin.description.overriding import from_here, override
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.reading import Table, resolve_signals
+from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.series import Series
 from finger_pin.description.validation import Description, find_field, validate
 from finger_pin.exceptions import InputError
 

@@ -14,9 +14,9 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiterSettings
+from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
-from finger_pin.description.series import Series, series
 from finger_pin.description.signals import SignalSettings
 from finger_pin.description.validation import (
     IN_RADIANS,

@@ -12,7 +12,6 @@ from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
-from finger_pin.description.bench import IdentifySettings
 from finger_pin.description.hand import HandDescription
 from finger_pin.description.overriding import from_here, override
 from finger_pin.description.parameters import FingerDescription
@@ -26,8 +25,9 @@ from finger_pin.description.reading import (
     resolve_signals,
     shipped,
 )
+from finger_pin.description.recordings.bench import IdentifySettings
+from finger_pin.description.recordings.series import PACKED, Series, packed
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.series import PACKED, Series, packed
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
 

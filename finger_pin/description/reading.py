@@ -12,8 +12,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from finger_pin.description.columns import read_columns
-from finger_pin.description.series import PACKED
+from finger_pin.description.recordings.columns import read_columns
+from finger_pin.description.recordings.series import PACKED
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from finger_pin.description.series import Series, series
+from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.validation import (
     IN_RADIANS,
     MOST_ANGLE,

@@ -7,6 +7,7 @@ import numpy as np
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.mechanism.routes import Routes
+from finger_pin.mechanism.rows import RowSignals, combined
 
 
 class Excursions:
@@ -20,7 +21,7 @@ class Excursions:
             description: Of the finger.
             paths: The paths of its tree; None without a tree.
         """
-        self._coupling, self._paths, self._rest = routing.coupling, paths, np.zeros(0)
+        self._names, self._coupling, self._paths, self._rest = routing.tendons, routing.coupling, paths, np.zeros(0)
         # Of every tendon that goes along a path, which one.
         self._along: dict[int, int] = {}
         if paths is not None and description.tree is not None:
@@ -43,3 +44,12 @@ class Excursions:
         if self._paths is not None and self._along:
             coupling[..., [*self._along], :] = -self._paths.arms(position)[..., [*self._along.values()], :]
         return coupling
+
+    def torque(self, x: Array, pulling: RowSignals) -> Array:
+        """Return the torque of driven or elastic tendons at packed states, shape (..., size): shape (..., n), N m."""
+        joints = self._coupling.shape[1]
+        if not pulling.rows.routed:
+            return combined(pulling.force, pulling.rows.arm)[..., :joints]
+        places = [self._names.index(name) for name in pulling.rows.pulls or pulling.rows.names]
+        coupling = self.slopes(x[..., :joints])[..., places, :]
+        return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +13,6 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
@@ -29,10 +26,10 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
-from finger_pin.mechanism.rows import Rows, RowSignals, combined, further_states, pulled
+from finger_pin.mechanism.rows import Rows, RowSignals, pulled
 from finger_pin.mechanism.state import Layout
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
-from finger_pin.mechanism.surroundings import Surroundings
+from finger_pin.mechanism.surroundings import Surroundings, same_but_for_path
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
 
@@ -121,7 +118,7 @@ class Finger:
         around = None if objects is None else Surroundings.of(objects, description, mechanism, placed)
         self.surroundings = around
         self.mechanism = mechanism if around is None else around.around(mechanism)
-        self.layout = self._laid_out()
+        self.layout = Layout.of(self.tendons, self.actuators, self.further, around)
 
     def _tables(self, drives: Sequence[Rows], width: int) -> list[Rows]:
         """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
@@ -137,17 +134,6 @@ class Finger:
             *self.actuators.rotor_rows(width),
             *(table for table in self.further if not table.pulls),
         ]
-
-    def _laid_out(self) -> Layout:
-        tendons, motors, around = self.routing.tendons, self.actuators, self.surroundings
-        ringing = tuple((np.sqrt(2.0 * self.tendons.half_stiffness) / np.sqrt(self.tendons.mass)).tolist())
-        held = tuple(tendons[motors.tendons[k]] for k in motors.held)
-        driving, states = (further_states([t for t in self.further if bool(t.pulls) == own]) for own in (True, False))
-        joints, passive = self.routing.joints, self.routing.passive
-        layout = Layout(joints, tendons, passive, states, ringing, motors.names, held=held, drives=driving)
-        if around is None:
-            return layout
-        return replace(layout, objects=tuple(around.free), world=around.world, contacts=around.contacts.names)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -191,7 +177,7 @@ class Finger:
         """Return the finger that another description and other objects make, with the body and rows that were given."""
         (rigid_body, rows, known), around = self.made_of, self.surroundings
         led = objects is known or (around is not None and around.same_but_for_paths(objects))
-        if led and _same_but_for_path(self.description, description):
+        if led and same_but_for_path(self.description, description):
             # The mechanism does not know where its palm and objects are led.
             finger = copy.copy(self)
             finger.description, finger.made_of = description, (rigid_body, rows, objects)
@@ -200,10 +186,6 @@ class Finger:
         finger = Finger(description, rigid_body, rows, objects)
         finger.visuals = self.visuals
         return finger
-
-    def fitted(self, known: Scenario, other: Scenario) -> Finger:
-        """Return this finger where two scenarios describe theirs alike, else it with the numbers of the other one."""
-        return self if known.finger == other.finger else self.changed(other.finger, self.made_of[2])
 
     @property
     def coupling(self) -> Array:
@@ -274,9 +256,9 @@ class Finger:
     def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
         """Return H_c2^T f at packed states, shape (..., n), N m, (11), of what the tendons' rows do."""
         pulling = [rows[group] for group in self.pulling]
-        torque = self._pulled_torque(x, pulling[0])
+        torque = self._excursions.torque(x, pulling[0])
         for each in pulling[1:]:
-            torque = torque + self._pulled_torque(x, each)
+            torque = torque + self._excursions.torque(x, each)
         return torque
 
     def coupling_at(self, position: Array) -> Array:
@@ -286,15 +268,6 @@ class Finger:
     def excursion(self, position: Array) -> Array:
         """Return l of the actuated tendons at theta, shape (..., n), also of those along paths; shape (..., a), m."""
         return self._excursions.lengths(position)[..., : self.routing.actuated]
-
-    def _pulled_torque(self, x: Array, pulling: RowSignals) -> Array:
-        """Return the torque of driven or elastic tendons, shape (..., n), N m."""
-        joints = len(self.routing.joints)
-        if not pulling.rows.routed:
-            return combined(pulling.force, pulling.rows.arm)[..., :joints]
-        places = [self.routing.tendons.index(name) for name in pulling.rows.pulls or pulling.rows.names]
-        coupling = self.coupling_at(x[..., :joints])[..., places, :]
-        return np.asarray((pulling.force[..., None, :] @ coupling)[..., 0, :])
 
     def powers(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -320,38 +293,5 @@ class Finger:
         return self.mechanism.evaluate(x, inputs, fingertip_force).rate
 
 
-def _same_but_for_path(one: FingerDescription, other: FingerDescription) -> bool:
-    """Return whether two descriptions have the same parts, and hands with palms that both move or both rest."""
-    if one.hand is None or other.hand is None:
-        return one == other
-    parts = all(getattr(one, name) is getattr(other, name) for name in FingerDescription.model_fields)
-    moving = (one.hand.palm.path is None) == (other.hand.palm.path is None)
-    return parts and moving and one.hand.fingers_touch == other.hand.fingers_touch
-
-
 #: A hand is a finger whose joints form a tree.
 Hand = Finger
-#: Wherever a finger is taken: itself, its description, the name of one that ships, or the path of a file.
-FingerLike: TypeAlias = Finger | DescriptionLike
-
-
-def as_finger(finger: FingerLike, objects: Mapping[str, Object] | None = None) -> Finger:
-    """Return a finger that is given in any way, with objects around it where it is not built yet."""
-    return finger if isinstance(finger, Finger) else Finger(finger, objects=objects)
-
-
-def description_of(finger: FingerLike) -> FingerDescription:
-    """Return the description of a finger that is given in any way; none is built."""
-    return finger.description if isinstance(finger, Finger) else describe(finger)
-
-
-def own_finger(finger: FingerLike | None, scenario: Scenario) -> Finger | None:
-    """Return the finger that replaces the one of a scenario; None where none is given."""
-    return None if finger is None else as_finger(finger, scenario.environment.objects)
-
-
-def described_by(scenario: Scenario, finger: Finger | None) -> Scenario:
-    """Return a scenario with the description of the finger that replaces its own; of a hand it stays as it is."""
-    if finger is None or scenario.hand is not None:
-        return scenario
-    return scenario.model_copy(update={"finger": finger.description})

@@ -12,11 +12,20 @@ world that it sees follow o and o'.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from finger_pin.mechanism.rows import Rows, further_states
+
+if TYPE_CHECKING:
+    from finger_pin.mechanism.actuators import Actuators
+    from finger_pin.mechanism.surroundings import Surroundings
+    from finger_pin.mechanism.tendons import Tendons
 
 Array = NDArray[np.float64]
 
@@ -104,6 +113,29 @@ class Layout:
     contacts: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     drives: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def of(
+        cls, tendons: Tendons, motors: Actuators, rows: Sequence[Rows] = (), around: Surroundings | None = None
+    ) -> Layout:
+        """Return the layout of tendons, motors, further rows, drives among them, and what surrounds a finger."""
+        routing = tendons.routing
+        drives, further = (
+            further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False)
+        )
+        return cls(
+            joints=routing.joints,
+            tendons=routing.tendons,
+            passive=routing.passive,
+            further=further,
+            ringing=tuple((np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)).tolist()),
+            motors=motors.names,
+            objects=() if around is None else tuple(around.free),
+            world=() if around is None else around.world,
+            contacts=() if around is None else around.contacts.names,
+            held=tuple(routing.tendons[motors.tendons[k]] for k in motors.held),
+            drives=drives,
+        )
 
     @cached_property
     def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:

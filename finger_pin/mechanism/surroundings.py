@@ -220,3 +220,12 @@ def _placed(state: State) -> Array:
     """Return the positions of the bodies of the surroundings, shape (..., nq)."""
     parts = (state.position, state.object_pose, state.world_position)
     return np.concatenate([each for each in parts if each is not None], axis=-1)
+
+
+def same_but_for_path(one: FingerDescription, other: FingerDescription) -> bool:
+    """Return whether two descriptions have the same parts, and hands with palms that both move or both rest."""
+    if one.hand is None or other.hand is None:
+        return one == other
+    parts = all(getattr(one, name) is getattr(other, name) for name in FingerDescription.model_fields)
+    moving = (one.hand.palm.path is None) == (other.hand.palm.path is None)
+    return parts and moving and one.hand.fingers_touch == other.hand.fingers_touch

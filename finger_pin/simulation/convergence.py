@@ -18,7 +18,7 @@ from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
-from finger_pin.mechanism.finger import FingerLike, own_finger
+from finger_pin.mechanism.finger_like import FingerLike, own_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.initial_state import own_parts

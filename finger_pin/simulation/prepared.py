@@ -19,7 +19,8 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
-from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import SampledMotion

@@ -13,7 +13,7 @@ from finger_pin.control.proportional import Controller
 from finger_pin.control.user_controllers import Samples
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
-from finger_pin.mechanism.finger import FingerLike, own_finger
+from finger_pin.mechanism.finger_like import FingerLike, own_finger
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible

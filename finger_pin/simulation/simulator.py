@@ -21,7 +21,8 @@ from finger_pin.description.family import Family
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.mechanism.finger import Finger, FingerLike, as_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference

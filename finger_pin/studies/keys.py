@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.series import Series
 from finger_pin.description.validation import find_field, nearest
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
 
 #: What a key may be given: a number, or a name such as that of a method, or yes or no.
 Value = float | str | bool
@@ -78,7 +79,7 @@ class Starting:
 
     def finger_at(self, scenario: Scenario) -> Finger | None:
         """Return the finger that replaces the one of a point's scenario; None where nothing does."""
-        return None if self.finger is None else self.finger.fitted(self.scenario, scenario)
+        return None if self.finger is None else fitted(self.finger, self.scenario, scenario)
 
     def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
         """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.

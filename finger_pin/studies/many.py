@@ -17,7 +17,8 @@ from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
-from finger_pin.mechanism.finger import Finger, FingerLike, own_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, own_finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import prepare, refuse_unknown

@@ -23,7 +23,8 @@ from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism import joint_friction, tendons
 from finger_pin.mechanism.books import LOST
-from finger_pin.mechanism.finger import Finger, described_by
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import described_by
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.simulate import simulate

@@ -17,7 +17,7 @@ from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.mechanism.finger import FingerLike
+from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked

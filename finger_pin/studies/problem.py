@@ -13,7 +13,7 @@ import numpy as np
 from finger_pin.description.parameters import Tendon
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import FingerLike, description_of
+from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.studies.designs import Range
 from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric, choose

@@ -10,7 +10,7 @@ import xarray as xr
 import finger_pin as fp
 from finger_pin.commands.application import run
 from finger_pin.studies.comparison import CASES, compare, to_csv
-from finger_pin.views.plots.controllers import plot_controllers
+from finger_pin.views.plots.experiments.controllers import plot_controllers
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.commands.application import run
-from finger_pin.description.units import in_si
+from finger_pin.description.recordings.units import in_si
 from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.studies.identification.ledger import NAME
 from finger_pin.views.report import summarize_identification, write_report

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.bench import IdentifySettings
+from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.studies.identification.estimate import Fit, fit

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.description.bench import IdentifySettings
 from finger_pin.description.loading import ScenarioLike, load_bench
+from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger, FingerLike, described_by, own_finger
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.studies.fingerprint import finger_digest
 from finger_pin.studies.identification.comparing import LawComparison, compare_laws
 from finger_pin.studies.identification.estimate import Fit, fit

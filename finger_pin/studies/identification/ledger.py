@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from finger_pin.description.bench import IdentifySettings
+from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError

@@ -17,6 +17,7 @@ from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import fitted
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
@@ -142,7 +143,7 @@ class RecordedMotion:
         moved = self._with_start(scenario, own)
         if self._finger is None:
             return Setup.of(moved)
-        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=self._finger.fitted(self.scenario, moved)))
+        return Setup.of(moved, ClosedLoop.from_scenario(moved, finger=fitted(self._finger, self.scenario, moved)))
 
     def _made(
         self, scenario: Scenario, own: Mapping[str, float]

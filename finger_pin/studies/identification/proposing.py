@@ -10,7 +10,7 @@ import numpy as np
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import FingerLike
+from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.simulation.prepared import prepare
 from finger_pin.simulation.run_arrays import RunArrays
 

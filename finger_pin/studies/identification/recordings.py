@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from finger_pin.description.bench import Column, RecordingSettings
+from finger_pin.description.recordings.bench import Column, RecordingSettings
+from finger_pin.description.recordings.units import in_si
 from finger_pin.description.routing import Array
-from finger_pin.description.units import in_si
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError
 

@@ -2,17 +2,18 @@ from .comparing import compare as compare
 from .contact import plot_contact as plot_contact
 from .convergence import plot_convergence as plot_convergence
 from .energy import plot_energy as plot_energy
+from .experiments.friction_influence import plot_friction_influence as plot_friction_influence
+from .experiments.passive_delivery import plot_passive_delivery as plot_passive_delivery
+from .experiments.transmission import plot_transmission as plot_transmission
 from .fig6 import plot_fig6 as plot_fig6
 from .force_capability import plot_force_polytope as plot_force_polytope
 from .force_capability import plot_radius_sensitivity as plot_radius_sensitivity
-from .friction_influence import plot_friction_influence as plot_friction_influence
 from .friction_law import plot_friction_law as plot_friction_law
 from .hand_motion import plot_hand_motion as plot_hand_motion
 from .identification import plot_identification as plot_identification
 from .identification import plot_profiles as plot_profiles
 from .losses import plot_losses as plot_losses
 from .pareto import plot_pareto as plot_pareto
-from .passive_delivery import plot_passive_delivery as plot_passive_delivery
 from .saving import draw_all as draw_all
 from .saving import save_figure as save_figure
 from .self_locking import plot_critical_friction as plot_critical_friction
@@ -20,5 +21,4 @@ from .self_locking import plot_runaway as plot_runaway
 from .self_locking import plot_self_locking_map as plot_self_locking_map
 from .servo import plot_servo as plot_servo
 from .sweep import plot_sweep as plot_sweep
-from .transmission import plot_transmission as plot_transmission
 from .workspace import plot_workspace as plot_workspace

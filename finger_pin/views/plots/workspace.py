@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import FingerLike, as_finger
+from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.views.plots.panels import sheet, title
 from finger_pin.views.plots.reach import fingertip_surface, flexion_section
 from finger_pin.views.plots.space import AXES, space

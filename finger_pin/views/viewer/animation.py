@@ -16,7 +16,8 @@ from finger_pin.description.embedded import described
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
-from finger_pin.mechanism.finger import Finger, FingerLike
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene

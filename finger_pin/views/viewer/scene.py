@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.finger import Finger, FingerLike, description_of
+from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
 from finger_pin.views.viewer.force_set import ForceSet
 from finger_pin.views.viewer.solids import ROOT, is_mesh, link_names, root_command, solid_commands

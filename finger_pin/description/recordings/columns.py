@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from finger_pin.description.series import Series
+from finger_pin.description.recordings.series import Series
 from finger_pin.description.signals import MOST_POINTS
 from finger_pin.exceptions import InputError
 
