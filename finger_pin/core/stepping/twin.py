@@ -22,8 +22,9 @@ _STEPS = 128
 # it was less than so large a share of that, or from so many looks ago; if it was more than another share then: of what
 # was less, most has been added by the steps themselves since.
 _LARGE, _LARGEST, _SMALL, _LEAST, _LOOKS = 3e3, 3e-2, 1.0 / 30.0, 1.0 / 300.0, 4
-# Motions that are farther apart, rad or m, have nothing to do with each other any more.
-_APART = 0.1
+# It grows beyond all bounds if it is larger than the largest at so many looks in a row, has grown before each, and is
+# no less than such a share of what the linearised flow makes of it.
+_GROWN, _SHARE = 2, 0.5
 
 
 class Moment(NamedTuple):
@@ -37,13 +38,14 @@ class Moment(NamedTuple):
 
 
 class Twin:
-    """Follows the error of an island.
+    """Follows the error of an island."""
 
-    Attributes:
-        lost: Whether it has grown beyond all bounds.
-    """
+    _grown = 0
 
-    lost = False
+    @property
+    def lost(self) -> bool:
+        """Whether the error has grown beyond all bounds."""
+        return self._grown >= _GROWN
 
     def __init__(self, part: Part) -> None:
         """Begin where an island stands."""
@@ -63,7 +65,9 @@ class Twin:
             if _size(part, self._seen[0].drift) > _LEAST * self._large:
                 self._follow()
             self._seen = [self._now()]
-        elif size < _SMALL * self._large:
+            return
+        self._grown = 0
+        if size < _SMALL * self._large:
             self._seen = self._seen[-1:]
 
     def _now(self) -> Moment:
@@ -84,9 +88,11 @@ class Twin:
             other = difference(part, moment, twin)
             means = [max(_mean(each[places]) for each in (error, other)) for places in (part.joints, part.objects)]
             sums, time, error = sums + (moment.time - time) * np.minimum(means, 1.0), moment.time, other
-        if _size(part, error) < _size(part, part.drift):
+        was, found, linear = (_size(part, each) for each in (begin.drift, error, part.drift))
+        grows = found > max(_LARGEST, was, _SHARE * linear)
+        self._grown = self._grown + 1 if grows else 0
+        if found < linear:
             part.drift[:], part.memory[[core.DRIFT, core.OBJECT_DRIFT]], part.memory[core.BEHIND] = error, sums, 0.0
-        self.lost = _size(part, part.drift) > _APART
 
 
 def difference(part: Part, moment: Moment, other: Part) -> Array:
