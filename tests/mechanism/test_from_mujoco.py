@@ -274,12 +274,13 @@ def test_coupled_fixed_tendons_follow_as_mujoco_s_equality_says():
 
 
 def test_what_is_not_carried_over_is_listed():
-    rest = f"""{FIXED}<equality><weld body1="w"/><joint joint1="j" polycoef="0 0 1 0 0"/>
-    <connect name="loop" body1="w" anchor="0 0 0"/></equality>
+    straight = '<spatial name="straight"><site site="s"/><site site="base"/></spatial></tendon>'
+    rest = f"""{FIXED.replace("</tendon>", straight)}<equality><weld body1="w"/><joint joint1="j" polycoef="0 0 1 0 0"/>
+    <connect name="loop" body1="w" anchor="0 0 0"/><tendon name="both" tendon1="t" tendon2="straight"/></equality>
     <actuator><velocity joint="j" kv="1"/><intvelocity joint="j" kp="1" actrange="-1 1"/>
     <adhesion body="w" ctrlrange="0 1"/></actuator>"""
     body = LINK.replace("<body>", '<body name="w" gravcomp="1">')
-    model = model_of(body + '<body name="thing"><freejoint/><geom size="0.1"/></body>', rest)
+    model = model_of(body + '<site name="base"/><body name="thing"><freejoint/><geom size="0.1"/></body>', rest)
     description = fp.from_mujoco(model)
     assert description.tree.left_out == (
         "free joint of thing: it stays where it is",
@@ -290,6 +291,7 @@ def test_what_is_not_carried_over_is_listed():
         "equality equality_0: of kind weld",
         "equality equality_1: its polynomial is not linear",
         "equality loop: of kind connect",
+        "equality both: of tendons through space",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w"]

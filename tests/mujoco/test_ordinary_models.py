@@ -149,3 +149,22 @@ def test_a_process_that_has_not_imported_us_is_told_what_is_missing_by_the_xml()
     )
     told = subprocess.run([sys.executable, "-c", code], input=text, capture_output=True, text=True, check=True).stdout
     assert "finger_pin.friction" in told
+
+
+def test_a_binary_or_pickled_model_moves_alike_in_a_process_that_imports_us_first_and_is_lost_in_one_that_does_not(
+    model,
+):
+    whole, kept = motion(model, steps=50), pickle.dumps((pickle.dumps(model), CONTROLS[:50]))
+    load = "import pickle, sys\nmodel, controls = pickle.loads(sys.stdin.buffer.read())\n"
+    code = load + (
+        "import mujoco\nmodel = pickle.loads(model)\ndata = mujoco.MjData(model)\n"
+        "for each in controls:\n    data.ctrl[:] = each\n    mujoco.mj_step(model, data)\n"
+        "print(*[x.hex() for x in (*data.qpos, *data.qvel, *data.act)])"
+    )
+    ours, without = (
+        subprocess.run([sys.executable, "-c", first + code], input=kept, capture_output=True, check=False)
+        for first in ("import finger_pin.mujoco\n", "")
+    )
+    assert ours.returncode == 0 and [float.fromhex(each) for each in ours.stdout.decode().split()] == whole.tolist()
+    # MuJoCo does not tell: it crashes, or goes on without friction in a version that does not.
+    assert without.returncode != 0 or ours.stdout != without.stdout

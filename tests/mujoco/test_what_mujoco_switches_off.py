@@ -1,6 +1,7 @@
 """Friction while MuJoCo lets trees sleep, or has actuation disabled."""
 
 import mujoco
+import numpy as np
 import pytest
 from sliders import slider
 
@@ -44,3 +45,15 @@ def test_what_is_left_without_actuation_is_the_drag():
     data.ctrl[0], data.qfrc_applied[0] = 10.0, 1.5
     mujoco.mj_step(model, data, 500)
     assert data.qvel[0] == pytest.approx(1.0 / 0.1, rel=1e-3)
+
+
+def test_inverse_dynamics_leave_out_what_friction_holds():
+    model = slider(0.1, coulomb=0.2, curvature_offset=1.0)
+    data, held = mujoco.MjData(model), 8.0 * (1.0 - np.exp(-0.2))
+    data.ctrl[:] = 10.0, held - 10.0
+    mujoco.mj_step(model, data, 500)
+    mujoco.mj_forward(model, data)
+    assert abs(data.qacc[0]) < 1e-6 and data.qfrc_constraint[0] == pytest.approx(-held, rel=1e-6)
+    mujoco.mj_inverse(model, data)
+    # It is at rest under a force, so that the force is what they should find: they find the floor of the friction.
+    assert abs(data.qfrc_inverse[0]) <= 1e-4 and data.qfrc_actuator[0] == pytest.approx(held)
