@@ -31,25 +31,70 @@ def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int
 
 
 @compiled
-def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
-    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
-    tables, control, work, linear = model.tables, model.control, model.work, model.linear
-    load, command, force, slopes = linear.load, linear.command, linear.force, work.slopes
-    blocks = linear.blocks
-    place, own_places = blocks.place, blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
-    last = wide - 1
+def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
+    """Fill A^T d phi of a block by what is no row of its own: inertial forces, those at tips, and contacts."""
+    tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
+    places, last = linear.blocks.coordinates[linear.blocks.coordinate_start[b] :], wide - 1
     for j in range(width):
         for c in range(wide):
             force[j, c] = 0.0
-        force[j, last] -= linear.bias_rate[own_places[j]]
+        force[j, last] -= linear.bias_rate[places[j]]
     if tables.loaded:
         for t in range(tables.tip_body.size):
             for j in range(width):
                 for r in range(3):
-                    force[j, last] += work.jacobian[t, r, own_places[j]] * work.force_rate[t, r]
+                    force[j, last] += work.jacobian[t, r, places[j]] * work.force_rate[t, r]
     if tables.touching:
-        blocks.current[0] = b
+        linear.blocks.current[0] = b
         call_at(model.touch, address, g)
+
+
+@compiled
+def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) -> None:
+    """Fill the change of a row's load."""
+    tables, linear, load = model.tables, model.linear, model.linear.load
+    _terms(tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load)
+    if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
+        for c in range(width):
+            load[c] += linear.load_by_position[k, places[c]]
+        load[wide - 1] += linear.load_by_time[k]
+        if tables.touching:
+            call_at(model.press, address, float(k))
+
+
+@compiled
+def _command(model: Any, k: int, places: Any, width: int, wide: int) -> None:
+    """Fill the change of a row's input."""
+    tables, control, linear, command = model.tables, model.control, model.linear, model.linear.command
+    _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, wide, command)
+    channel = tables.channel[k]
+    if channel >= 0:
+        for c in range(width):
+            command[c] += control.by_position[channel, places[c]]
+            command[width + c] += control.by_velocity[channel, places[c]]
+        command[wide - 1] += control.by_time[channel]
+
+
+@compiled
+def _add_motion(
+    model: Any, k: int, width: int, by_length: float, by_speed: float, by_curvature: float, out: Any
+) -> None:
+    """Add slopes by a row's length, speed and curvature, by coordinates and velocities."""
+    tables, linear, place = model.tables, model.linear, model.linear.blocks.place
+    for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
+        out[place[tables.arm_at[e]]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
+        out[width + place[tables.arm_at[e]]] += by_speed * linear.arm[e]
+    for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
+        out[place[tables.bend_at[e]]] += by_curvature * linear.bend[e]
+
+
+@compiled
+def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
+    """Fill the gains of a block's rows and states, and sum up A^T d phi; columns (dq | dv | r_z | time)."""
+    tables, linear, slopes, blocks = model.tables, model.linear, model.work.slopes, model.linear.blocks
+    load, command, force, place = linear.load, linear.command, linear.force, blocks.place
+    own_places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+    _outside(model, address, g, b, width, wide)
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
         row, state = linear.gain[k], tables.state[k]
@@ -70,15 +115,7 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
                 own[c] = 0.0
         pressed = tables.load_start[k + 1] > tables.load_start[k] or (tables.touching and tables.pins[k] >= 0)
         if pressed and (of_load != 0.0 or by_load != 0.0):
-            _terms(
-                tables, tables.load_start[k], tables.load_start[k + 1], linear.load_slope[k], linear.gain, wide, load
-            )
-            if (tables.loaded or tables.touching) and tables.pins[k] >= 0:
-                for c in range(width):
-                    load[c] += linear.load_by_position[k, own_places[c]]
-                load[last] += linear.load_by_time[k]
-                if tables.touching:
-                    call_at(model.press, address, float(k))
+            _load(model, address, k, own_places, width, wide)
             for c in range(wide):
                 row[c] = of_load * load[c]
             if by_load != 0.0:
@@ -86,27 +123,15 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
                     own[c] = by_load * load[c]
         fed = tables.channel[k] >= 0 or tables.input_start[k + 1] > tables.input_start[k]
         if fed and (of_command != 0.0 or by_command != 0.0):
-            _terms(tables, tables.input_start[k], tables.input_start[k + 1], 1.0, linear.gain, wide, command)
-            channel = tables.channel[k]
-            if channel >= 0:
-                for c in range(width):
-                    command[c] += control.by_position[channel, own_places[c]]
-                    command[width + c] += control.by_velocity[channel, own_places[c]]
-                command[last] += control.by_time[channel]
+            _command(model, k, own_places, width, wide)
             for c in range(wide):
                 row[c] += of_command * command[c]
             if by_command != 0.0:
                 for c in range(wide):
                     own[c] += by_command * command[c]
-        begin, end = tables.arm_start[k], tables.arm_start[k + 1]
         if state >= 0:
             by_length, by_speed = factor * slopes[at.R_LENGTH, k], factor * slopes[at.R_SPEED, k]
-            by_curvature = factor * slopes[at.R_CURVATURE, k]
-            for e in range(begin, end):
-                own[place[tables.arm_at[e]]] += by_length * linear.measure[e] + by_speed * linear.turning[e]
-                own[width + place[tables.arm_at[e]]] += by_speed * linear.arm[e]
-            for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-                own[place[tables.bend_at[e]]] += by_curvature * linear.bend[e]
+            _add_motion(model, k, width, by_length, by_speed, factor * slopes[at.R_CURVATURE, k], own)
             for c in range(wide):
                 row[c] += total * own[c]
             # The column of r_z itself, without the difference g dz - r_z.
@@ -116,12 +141,8 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
         elif of_length == 0.0 and of_speed == 0.0 and of_curvature == 0.0 and not (pressed or fed):
             # An idle row, such as a limiter inside its range.
             continue
-        for e in range(begin, end):
-            row[place[tables.arm_at[e]]] += of_length * linear.measure[e] + of_speed * linear.turning[e]
-            row[width + place[tables.arm_at[e]]] += of_speed * linear.arm[e]
-        for e in range(tables.bend_start[k], tables.bend_start[k + 1]):
-            row[place[tables.bend_at[e]]] += of_curvature * linear.bend[e]
-        for e in range(begin, end):
+        _add_motion(model, k, width, of_length, of_speed, of_curvature, row)
+        for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
             arm, target = linear.arm[e], force[place[tables.arm_at[e]]]
             for c in range(wide):
                 target[c] += arm * row[c]

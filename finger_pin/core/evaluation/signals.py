@@ -142,78 +142,94 @@ def _touch(paths: Any, work: Any, out: Any) -> None:
                 touch[r] -= work.rows[FORCE, k + i] * own.wrench[e, i, 3 + r]
 
 
+@compiled
+def _set(many: Any, model: Any, m: int) -> None:
+    """Set inputs, forces at the tips and state to the m-th."""
+    for i in range(many.commands.shape[1]):
+        model.control.tension[i] = many.commands[m, i]
+    for t in range(many.forces.shape[1]):
+        for r in range(3):
+            model.tables.tip_force[t, r] = many.forces[m, t, r]
+    for c in range(many.states.shape[1]):
+        model.state[c] = many.states[m, c]
+
+
+@compiled
+def _evaluate(many: Any, model: Any, m: int) -> None:
+    """Evaluate the state that is set."""
+    tables, work = model.tables, model.work
+    if many.rates.shape[0] > 0 or many.bases.shape[0] > 0:
+        call_at(model.evaluate, many.model, 0.0)
+        return
+    # Powers do not need the acceleration, and only some rows need to know where bodies are.
+    for i in range(many.commands.shape[1]):
+        work.command[i] = many.commands[m, i]
+    if tables.loaded or tables.paths.columns.size > 0:
+        width = work.torque.size
+        move(tables, model.state[:width], model.state[width : 2 * width], work)
+    call_at(model.exert, many.model, 0.0)
+
+
+@compiled
+def _keep(many: Any, model: Any, m: int) -> None:
+    """Fill the m-th place with what has been evaluated."""
+    tables, work, rates, rows = model.tables, model.work, many.rates, many.rows
+    if rates.shape[0] > 0:
+        for c in range(many.states.shape[1]):
+            rates[m, c] = model.rate[c]
+    if rows.shape[1] > 0:
+        for c in range(rows.shape[0]):
+            for k in range(rows.shape[2]):
+                rows[c, many.first + m, k] = work.rows[c, k]
+        if tables.touching:
+            _touch(tables.paths, work, many.touches[m])
+    for j in range(many.torques.shape[1]):
+        many.torques[m, j] = work.torque[j]
+        many.externals[m, j] = work.external[j]
+    _book(tables, work, many.booked[m])
+
+
+@compiled
+def _book_moved(many: Any, model: Any, m: int) -> None:
+    """Book the power of a base that moves, or of what moves coordinates along paths."""
+    work, width, last = model.work, many.torques.shape[1], many.booked.shape[1] - 1
+    if model.power != 0 and many.bases.shape[0] > 0:
+        call_at(model.power, many.model, 0.0)
+        many.booked[m, last] = work.base_power[0]
+    if work.guide.size > 0:
+        for j in range(width):
+            if model.tables.guided[j] >= 0:
+                many.booked[m, last] -= work.torque[j] * many.states[m, width + j]
+
+
 @Unit
 def evaluate_many(address: int, _time: float) -> int:
     """Evaluate the `States` at an address."""
     many = bound_at(address, STATES)
-    states, commands, forces, rates, rows = many.states, many.commands, many.forces, many.rates, many.rows
-    first = many.first
-    torques, externals, booked, bases, attitudes = (
-        many.torques,
-        many.externals,
-        many.booked,
-        many.bases,
-        many.attitudes,
-    )
     model = bound_at(many.model, MODEL)
-    tables, control, work = model.tables, model.control, model.work
+    tables, work, before = model.tables, model.work, model.rate
     # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
-    sleepy = tables.touching > 0 and rows.shape[1] == 0 and bases.shape[0] == 0
-    before = model.rate
+    sleepy = tables.touching > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
     for k in range(tables.touching):
         work.paths.asleep[k] = 0
     for e in range(work.paths.path.size):
         work.paths.path[e] = 0.0
     list_awake(tables, work.paths)
-    for m in range(states.shape[0]):
-        for i in range(commands.shape[1]):
-            control.tension[i] = commands[m, i]
-        for t in range(forces.shape[1]):
-            for r in range(3):
-                tables.tip_force[t, r] = forces[m, t, r]
-        for c in range(states.shape[1]):
-            model.state[c] = states[m, c]
+    for m in range(many.states.shape[0]):
+        _set(many, model, m)
         if sleepy and m > 0:
-            _wake(tables, work, attitudes, m, before, model.state)
+            _wake(tables, work, many.attitudes, m, before, model.state)
             list_awake(tables, work.paths)
-        _set_base(bases, m, tables, work)
-        place_bodies(tables, attitudes[m])
-        if rates.shape[0] > 0 or bases.shape[0] > 0:
-            call_at(model.evaluate, many.model, 0.0)
-        else:
-            # Powers do not need the acceleration, and only some rows need to know where bodies are.
-            for i in range(commands.shape[1]):
-                work.command[i] = commands[m, i]
-            if tables.loaded or tables.paths.columns.size > 0:
-                width = work.torque.size
-                move(tables, model.state[:width], model.state[width : 2 * width], work)
-            call_at(model.exert, many.model, 0.0)
-        if rates.shape[0] > 0:
-            for c in range(states.shape[1]):
-                rates[m, c] = model.rate[c]
-        if rows.shape[1] > 0:
-            for c in range(rows.shape[0]):
-                for k in range(rows.shape[2]):
-                    rows[c, first + m, k] = work.rows[c, k]
-            if tables.touching:
-                _touch(tables.paths, work, many.touches[m])
-        for j in range(torques.shape[1]):
-            torques[m, j] = work.torque[j]
-            externals[m, j] = work.external[j]
-        _book(tables, work, booked[m])
+        _set_base(many.bases, m, tables, work)
+        place_bodies(tables, many.attitudes[m])
+        _evaluate(many, model, m)
+        _keep(many, model, m)
         if sleepy:
             arrive(tables, work.paths)
             settle(tables, work.rows, work.paths, model.state[2 * work.torque.size :])
-            for c in range(states.shape[1]):
+            for c in range(many.states.shape[1]):
                 before[c] = model.state[c]
-        last = booked.shape[1] - 1
-        if model.power != 0 and bases.shape[0] > 0:
-            call_at(model.power, many.model, 0.0)
-            booked[m, last] = work.base_power[0]
-        if work.guide.size > 0:
-            for j in range(torques.shape[1]):
-                if tables.guided[j] >= 0:
-                    booked[m, last] -= work.torque[j] * states[m, torques.shape[1] + j]
+        _book_moved(many, model, m)
     return 1
 
 
