@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from finger_pin.description.validation import Description
+from pydantic_core import PydanticCustomError
+
+from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
 
@@ -65,3 +67,13 @@ def _flat(table: Any, holds_tables: Callable[[dict[str, Any]], bool]) -> Any:
         else:
             found[name] = value
     return found
+
+
+def error_of_finger(finger: str, error: PydanticCustomError) -> PydanticCustomError:
+    """Return an error of one finger as that of the whole hand."""
+    context = error.context or {}
+    entry, allowed, value = str(context["entry"]), str(context["allowed"]), context["value"].content
+    if finger and entry.startswith("finger."):
+        return problem(f"hand.fingers.{finger}.{entry}", allowed, value)
+    named = not finger or finger in f"{entry} {allowed}"
+    return problem(entry, allowed if named else f"{allowed} (finger {finger})", value)

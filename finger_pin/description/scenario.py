@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from finger_pin.description.actuators import check_currents, check_sources
-from finger_pin.description.by_finger import flat, flat_numbers, given, nested, of_finger
+from finger_pin.description.by_finger import error_of_finger, flat, flat_numbers, given, nested, of_finger
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import HandDescription
@@ -173,7 +173,7 @@ class Scenario(Description):
             try:
                 part._check()
             except PydanticCustomError as error:
-                raise _of_finger(name, error) from None
+                raise error_of_finger(name, error) from None
         return self
 
     @model_serializer(mode="wrap")
@@ -293,13 +293,3 @@ class Scenario(Description):
             times[-1] = duration
             return times
         return np.append(times, duration)
-
-
-def _of_finger(finger: str, error: PydanticCustomError) -> PydanticCustomError:
-    """Return an error of one finger as that of the whole hand."""
-    context = error.context or {}
-    entry, allowed, value = str(context["entry"]), str(context["allowed"]), context["value"].content
-    if finger and entry.startswith("finger."):
-        return problem(f"hand.fingers.{finger}.{entry}", allowed, value)
-    named = not finger or finger in f"{entry} {allowed}"
-    return problem(entry, allowed if named else f"{allowed} (finger {finger})", value)

@@ -20,7 +20,8 @@ from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.motions import SampledMotion
-from finger_pin.simulation.variables import RESIDUAL, Quantity, variables
+from finger_pin.simulation.quantity import Quantity
+from finger_pin.simulation.variables import RESIDUAL, variables
 
 _NOTHING, _EVER = Statistics(0, 0, 0, 0, 0.0), np.array([np.inf])
 # Of a reference and a controller, which do not act.

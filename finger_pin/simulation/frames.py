@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.variables import BASE_FRAME, WORLD_FRAME
+from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME
 
 if TYPE_CHECKING:
     import xarray as xr

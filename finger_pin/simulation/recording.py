@@ -16,7 +16,8 @@ from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.simulation.motions import SampledMotion
-from finger_pin.simulation.variables import BASE_FRAME, SHORTFALL, coordinates, variables
+from finger_pin.simulation.quantity import BASE_FRAME
+from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
 
 if TYPE_CHECKING:
     import xarray as xr

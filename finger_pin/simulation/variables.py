@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,49 +12,18 @@ import pinocchio as pin
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.books import LOST, Energy
+from finger_pin.mechanism.books import LOST
 from finger_pin.mechanism.rows import Rows
 from finger_pin.simulation.contact_variables import contact_coordinates, contact_variables
 from finger_pin.simulation.energy import flows, stores
 from finger_pin.simulation.motions import SampledMotion
+from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
 
 _JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
 _MOTOR, _TIME = ("time", "motor"), ("time",)
 #: A variable that is left out of a whole result where nothing limits tensions.
 SHORTFALL = "torque_shortfall"
 RESIDUAL = "energy_residual"
-#: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.
-BASE_FRAME, WORLD_FRAME = "base", "world"
-
-
-class Quantity(NamedTuple):
-    """A variable of a result.
-
-    Attributes:
-        dims: Names of its dimensions, time first.
-        value: Returns its values from what is known of a motion.
-        units: SI.
-        long_name: In words.
-        equation: Number of its equation in the paper; empty for none.
-        frame: Whose axes its components are along, `BASE_FRAME` or `WORLD_FRAME`; empty for what has none.
-        booked: What it is of the energy account, if it belongs there.
-    """
-
-    dims: tuple[str, ...]
-    value: Callable[[SampledMotion], Array]
-    units: str
-    long_name: str
-    equation: str = ""
-    frame: str = ""
-    booked: Energy | None = None
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Unit, name, frame and equation, and what it is of the account."""
-        found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
-        if self.booked is not None:
-            found |= {"account": self.booked.kind, "label": self.booked.label}
-        return found | {"equation": f"({self.equation})"} if self.equation else found
 
 
 def variables(loop: ClosedLoop) -> dict[str, Quantity]:

@@ -22,8 +22,8 @@ from finger_pin.mechanism.finger_like import FingerLike, own_finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.prepared import prepare, refuse_unknown
+from finger_pin.simulation.quantity import Quantity
 from finger_pin.simulation.simulate import simulate
-from finger_pin.simulation.variables import Quantity
 from finger_pin.simulation.variables import variables as known_variables
 from finger_pin.studies.executing import Crew, Lost
 

@@ -62,3 +62,11 @@ def posture(model, random):
     free = random.uniform(-0.6, 0.6, model.nq)
     within = random.uniform(*model.jnt_range.T)
     return np.where(model.jnt_limited == 1, within, free)
+
+
+LINK = '<body><joint name="j" axis="0 1 0"/><geom type="box" size="0.1 0.1 0.1"/><site name="s" pos="0.1 0 0"/></body>'
+FIXED = '<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>'
+
+
+def model_of(body, rest):
+    return mujoco.MjModel.from_xml_string(f"<mujoco>{HEAD}<worldbody>{body}</worldbody>{rest}</mujoco>")
