@@ -84,7 +84,7 @@ def _limited_or_coupled(model: Any, tendon: int) -> bool:
 
 
 def _share(model: Any, tendon: int, names: list[str]) -> float:
-    """Return how a fixed tendon shares in what drives the only joint that it runs over; see `PluginFriction`.
+    """Return the share of a fixed tendon in the drive of the only joint that it runs over; see `PluginFriction`.
 
     Zero of all others, and of those that have an actuator or a spring of their own.
     """

@@ -90,7 +90,7 @@ def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
 
 @compiled
 def signals(m: Any, instance: Any, at: Any) -> Any:
-    """Return how many numbers an instance keeps in plugin_state; MuJoCo asks before a model has its tuples."""
+    """Return the number of signals of an instance in plugin_state; MuJoCo asks before a model has its tuples."""
     digits, k, count = flags(m, at.plugin_attr), integer_in(m, at.plugin_attradr, instance), 0
     while digits[k] != 0:
         count, k = 10 * count + digits[k] - 48, k + 1
@@ -174,14 +174,14 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
 
 @compiled
 def _entries(m: Any, at: Any, which: Any) -> Any:
-    """Return where the elements of a tuple begin and end."""
+    """Return the first element of a tuple, and the one after its last."""
     first = integer_in(m, at.tuple_adr, which)
     return first, first + integer_in(m, at.tuple_size, which)
 
 
 @compiled
 def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
-    """Return where the first friction has its bristles, its loads and its signals."""
+    """Return the addresses of the first friction's bristles, loads and signals."""
     bristles = integer_in(m, at.actuator_actadr, key & _LOW)
     loads = bristles + signals(m, instance, at) // SIGNALS
     return bristles, loads, integer_in(m, at.plugin_stateadr, instance)

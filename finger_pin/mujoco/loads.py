@@ -47,7 +47,7 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any)
 
 @compiled
 def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
-    """Return what a tendon's own spring exerts along it, N: negative where it pulls."""
+    """Return the force of a tendon's own spring along it, N: negative where it pulls."""
     stiffness = number_in(m, at.tendon_stiffness, tendon)
     if stiffness == 0.0:
         return 0.0

@@ -37,7 +37,7 @@ class _Plugin(ctypes.Structure):
 
 
 def _fingerprint() -> str:
-    """Return what the callbacks are compiled from: numba sees the file that they stand in, and not what they call."""
+    """Return a hash of the files that callbacks come from: numba sees one of them, not what it calls."""
     modules = (kernel, elements, elementary, lanes, loads, memory, rows, table, bristle, capstan)
     texts = (Path(str(each.__file__)).read_bytes() for each in modules)
     return hashlib.sha256(b"".join(texts)).hexdigest()

@@ -40,7 +40,7 @@ def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any)
 
 @compiled
 def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -> Any:
-    """Return where the diagonal of the dual solver's matrix is, in its dense or its sparse form."""
+    """Return the address of a diagonal entry of the dual solver's matrix, in its dense or its sparse form."""
     how = integer(m, at.jacobian)
     # As mj_isSparse: automatic is sparse from 60 degrees of freedom on.
     if how == kinds.dense or (how != kinds.sparse and size(m, at.nv) < 60):

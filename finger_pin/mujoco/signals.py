@@ -35,7 +35,7 @@ class Signals:
     turn: Array
 
     def index(self, name: str) -> int:
-        """Return where a tendon or joint stands in the arrays.
+        """Return the index of a tendon or joint in the arrays.
 
         Raises:
             InputError: If it has no friction.

@@ -110,7 +110,7 @@ def _write(spec: Any, model: Any, found: list[PluginFriction]) -> None:
 
 
 def _target(spec: Any, found: list[PluginFriction]) -> tuple[str, Any]:
-    """Return what the actuator stands at, on which it does nothing: something driven, whose tree does not sleep."""
+    """Return the target of the actuator, on which it does nothing: something driven, whose tree does not sleep."""
     for each in spec.actuators:
         if each.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON):
             return each.target, each.trntype
