@@ -83,7 +83,7 @@ def pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[E
         if workers is not None:
             raise wrong("--workers", "are local; those of a scheduler are its own")
         return _dask(scheduler)
-    from finger_pin.core.stepping.stepper import usable_cores
+    from finger_pin.core.threads import usable_cores
 
     if workers is not None and workers < 1:
         raise wrong("--workers", f"must be at least 1, not {workers}")

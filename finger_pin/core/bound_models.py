@@ -12,8 +12,8 @@ from finger_pin.core.control import held_control
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
 from finger_pin.core.jit import call, copied
 from finger_pin.core.model import BoundModel
-from finger_pin.core.stepping.stepper import in_threads
 from finger_pin.core.tables import Tables
+from finger_pin.core.threads import in_threads
 from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
 from finger_pin.laws.contact import CONTACT

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.compiled import Bindings
-from finger_pin.core.stepping.stepper import TABLEAUS, in_threads
+from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.stepping.textbook import Stop, Trajectory
+from finger_pin.core.threads import in_threads
 from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array

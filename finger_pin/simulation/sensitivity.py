@@ -18,8 +18,9 @@ import numpy as np
 from finger_pin.core.stepping.integrator import joined
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.neighbours import NearbyMotion, differentiate, fits
-from finger_pin.core.stepping.stepper import Stepper, in_threads
+from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.textbook import Trajectory
+from finger_pin.core.threads import in_threads
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.run_arrays import RunArrays

@@ -21,8 +21,8 @@ from typing import Any, Self, TypeVar
 
 import cloudpickle
 
-from finger_pin.core.stepping.stepper import usable_cores
 from finger_pin.core.stepping.textbook import Stop
+from finger_pin.core.threads import usable_cores
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import FingerPinError, InputError, Interrupted, ScenarioWarning
 from finger_pin.simulation.simulate import simulate

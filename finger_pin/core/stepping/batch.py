@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound, bound_at, call_at
-from finger_pin.core.stepping.stepper import Stepper, usable_cores
+from finger_pin.core.stepping.stepper import Stepper
+from finger_pin.core.threads import usable_cores
 from finger_pin.description.routing import Array
 
 #: In the place of an end: this one is left alone.

@@ -12,9 +12,10 @@ import numpy as np
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part, Record, failure
-from finger_pin.core.stepping.stepper import Stepper, in_threads
+from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
 from finger_pin.core.stepping.twin import Twin
+from finger_pin.core.threads import in_threads
 from finger_pin.description.routing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.

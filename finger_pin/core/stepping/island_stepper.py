@@ -70,7 +70,8 @@ class Part:
         attitude: Quaternions of its free bodies, shape (f, 4).
         atol: Absolute tolerances, shape (size,).
         memory: Time, step size, error history and counters.
-        joints: Coordinates whose error is estimated; none of what is moved along paths.
+        judged: Whether its error is estimated.
+        joints: Coordinates whose error is; none of what is moved along paths.
         objects: Those of free objects, likewise.
         drives: Loops of motors in position drive, which sample on the way; None for none.
         knots: Times at which steps end, s, positive, in order.
@@ -91,6 +92,7 @@ class Part:
         rtol: float,
         atol: Array,
         memory: Array,
+        judged: bool = True,
     ) -> None:
         """Bind everything; arrays are taken as they are, not copied."""
         self.island, self.laws = island, laws
@@ -112,13 +114,13 @@ class Part:
             end=np.zeros(len(x)),
             drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
-            joints=np.flatnonzero(~of_objects & led),
-            objects=np.flatnonzero(of_objects & led),
+            joints=np.flatnonzero(~of_objects & led & judged),
+            objects=np.flatnonzero(of_objects & led & judged),
         )
         self._block = bound(self._bound, core.INTEGRATION)
         self.joints, self.objects = self._bound.joints, self._bound.objects
         place_all(tables, attitude)
-        self.tables, self.control, self.tableau = tables, control, tableau
+        self.tables, self.control, self.tableau, self.judged = tables, control, tableau, judged
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
         self._nothing, self._taken = self.room(0), np.zeros(1, dtype=np.int64)
         # What compiled code was given last: a record, loops and knots; and the blocks that hold them, what they are
@@ -215,6 +217,7 @@ class Part:
             bound.rtol,
             bound.atol,
             bound.memory,
+            self.judged,
         )
 
     def __reduce__(self) -> NoReturn:
@@ -244,6 +247,7 @@ class Part:
             _ANY,
             np.full_like(bound.atol, _ANY),
             bound.memory,
+            self.judged,
         )
         twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
         return twin
@@ -262,6 +266,7 @@ class Part:
             bound.rtol,
             bound.atol.copy(),
             bound.memory.copy(),
+            self.judged,
         )
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +19,7 @@ from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
 from finger_pin.core.stepping.islands import Island, find_islands, select, select_control, wiring
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
+from finger_pin.core.threads import in_threads
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 
@@ -31,9 +30,6 @@ TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": roda
 
 # As often the error that is carried along counts.
 _TWICE = 2.0
-
-_Item = TypeVar("_Item")
-_Found = TypeVar("_Found")
 
 
 class Stepper:
@@ -54,6 +50,8 @@ class Stepper:
         atol: Array,
         force: Array | None = None,
         time: float = 0.0,
+        *,
+        judged: bool = True,
     ) -> None:
         """Start from a state.
 
@@ -66,7 +64,9 @@ class Stepper:
             atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
+            judged: Whether `estimated_error` will be asked for, which takes a tenth of the time.
         """
+        self._judged = judged
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
         self._charts, self._width, self._wiring = Charts.of(mechanism), mechanism.coordinates, wiring(tables, control)
         self._islands = find_islands(tables, control)
@@ -78,7 +78,7 @@ class Stepper:
             memory[[core.TIME, core.STEP]] = time, FIRST_STEP
             followed = laws if len(self._islands) == 1 else [laws[g] for g in _groups_of(tables, island)]
             given = copied(own), copied(inputs), start, attitude, tableau, float(rtol), tolerances, memory
-            self.parts.append(Part(island, followed, *given))
+            self.parts.append(Part(island, followed, *given, judged))
 
     def renew(
         self,
@@ -155,8 +155,10 @@ class Stepper:
 
         It is that of free objects, of their turns and places, rad and m, where that is larger. The local errors are
         carried along the linearised flow, and count twice: at kinks they are known to a factor only. It is seldom
-        below a third of the error, and sometimes far above it.
+        below a third of the error, and sometimes far above it; NaN if nobody wants to know.
         """
+        if not self._judged:
+            return np.nan
         joints = [(len(part.joints), part.memory[core.DRIFT]) for part in self.parts]
         objects = [(len(part.objects), part.memory[core.OBJECT_DRIFT]) for part in self.parts]
         means = [sum(n * drift for n, drift in each) / max(sum(n for n, _ in each), 1) for each in (joints, objects)]
@@ -244,7 +246,7 @@ class Stepper:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds islands of its own."""
-        return Stepper, self._made_of, self.moments
+        return partial(Stepper, judged=self._judged), self._made_of, self.moments
 
     def __setstate__(self, state: Moments) -> None:
         """Go on from where another one stood that was made alike."""
@@ -273,24 +275,6 @@ class Stepper:
         """Say what a status means, with a name for every number of the state; empty if nothing failed."""
         part = min(self.parts, key=lambda each: each.time)
         return failure(part, status, [names[at] for at in self.places(part.island)])
-
-
-def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
-    # Only Linux binds processes to cores.
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
-    """Do a task that holds no lock of Python for all items side by side; return what it returns in their order.
-
-    Only what the main thread does is spread: who runs many at once has no core to spare.
-    """
-    workers = min(len(items), usable_cores())
-    if workers < 2 or threading.current_thread() is not threading.main_thread():
-        return [task(item) for item in items]
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(task, items))
 
 
 def _groups_of(tables: Tables, island: Island) -> list[int]:
