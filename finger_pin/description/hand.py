@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.parameters import FingerDescription, PassiveTendon, StrokeLimiterSettings
+from finger_pin.description.parameters import FingerDescription, Link, PassiveTendon, StrokeLimiterSettings
 from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
@@ -32,6 +32,7 @@ from finger_pin.description.validation import (
 from finger_pin.exceptions import InputError
 
 _BUILT: Remembered[FingerDescription] = Remembered()
+_LINKS: Remembered[Link] = Remembered()
 _JOINED: Remembered[FingerDescription] = Remembered()
 _MILLIMETRES = " m (is it in millimetres?)"
 _PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
@@ -245,14 +246,13 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
         return finger
     powers = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
     powers |= {"transverse_inertia": 5, "axial_inertia": 5}
+
+    def scaled_link(link: Link) -> Link:
+        return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in powers.items()})
+
     joints = {
         name: joint.model_copy(
-            update={
-                "link": joint.link
-                and joint.link.model_copy(
-                    update={key: getattr(joint.link, key) * scale**power for key, power in powers.items()}
-                )
-            }
+            update={"link": joint.link and _LINKS.of((joint.link, scale), partial(scaled_link, joint.link))}
         )
         for name, joint in finger.joints.items()
     }

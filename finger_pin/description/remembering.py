@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from pydantic import BaseModel
 
 _Made = TypeVar("_Made")
-_MOST = 32
+_MOST = 128
 
 
 class Remembered(Generic[_Made]):

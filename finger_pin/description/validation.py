@@ -127,6 +127,8 @@ def nearest(name: Any, names: Iterable[str]) -> str | None:
 
 def expand(value: Numbers, size: int) -> NDArray[np.float64]:
     """Return one number per item, shape (size,), from one number for all or one for each."""
+    if isinstance(value, int | float):
+        return np.full(size, float(value))
     return np.broadcast_to(np.asarray(value, dtype=float), (size,)).copy()
 
 

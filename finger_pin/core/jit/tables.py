@@ -80,6 +80,29 @@ def refill(table: tuple[Any, ...], other: tuple[Any, ...]) -> None:
             refill(own, new)
 
 
+def numbered(table: _Table) -> _Table:
+    """Return a table that has in the place of every number its index in the array."""
+    numbers = [
+        np.arange(each.size, dtype=float).reshape(each.shape) if _is_of_numbers(each) else each for each in table
+    ]
+    return type(table)(*(numbered(each) if isinstance(each, tuple) else each for each in numbers))
+
+
+def taken(like: _Table, places: _Table, table: tuple[Any, ...]) -> _Table:
+    """Return a table like one, with the numbers that stand at some places, as `numbered` has them, in another."""
+    found = []
+    for own, at, others in zip(like, places, table, strict=True):
+        if isinstance(own, tuple):
+            found.append(taken(own, at, others))
+        else:
+            found.append(others.ravel()[at.astype(np.int64)] if _is_of_numbers(own) else own)
+    return type(like)(*found)
+
+
+def _is_of_numbers(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == float
+
+
 def _copied(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.copy()

@@ -118,7 +118,8 @@ def integrate_compiled(
     stepper.advance(stepper.time)
     began = time.perf_counter()
     # Of a controller that acts in between, the linearised flow knows nothing.
-    judged = held is None and not stepper.driven
+    known = held is None and not stepper.driven
+    judged = known and stepper.judged
     recorders = [_Recorder(stepper, index, chunk, judged) for index in range(len(stepper.parts))]
     alone = len(recorders) == 1
     reason, interrupted = "", False
@@ -158,7 +159,7 @@ def integrate_compiled(
         interrupted=interrupted,
         estimated_error=_error(stepper, recorders) if judged else np.nan,
         # Inputs that are held in between are not the core's own.
-        islands=() if not judged or stepper.held else tuple(steps),
+        islands=() if not known or stepper.held else tuple(steps),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core.control import HELD, Control
 from finger_pin.core.evaluation.charts import Charts
-from finger_pin.core.jit import copied
+from finger_pin.core.jit import copied, numbered, taken
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import Drives
@@ -38,6 +38,7 @@ class Stepper:
     Attributes:
         mechanism: The mechanism.
         parts: Its islands.
+        judged: Whether its error is estimated.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class Stepper:
             time: When, s.
             judged: Whether `estimated_error` will be asked for, which takes a tenth of the time.
         """
-        self._judged = judged
+        self.judged = judged
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
         self._charts, self._width, self._wiring = Charts.of(mechanism), mechanism.coordinates, wiring(tables, control)
         self._islands = find_islands(tables, control)
@@ -100,7 +101,8 @@ class Stepper:
             return False
         self._made_of = (mechanism, control, x, tableau, rtol, atol, force, 0.0)
         if mechanism is not self.mechanism:
-            self._tables = self._selected(tables)
+            pairs = zip(self._tables, self._numbered, strict=True)
+            self._tables = [tables] if len(self._islands) == 1 else [taken(*each, tables) for each in pairs]
         begun = [*self._begun()]
         if not all(part.fits(*each[:2]) for part, each in zip(self.parts, begun, strict=True)):
             self._made_of, self._tables = before
@@ -115,6 +117,11 @@ class Stepper:
     def _selected(self, tables: Tables) -> list[Tables]:
         """Return the tables of every island."""
         return [tables] if len(self._islands) == 1 else [select(tables, island) for island in self._islands]
+
+    @cached_property
+    def _numbered(self) -> list[Tables]:
+        """Where the numbers of every island's tables stand in those of the whole."""
+        return self._selected(numbered(build_tables(self.mechanism)))
 
     def _begun(self) -> Iterator[tuple[Tables, Control, Array, Array, Array]]:
         """Yield of every island its tables, inputs, state, quaternions and absolute tolerances at the start."""
@@ -157,7 +164,7 @@ class Stepper:
         carried along the linearised flow, and count twice: at kinks they are known to a factor only. It is seldom
         below a third of the error, and sometimes far above it; NaN if nobody wants to know.
         """
-        if not self._judged:
+        if not self.judged:
             return np.nan
         joints = [(len(part.joints), part.memory[core.DRIFT]) for part in self.parts]
         objects = [(len(part.objects), part.memory[core.OBJECT_DRIFT]) for part in self.parts]
@@ -246,7 +253,7 @@ class Stepper:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds islands of its own."""
-        return partial(Stepper, judged=self._judged), self._made_of, self.moments
+        return partial(Stepper, judged=self.judged), self._made_of, self.moments
 
     def __setstate__(self, state: Moments) -> None:
         """Go on from where another one stood that was made alike."""

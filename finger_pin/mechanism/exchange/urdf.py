@@ -104,8 +104,7 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
     """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
     hand, joints = description.hand, description.joints
     if hand is not None:
-        placed = (hand.gravity, *hand.fingers, *hand.fingers.values())
-        return _BODIES.of(placed, partial(build_hand, hand))
+        return build_hand(hand)
     links = (description.name, description.gravity, *joints, *(joint.link for joint in joints.values()))
     return _BODIES.of(links, partial(_build, description))
 
@@ -124,10 +123,15 @@ def _read(text: str) -> pin.Model:
 
 def build_hand(hand: HandDescription) -> RigidBody:
     """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
-    placed = {"gravity": hand.gravity}
-    parts = {name: build_rigid_body(finger.model_copy(update=placed)) for name, finger in hand.built().items()}
-    places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
-    return RigidBody.join(parts, places)
+    pulled = {"gravity": hand.gravity}
+    parts = {name: build_rigid_body(finger.model_copy(update=pulled)) for name, finger in hand.built().items()}
+    placed = tuple((name, each.position, each.orientation) for name, each in hand.fingers.items())
+
+    def join() -> RigidBody:
+        places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
+        return RigidBody.join(parts, places)
+
+    return _BODIES.of((hand.gravity, *placed, *parts.values()), join)
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
