@@ -6,7 +6,7 @@ import copy
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -27,6 +27,7 @@ from finger_pin.description.reading import (
 )
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.recordings.series import PACKED, Series, packed
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
@@ -34,6 +35,8 @@ from finger_pin.exceptions import InputError
 # Of more numbers than this a text is written that is read at once; nobody reads them one by one.
 _MANY = 10_000
 _Described = TypeVar("_Described", bound=Description)
+# Few: some have millions of numbers.
+_TEXTS: Remembered[str] = Remembered(4)
 #: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
 ScenarioLike: TypeAlias = Scenario | str | Path
 #: Likewise a finger; a hand is one, too.
@@ -196,6 +199,10 @@ def to_toml(description: Description) -> str:
         raise InputError("description", allowed, type(description).__name__)
     if isinstance(description, FingerDescription) and description.hand is not None:
         description = description.hand
+    return _TEXTS.of((description,), partial(_text, description))
+
+
+def _text(description: Description) -> str:
     long: list[str] = []
     text = tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True), long))
     # In the single quotes of TOML nothing is escaped, so that nobody looks at each letter.

@@ -15,8 +15,9 @@ _MOST = 128
 class Remembered(Generic[_Made]):
     """The latest of what was made, by what it was made of: descriptions as objects, all else by value."""
 
-    def __init__(self) -> None:
-        """Remember nothing."""
+    def __init__(self, most: int = _MOST) -> None:
+        """Remember nothing yet, and never more than so many."""
+        self._most = most
         self._known: dict[tuple[Hashable, ...], tuple[tuple[object, ...], _Made]] = {}
         self._lock = Lock()
 
@@ -29,6 +30,6 @@ class Remembered(Generic[_Made]):
             found = parts, make()
             with self._lock:
                 self._known[key] = found
-                if len(self._known) > _MOST:
+                if len(self._known) > self._most:
                     del self._known[next(iter(self._known))]
         return found[1]

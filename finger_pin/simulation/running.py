@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.loading import to_toml
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
@@ -35,11 +37,12 @@ from finger_pin.simulation.accuracy import (
 )
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
+from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
 
 if TYPE_CHECKING:
     import xarray as xr
 
-from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
+_MARGINS: Remembered[float] = Remembered()
 
 
 def run(
@@ -132,4 +135,6 @@ def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
     planned = all(part.controller.kind == "proportional" for part in scenario.parts().values())
     if not planned or {"controller", "reference"} & set(own.split(", ")):
         return None
-    return quick_margin(scenario, loop.reference) if loop.finger.routing.force_closure().holds else None
+    if not loop.finger.routing.force_closure().holds:
+        return None
+    return _MARGINS.of((scenario,), partial(quick_margin, scenario, loop.reference))

@@ -166,10 +166,12 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[str]:
 
 def _prepared(study: Mapping[str, Any]) -> Iterator[str]:
     yield "a prepared scenario that records angles and tensions: processor time, ms"
-    head = ("scenario", "integration", "run", "simulate", "10 ms: steps", "run", "simulate", "load")
+    head = ("scenario", "integration", "run", "simulate", "10 ms: steps", "run", "changed", "simulate", "load")
     yield from table(head, list(prepared.lines(study)))
-    times = ", ".join(f"{name} {1e6 * value:.3g}" for name, value in study["simulator"].items())
-    yield f"a simulator, in steps of 20 ms at 1e-3 rad, us: {times}"
+    simulator = dict(study["simulator"])
+    error = simulator.pop("error")
+    times = ", ".join(f"{name} {1e6 * value:.3g}" for name, value in simulator.items())
+    yield f"a simulator, in steps of 20 ms that err by {error:.1e} rad rms, us: {times}"
 
 
 def _many(study: Mapping[str, Any]) -> Iterator[str]:

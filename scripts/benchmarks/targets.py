@@ -121,8 +121,8 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[Target]:
 
 def _prepared(study: Mapping[str, Any]) -> Iterator[Target]:
     fig6, simulator = study["runs"]["fig6"], study["simulator"]
-    beside = 1e3 * (fig6["short run"] - fig6["short steps"])
-    yield target("prepared run of 10 ms beside its steps", beside, "<=", 2.0, "ms")
+    beside = max(times["short changed"] - times["short steps"] for times in study["runs"].values())
+    yield target("prepared run of 10 ms with another number, beside its steps, at most", 1e3 * beside, "<=", 2.0, "ms")
     yield target("simulate of 10 ms", 1e3 * fig6["short simulate"], "<=", 6.0, "ms")
     slowest = max(times["load"] for times in study["runs"].values())
     yield target("a scenario that was read before", 1e3 * slowest, "<=", 3.0, "ms")
