@@ -42,7 +42,7 @@ def test_the_interpolant_of_a_step_converges_with_its_order(smooth, method):
     """Of one step from the same state: the error of an interpolant of order q is h^(q+1)."""
     x, errors = smooth.start, []
     for h in (2.5e-4, 1.25e-4, 6.25e-5):
-        recorder = _Recorder(smooth.stepper(method, step=h), 0, 1, False)
+        recorder = _Recorder(smooth.stepper(method, step=h), 0, 1)
         part = recorder.part
         assert recorder.advance(h) == rosenbrock.DONE and recorder.taken == 1
         times = np.linspace(0.0, h, 9)
