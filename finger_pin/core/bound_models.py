@@ -46,6 +46,27 @@ class Room(NamedTuple):
         packed, rates, torques, externals, booked, touches = (values[at] for values in own)
         return Room(packed, rates, self.rows, first, torques, externals, booked, touches)
 
+    def states(
+        self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
+    ) -> States:
+        """Return some states with what is filled for them, for the model at an address."""
+        own = self.part(at)
+        return States(
+            model=model,
+            states=states[at],
+            commands=commands[at],
+            forces=forces[at],
+            rates=own.rates,
+            rows=own.rows,
+            first=own.first,
+            torques=own.torques,
+            externals=own.externals,
+            booked=own.booked,
+            bases=bases[at],
+            attitudes=attitudes[at],
+            touches=own.touches,
+        )
+
 
 class Models:
     """Models of the same tables under inputs that are given: memory for threads, and with or without forces at tips."""
@@ -122,10 +143,8 @@ def fill(
     loaded, count = bool(np.any(forces)), len(states)
 
     def fill_part(model: BoundModel, part: slice) -> None:
-        own = room.part(part)
-        filled = (own.rates, own.rows, own.first, own.torques, own.externals, own.booked)
-        given = (states[part], commands[part], forces[part], *filled, bases[part], attitudes[part], own.touches)
-        call(evaluate_many, States(model.address, *given), STATES)
+        asked = room.states(part, model.address, states, commands, forces, bases, attitudes)
+        call(evaluate_many, asked, STATES)
 
     if count < FEW:
         fill_part(models.model(loaded), slice(None))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.compiled_finger import CompiledFinger
-from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
+from finger_pin.core.evaluation.signals import STATES, evaluate_many
 from finger_pin.core.jit import bound
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger_signals import FingerSignals
@@ -69,24 +69,10 @@ class CompiledFingers:
 
     def _bound(self, index: int, loaded: bool, moved: bool) -> NDArray[np.uint8]:
         """Return the block by which compiled code finds a finger, its state, and what is filled for it."""
-        at = slice(index, index + 1)
-        room, bases = self._room.part(at), self._bases[at] if moved else self._bases[:0]
-        states = States(
-            model=self._fingers[index].mechanism.models.model(loaded).address,
-            states=self._states[at],
-            commands=self._commands[at],
-            forces=self._forces[at],
-            rates=room.rates,
-            rows=room.rows,
-            first=room.first,
-            torques=room.torques,
-            externals=room.externals,
-            booked=room.booked,
-            bases=bases,
-            attitudes=self._attitudes[at],
-            touches=room.touches,
-        )
-        return bound(states, STATES)
+        model = self._fingers[index].mechanism.models.model(loaded)
+        bases = self._bases if moved else self._bases[:0]
+        given = (self._states, self._commands, self._forces, bases, self._attitudes)
+        return bound(self._room.states(slice(index, index + 1), model.address, *given), STATES)
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
