@@ -16,7 +16,7 @@ from finger_pin.commands.console import print_text
 from finger_pin.commands.options import Output, Restart, wrong
 
 # Proximal policy optimisation: small batches learn more of a step than it costs to take another.
-SETTINGS = {"batch_size": 160, "n_epochs": 10, "gamma": 0.9, "gae_lambda": 0.9}
+SETTINGS = {"batch_size": 160, "n_epochs": 10, "gae_lambda": 0.9}
 _HIDDEN, _RATE, _LEAST_RATE = [128, 128], 1e-3, 5e-5
 #: Columns of the curve: steps, processor time of training, s, and the mean reward per step of the last episodes.
 COLUMNS = ("steps", "seconds", "reward")
@@ -29,15 +29,17 @@ class Training(NamedTuple):
         steps: Control steps of all worlds together.
         rollout: Steps of each world between improvements of the policy.
         spread: Logarithm of the first standard deviation of actions, over half their range.
+        discount: What a reward counts a step later.
     """
 
     steps: int
     rollout: int
     spread: float
+    discount: float = 0.9
 
 
-TRAININGS = {"Reach": Training(200_000, 50, -1.0), "Press": Training(200_000, 50, -2.0)}
-TRAININGS["Grasp"] = Training(80_000, 50, -2.0)
+TRAININGS = {"Reach": Training(100_000, 50, -1.0), "Press": Training(120_000, 50, -2.0)}
+TRAININGS["Grasp"] = Training(80_000, 50, -2.0, 0.97)
 
 
 class Goal(NamedTuple):
@@ -146,9 +148,14 @@ class Policy:
         kept = [folder / name for name in ("policy.zip", "normalisation.pkl", "curve.csv")]
         monitored = VecMonitor(build_worlds(task, worlds, **fields))
         if restart or not all(path.exists() for path in kept):
-            environment = VecNormalize(monitored, gamma=SETTINGS["gamma"])
+            environment = VecNormalize(monitored, gamma=training.discount)
             network = {"net_arch": _HIDDEN, "log_std_init": training.spread}
-            own: dict[str, Any] = {"policy_kwargs": network, "n_steps": training.rollout, "learning_rate": falling_rate}
+            own: dict[str, Any] = {
+                "policy_kwargs": network,
+                "n_steps": training.rollout,
+                "learning_rate": falling_rate,
+                "gamma": training.discount,
+            }
             model = PPO("MlpPolicy", environment, seed=seed, device="cpu", **SETTINGS, **own)
             curve: list[tuple[float, ...]] = []
         else:

@@ -132,7 +132,9 @@ def _prepared(study: Mapping[str, Any]) -> Iterator[Target]:
 
 
 def _learning(study: Mapping[str, Any]) -> Iterator[Target]:
-    times = study["kinds"]["smooth"]["times"]
+    times, errors = (study["kinds"]["smooth"][name] for name in ("times", "errors"))
     yield target("a control step of Reach", 1e6 * times["one"], "<=", 100.0, "us")
+    yield target("its error over episodes", 1e3 * errors["one"], "<=", 1.0, "mrad")
     yield target(f"{study['worlds']} worlds over one", times["one"] / times["many"], ">=", 1.8, "x")
-    yield target("a reset with numbers drawn anew", 1e3 * study["reset"], "<=", 2.0, "ms")
+    for name, took in study["reset"].items():
+        yield target(f"a reset of {name} with numbers drawn anew", 1e3 * took, "<=", 2.0, "ms")
