@@ -83,7 +83,7 @@ def train(
     restart: Restart = False,
     output: Output = Path("results/policies"),
 ) -> None:
-    """Train a policy on a task that ships, and draw how it learns.
+    """Train a policy on a task that ships, and draw how all that were trained so far learn.
 
     Ctrl-C keeps the policy so far, and the same command goes on with it.
     """
@@ -96,7 +96,7 @@ def train(
     folder = output / task.lower()
     policy = Policy.trained(folder, task, training, worlds, seed, restart=restart)
     found, goal = policy.evaluate(task, episodes=100), GOALS[task]
-    draw_curve(policy.curve, task, folder / "curve.png")
+    draw_curves(output, output / "curves.png")
     text = f"{task}: of 100 new episodes {100.0 * found.solved:.0f} end within {goal.scale * goal.within:g} {goal.unit}"
     text += f" (median {goal.scale * found.error:.2g} {goal.unit}); reward {found.reward:.3f} a step, 1 at best"
     print_text(f"{text}. Results are in {folder}")
@@ -108,12 +108,11 @@ class Policy:
     Attributes:
         model: Of stable-baselines3.
         folder: With ``policy.zip``, ``normalisation.pkl`` and ``curve.csv``.
-        curve: Shape (k, 3), as `COLUMNS` has it.
     """
 
-    def __init__(self, model: Any, folder: Path, curve: Any) -> None:
+    def __init__(self, model: Any, folder: Path) -> None:
         """Keep them."""
-        self.model, self.folder, self.curve = model, folder, curve
+        self.model, self.folder = model, folder
 
     @classmethod
     def trained(
@@ -168,7 +167,7 @@ class Policy:
         finally:
             keeper.keep()
             environment.close()
-        return cls(model, folder, np.array(curve))
+        return cls(model, folder)
 
     def evaluate(self, task: str, episodes: int, **fields: Any) -> Found:
         """Return how the policy does in new episodes, without exploration.
@@ -252,8 +251,8 @@ def build_keeper(curve: list[tuple[float, ...]], kept: list[Path]) -> Any:
     return Keeper()
 
 
-def draw_curve(curve: Any, task: str, path: Path) -> None:
-    """Write the figure of a curve."""
+def draw_curves(output: Path, path: Path) -> None:
+    """Write the figure of all curves that a folder keeps."""
     from finger_pin.views.plots import save_figure
     from finger_pin.views.plots.style import new_figure, styled
 
@@ -261,10 +260,13 @@ def draw_curve(curve: Any, task: str, path: Path) -> None:
     def plot() -> Any:
         figure = new_figure(6.4, 3.6)
         axes = figure.subplots()
-        steps, seconds, reward = np.reshape(curve, (-1, len(COLUMNS))).T
-        axes.plot(seconds / 60.0, reward)
+        for task in GOALS:
+            kept = output / task.lower() / "curve.csv"
+            if kept.exists():
+                steps, seconds, reward = np.loadtxt(kept, delimiter=",", skiprows=1, ndmin=2).T
+                axes.plot(seconds / 60.0, reward, label=f"{task}: {int(steps[-1]):,} steps")
         axes.set(xlabel="processor time of training (min)", ylabel="reward per step", ylim=(0.0, 1.0), xlim=(0.0, None))
-        axes.set_title(f"{task}: {int(steps[-1]):,} steps of 20 ms" if len(steps) else task)
+        axes.legend(loc="lower right")
         return figure
 
     save_figure(plot(), path)

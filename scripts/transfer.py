@@ -128,7 +128,7 @@ def studies() -> dict[str, Study]:
     return {
         "tensions": Study(
             {},
-            TRAININGS["Reach"],
+            TRAININGS["Reach"]._replace(steps=80_000),
             {_WITHOUT: friction(0.0, 0.0), _ONE: friction(1.0, 1.0), _ANEW: friction(0.25, 3.0)},
             {label: (factors, friction)},
         ),
