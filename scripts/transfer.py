@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -146,14 +146,37 @@ def studies() -> dict[str, Study]:
 
 
 class Trial(NamedTuple):
-    """How a policy did: the study, what it was trained on, by which seed, what was varied, and what was solved."""
+    """How a policy did.
+
+    Attributes:
+        driven: The study.
+        trained: On what.
+        seed: Of the training.
+        steps: Of the training.
+        varied: What was varied.
+        value: Of that.
+        episodes: How many were tried.
+        solved: The part of them that ended within 5 mm.
+    """
 
     driven: str
     trained: str
     seed: int
+    steps: int
     varied: str
     value: float
+    episodes: int
     solved: float
+
+
+def read_trials(path: Path) -> list[Trial]:
+    """Return the trials that a file keeps; none if there is no file."""
+    if not path.exists():
+        return []
+    kinds = (str, str, int, int, str, float, int, float)
+    with open(path, newline="", encoding="utf-8") as file:
+        _, *rows = csv.reader(file)
+    return [Trial(*(kind(text) for kind, text in zip(kinds, row, strict=True))) for row in rows]
 
 
 def transfer(
@@ -174,33 +197,55 @@ def transfer(
         if value < 1:
             raise wrong(name, "must be above 0")
     chosen = {name: study for name, study in studies().items() if driven in (name, "both")}
-    trials: list[Trial] = []
+    output.mkdir(parents=True, exist_ok=True)
+    path, trials = output / "transfer.csv", dict[tuple[Any, ...], Trial]()
+    for trial in [] if restart else read_trials(path):
+        trials[trial[:-1]] = trial
     for seed in range(1, seeds + 1):
         for name, study in chosen.items():
-            trials += _tried(name, study, steps, seed, episodes, output, restart=restart)
-    with open(output / "transfer.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerows([Trial._fields, *trials])
-    draw(chosen, trials, output / "transfer.png")
+            training = study.training if steps is None else study.training._replace(steps=steps)
+            for trained in study.trained:
+                place = output / f"{name}_{trained.replace(' ', '_')}_{seed}"
+                tried = _Tried(name, study._replace(training=training), trained, seed, episodes, place)
+                for trial in tried.missing(trials, restart=restart):
+                    trials[trial[:-1]] = trial
+                    with open(path, "w", newline="", encoding="utf-8") as file:
+                        csv.writer(file).writerows([Trial._fields, *trials.values()])
+    lengths = {name: steps or study.training.steps for name, study in chosen.items()}
+    wanted = [
+        trial
+        for trial in trials.values()
+        if trial.steps == lengths.get(trial.driven) and trial.seed <= seeds and trial.episodes == episodes
+    ]
+    draw(chosen, wanted, output / "transfer.png")
     ending = f"Part of {episodes} new episodes that end within 5 mm of the goal, mean of {seeds} trainings"
-    print_text("\n".join([*_table(chosen, trials), f"{ending}. Results are in {output}"]))
+    print_text("\n".join([*_table(chosen, wanted), f"{ending}. Results are in {output}"]))
 
 
-def _tried(
-    name: str, study: Study, steps: int | None, seed: int, episodes: int, output: Path, *, restart: bool
-) -> Iterator[Trial]:
-    """Yield the trials of all policies of a study that a seed makes."""
-    training = study.training if steps is None else study.training._replace(steps=steps)
-    for trained, drawn in study.trained.items():
-        place = output / f"{name}_{trained.replace(' ', '_')}_{seed}"
-        policy = Policy.trained(
-            place, "Reach", training, 32, seed, restart=restart, **{**study.task, "randomise": drawn}
-        )
+class _Tried(NamedTuple):
+    """A policy that is tried: of a study, trained in one way, by one seed, kept at a place."""
+
+    driven: str
+    study: Study
+    trained: str
+    seed: int
+    episodes: int
+    place: Path
+
+    def missing(self, kept: Collection[tuple[Any, ...]], *, restart: bool) -> Iterator[Trial]:
+        """Train the policy unless that is done, and yield the trials that are not kept."""
+        study, policy = self.study, None
         for varied, (values, make) in study.tried.items():
             for value in values:
-                fields = {**study.task, "randomise": make(value, value)}
-                found = policy.evaluate("Reach", episodes, **fields)
-                yield Trial(name, trained, seed, varied, value, found.solved)
+                of = self.driven, self.trained, self.seed, study.training.steps, varied, value, self.episodes
+                if of in kept:
+                    continue
+                drawn = {**study.task, "randomise": study.trained[self.trained]}
+                policy = policy or Policy.trained(
+                    self.place, "Reach", study.training, 32, self.seed, restart=restart, **drawn
+                )
+                found = policy.evaluate("Reach", self.episodes, **{**study.task, "randomise": make(value, value)})
+                yield Trial(*of, found.solved)
 
 
 def _solved(trials: list[Trial], *which: str) -> tuple[Any, Any]:
