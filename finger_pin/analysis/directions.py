@@ -43,10 +43,16 @@ def _ways(columns: bytes, shape: tuple[int, int], moving: tuple[bool, ...]) -> t
         unsure = np.array([len(option) > 1 for option in options])
         undecided = turns[unsure][:, moves]
         undecided = undecided / np.linalg.norm(undecided, axis=1, keepdims=True)
-        for slide in product(*options):
-            if _possible(np.array(slide)[unsure, None] * undecided):
-                signs.append(sign)
-                sliding.append(slide)
+        ways: list[tuple[float, ...]] = [()]
+        # What some tendons cannot do together, all of them cannot.
+        for count in range(1, len(undecided) + 1):
+            further = ((*way, side) for way in ways for side in (1.0, -1.0))
+            ways = [way for way in further if _possible(np.array(way)[:, None] * undecided[:count])]
+        slide = np.array([option[0] for option in options])
+        for way in ways:
+            slide[unsure] = way
+            signs.append(sign)
+            sliding.append(slide.copy())
     return np.array(signs), np.array(sliding)
 
 

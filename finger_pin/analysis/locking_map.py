@@ -119,20 +119,25 @@ def _worst(finger: Finger, positions: Array, minimum: Array) -> tuple[Array, Arr
     locking = np.unique(np.hstack([signs, mattering]), axis=0)
     curved = np.abs(positions) @ routing.curvature_matrix[counted].T
     _, first_of, same = np.unique(curved.round(12), axis=0, return_index=True, return_inverse=True)
-    for case in locking:
+    closest = np.zeros(len(locking))
+    for index, case in enumerate(locking):
         sign = np.broadcast_to(case[:size], positions.shape)
         slide = np.broadcast_to(case[size:], (count, len(routing.tendons)))
         kappa = loop.critical(positions[first_of], sign[first_of], slide[first_of])[0]
-        coefficient = np.minimum(coefficient, kappa[same.reshape(-1)])
+        coefficient, closest[index] = np.minimum(coefficient, kappa[same.reshape(-1)]), kappa.min()
     if alone:
         for case in locking:
             ways = sliding[np.all(np.hstack([signs, mattering]) == case, axis=1)]
             command = loop.greatest_command(positions, case[:size] * static, ways, minimum, weight)
             tension = np.maximum(tension, command)
     else:
-        for sign, slide in zip(signs, sliding, strict=True):
-            cases = np.broadcast_to(slide, (count, len(slide)))
-            weights = np.broadcast_to(sign * static, positions.shape)
-            command = loop.command_to_move(positions, weights, cases, minimum, weight)
-            tension = np.maximum(tension, command[:, : routing.actuated].max(axis=1))
+        # Where it locks in one direction no other one needs more: first that which locks first.
+        for case in locking[np.argsort(closest)]:
+            left = np.flatnonzero(np.isfinite(tension))
+            if not len(left):
+                break
+            cases = np.broadcast_to(case[size:], (len(left), len(routing.tendons)))
+            weights = np.broadcast_to(case[:size] * static, (len(left), size))
+            command = loop.command_to_move(positions[left], weights, cases, minimum, weight[left])
+            tension[left] = np.maximum(tension[left], command[:, : routing.actuated].max(axis=1))
     return coefficient, tension
