@@ -186,7 +186,10 @@ class Prepared:
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
     ) -> tuple[Setup, Trajectory, RunArrays]:
         """Make a run, with bindings of an earlier one if any are free."""
-        bindings = self._bindings.pop() if self._bindings else Bindings()
+        try:
+            bindings = self._bindings.pop()
+        except IndexError:
+            bindings = Bindings()
         setup = self._setup(scenario, initial, bindings)
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:

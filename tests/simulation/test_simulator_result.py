@@ -82,6 +82,14 @@ def test_a_state_put_in_begins_a_new_result_and_a_copy_has_the_steps_of_both(fin
     np.testing.assert_array_equal(result.joint_position[-1], twin.state.position)
 
 
+def test_a_copy_keeps_its_result_when_the_other_one_is_given_other_numbers(finger: fp.Finger) -> None:
+    simulator = pushed(fp.Simulator(finger, START), 10, 5)
+    twin, before = simulator.clone(), simulator.result()
+    simulator.set_parameters({"finger.tendon_friction.coulomb": 0.2, "finger.joints.medial.link.mass": 0.1})
+    simulator.step(TENSION, 0.01)
+    assert np.array_equal(twin.result().tendon_tension, before.tendon_tension)
+
+
 def test_a_result_is_marked_and_drawn_and_saved_like_any_other(finger: fp.Finger, tmp_path: Path) -> None:
     reference = (np.array([0.0, 1.0]), np.array([START[:3], START[:3] + 0.1]))
     result = pushed(fp.Simulator(finger, START), 10, seed=5).result(reference=reference)
