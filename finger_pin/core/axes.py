@@ -40,7 +40,7 @@ def _declared(table: type) -> dict[str, Along]:
     }
 
 
-class Part:
+class Subset:
     """A part of tables: what is kept of every axis.
 
     Attributes:

@@ -24,7 +24,7 @@ MOST_POINTS = 1_000_000
 
 
 class Design(Protocol):
-    """Which points a sweep runs."""
+    """The points of a sweep."""
 
     @property
     def values(self) -> Mapping[str, tuple[Value, ...]]:

@@ -1,4 +1,4 @@
-"""What a run depends on besides its scenario: the package's source, other packages, metrics, a finger of one's own."""
+"""Digests of what a run depends on besides its scenario: source, other packages, metrics, a finger of one's own."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def finger_digest(finger: Finger) -> str:
 
 
 def _parts(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Iterator[str]:
-    """Yield what distinguishes a thing from others; of a user's own module, only what is used by one of some names."""
+    """Yield the marks of a thing; of a user's own module, only those of what is used by one of some names."""
     if thing is None or isinstance(thing, bool | int | float | complex | str | bytes | EllipsisType):
         yield repr(thing)
         return

@@ -118,7 +118,7 @@ class StudyFolder:
     def __init__(
         self, path: str | Path, asked: Mapping[str, Any], products: list[str], *, restart: bool = False
     ) -> None:
-        """Say which study.
+        """Name the study.
 
         Args:
             path: The folder; it may exist.

@@ -60,7 +60,7 @@ class Run:
 
     @cached_property
     def result(self) -> xr.Dataset:
-        """What `simulate` returns."""
+        """The Dataset of `simulate`."""
         # Studies look at many designs, and at the margin by its metric; they have a bar of their own.
         with quiet():
             return simulate(self.scenario, finger=self._finger, progress=lambda time: None, stop=self._stop)

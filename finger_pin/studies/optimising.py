@@ -46,7 +46,7 @@ DEFAULT_CONSTRAINTS = ("self_locking_margin>=1.5", "fingertip_force>=0.8")
 
 @dataclass(frozen=True)
 class Effort:
-    """How long and from which random numbers to search.
+    """The effort of a search: its length and its random numbers.
 
     Attributes:
         population: Designs of a generation.
@@ -152,7 +152,7 @@ def optimise(
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """What a search goes through."""
+    """The course of a search."""
 
     starting: Starting
     goals: Goals

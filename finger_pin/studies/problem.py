@@ -1,4 +1,4 @@
-"""What a search is about: the variables that it may change, its objectives, and its constraints."""
+"""The problem of a search: the variables that it may change, its objectives, and its constraints."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Constraint:
     sign: int
 
     def excess(self, value: float) -> float:
-        """Return by how much a value breaks the bound, over the size of the bound; not above zero if it keeps it."""
+        """Return the excess of a value over the bound, over the bound's size; not above zero if it keeps it."""
         return self.sign * (value - self.bound) / (abs(self.bound) or 1.0)
 
     def __str__(self) -> str:

@@ -102,7 +102,7 @@ def settling_time(run: Run) -> float:
 
 
 def grip_margin(run: Run) -> float:
-    """Return what is left of the friction that contacts could have, as a share, over the last tenth of the run.
+    """Return the share of friction that contacts have left over the last tenth of the run.
 
     1 - f^t / (what friction can be at that normal force), the least of all contacts that are closed and all times: 1
     where nothing rubs, 0 where something slides, and where nothing is touched.

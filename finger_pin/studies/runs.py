@@ -32,7 +32,7 @@ Progress = Callable[[int, int, int], None]
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What is kept of a run.
+    """The record of a run.
 
     Attributes:
         key: Digest of everything that determines the run.
@@ -93,7 +93,7 @@ class PlannedRun:
 
 
 class Archive(Protocol):
-    """Where records are found and kept."""
+    """A place of records."""
 
     @property
     def records(self) -> Mapping[str, RunRecord]:
@@ -196,7 +196,7 @@ def execute(task: PlannedRun, stop: Stop) -> RunRecord:
 
 
 def _identity(metric: Metric) -> list[str]:
-    """Return what distinguishes a metric from others; from all others, if what its code depends on cannot be known."""
+    """Return the marks of a metric; they come only once if what its code depends on cannot be known."""
     return [metric.name, metric.unit, metric.long_name, _known(code_digest, metric.measure)]
 
 

@@ -60,7 +60,7 @@ class Search:
         return np.asarray(self._asked.get("X"), dtype=float)
 
     def tell(self, values: Array, excesses: Array) -> None:
-        """Say how good they are.
+        """Take objectives and excesses of designs.
 
         Args:
             values: Objectives, to be made small, shape (population, objectives).
@@ -74,6 +74,6 @@ class Search:
 
 
 def nondominated(values: Array) -> Any:
-    """Return which of m designs no other one is better than, with objectives to be made small, shape (m, k)."""
+    """Return a mask of the designs that no other is better than; objectives are to be made small, shape (m, k)."""
     better = (values[:, None] <= values[None]).all(axis=2) & (values[:, None] < values[None]).any(axis=2)
     return ~better.any(axis=0)

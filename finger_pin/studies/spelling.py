@@ -1,4 +1,4 @@
-"""How the values of a key are spelt on a command line: START:STOP:N, LOW:HIGH, or A,B,C."""
+"""Spellings of a key's values on a command line: START:STOP:N, LOW:HIGH, or A,B,C."""
 
 from __future__ import annotations
 

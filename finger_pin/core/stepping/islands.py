@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.axes import Part
+from finger_pin.core.axes import Subset
 from finger_pin.core.control import PLANNED, Control
 from finger_pin.core.evaluation.time_functions import SignalTable
 from finger_pin.core.jit import indices
@@ -99,7 +99,7 @@ def select(tables: Tables, island: Island) -> Tables:
     rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.parents) + len(tables.lumps)
     bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
     present, groups = _groups(tables, rows)
-    part = Part()
+    part = Subset()
     part.keep("coordinate", island.coordinates, width)
     part.keep("body", bodies, size)
     part.keep("lump", lumps - size, width - size)
@@ -130,7 +130,7 @@ def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64],
 
 def select_control(control: Control, island: Island) -> Control:
     """Return the inputs of an island."""
-    part = Part()
+    part = Subset()
     part.keep("coordinate", island.coordinates, len(control.gain))
     part.keep("channel", island.channels, len(control.tension))
     part.keep("planned", island.planned, len(control.minimum))

@@ -1,4 +1,4 @@
-"""What the experiments say: the paper's conclusions as claims, what was measured, and whether it bears them out."""
+"""Findings of the experiments: the paper's conclusions as claims, the measurements, and whether these bear them out."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Verdict(Enum):
 
     @classmethod
     def of(cls, cases: Iterable[bool]) -> Verdict:
-        """Return what follows from several cases: all, some or none of them bear the claim out."""
+        """Return the verdict of several cases: all, some or none of them bear the claim out."""
         borne_out = list(cases)
         return cls.HOLDS if all(borne_out) else cls.PARTLY if any(borne_out) else cls.FAILS
 
