@@ -1,0 +1,233 @@
+"""Random flights, spins and sweeps of bodies towards each other, whose motion is known until they touch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger_pin.description.hand import PathSignal
+from finger_pin.description.objects import Object
+from finger_pin.description.routing import Array
+
+G = 9.81
+#: Touches that are not as deep, m, and misses that are as near, are left out: they are within the tolerances.
+DEPTH = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """Bodies under way, and what is known of them.
+
+    Attributes:
+        objects: By name.
+        duration: s.
+        gap: Maps packed positions, shape (m, nq), to the distance of the two surfaces, negative inside, shape (m,), m.
+        exact: Maps times, shape (m,), to the packed positions if nothing touched, shape (m, nq).
+        gravity: Along z, m/s2.
+        speed: Of a link of 0.1 m that turns about z in the origin, rad/s; None without.
+        path: Of the first object along x, if it is moved.
+        margin: Touches less deep are left out, m.
+    """
+
+    objects: dict[str, Object]
+    duration: float
+    gap: Callable[[Array], Array]
+    exact: Callable[[Array], Array]
+    gravity: float = 0.0
+    speed: float | None = None
+    path: PathSignal | None = None
+    margin: float = DEPTH
+
+
+def from_box(points: Array, sides: Array) -> Array:
+    """Return signed distances of points from a box about the origin."""
+    beyond = np.abs(points) - 0.5 * np.asarray(sides)
+    return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0))
+
+
+def from_segment(points: Array, start: Array, end: Array) -> Array:
+    """Return distances of points from segments."""
+    along = end - start
+    share = np.clip(np.sum((points - start) * along, axis=-1) / np.sum(along * along, axis=-1), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(points - start - share[..., None] * along, axis=-1))
+
+
+def turned(quaternions: Array, vector: Array) -> Array:
+    """Return a vector turned by quaternions (x, y, z, w), shape (m, 4)."""
+    axis, scalar = quaternions[:, :3], quaternions[:, 3:]
+    across = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + scalar * across + np.cross(axis, across))
+
+
+def thrown(times: Array, start: Array, velocity: Array, gravity: float) -> Array:
+    """Return a parabola."""
+    places = start + np.outer(times, velocity)
+    places[:, 2] -= 0.5 * gravity * times**2
+    return places
+
+
+def pose(places: Array, turns: Array | None = None) -> Array:
+    """Return poses at places, turned by angles about y."""
+    found = np.column_stack([places, np.zeros((len(places), 3)), np.ones(len(places))])
+    if turns is not None:
+        found[:, 4], found[:, 6] = np.sin(0.5 * turns), np.cos(0.5 * turns)
+    return found
+
+
+def _surface(rng: np.random.Generator) -> dict[str, float]:
+    return {"stiffness": 10 ** rng.uniform(4.0, 6.0), "damping": float(rng.choice([0.0, 1.0, 5.0]))}
+
+
+def _velocity(rng: np.random.Generator) -> Array:
+    return np.asarray(rng.normal(size=3) * 10 ** rng.uniform(-1.5, 1))
+
+
+def ball_and_plate(rng: np.random.Generator) -> Flight:
+    """Throw a small ball at a thin plate, with gravity or without, spinning."""
+    radius, thick, velocity = 10 ** rng.uniform(-3, -1.5), 10 ** rng.uniform(-3.3, -1.5), _velocity(rng)
+    gravity, meets = float(rng.choice([0.0, G])), 10 ** rng.uniform(-1.5, 0.5)
+    sides, surface = np.array([*rng.uniform(0.1, 1.0, 2), thick]), _surface(rng)
+    aim = np.array([*(0.6 * rng.uniform(-1.0, 1.0, 2) * sides[:2]), 0.5 * thick])
+    start = aim - velocity * meets + [0.0, 0.0, 0.5 * gravity * meets**2]
+    plate = Object(shape="box", sides=tuple(sides), surface=surface)
+    ball = Object(
+        shape="sphere",
+        radius=radius,
+        mass=10 ** rng.uniform(-3, -0.5),
+        position=tuple(start),
+        velocity=tuple(velocity),
+        angular_velocity=tuple(_velocity(rng) * 10.0),
+        surface=surface,
+    )
+    return Flight(
+        {"plate": plate, "ball": ball},
+        2.0 * meets,
+        lambda q: from_box(q[:, :3], sides) - radius,
+        lambda t: pose(thrown(t, start, velocity, gravity)),
+        gravity,
+    )
+
+
+def two_balls(rng: np.random.Generator) -> Flight:
+    """Let two balls fall and meet, or miss each other by little."""
+    radii, velocities = 10 ** rng.uniform(-3, -1.5, 2), [_velocity(rng), _velocity(rng)]
+    meets, gravity, surface = 10 ** rng.uniform(-1.5, 0.5), float(rng.choice([0.0, G])), _surface(rng)
+    beside = rng.normal(size=3)
+    beside *= 1.2 * rng.random() * radii.sum() / np.linalg.norm(beside)
+    fallen = np.array([0.0, 0.0, 0.5 * gravity * meets**2])
+    starts = [fallen - velocities[0] * meets, fallen + beside - velocities[1] * meets]
+    balls = {
+        f"ball_{i}": Object(
+            shape="sphere",
+            radius=radii[i],
+            mass=0.01 + rng.random(),
+            position=tuple(starts[i]),
+            velocity=tuple(velocities[i]),
+            surface=surface,
+        )
+        for i in range(2)
+    }
+    return Flight(
+        balls,
+        2.0 * meets,
+        lambda q: np.asarray(np.linalg.norm(q[:, :3] - q[:, 7:10], axis=1) - radii.sum()),
+        lambda t: np.hstack([pose(thrown(t, *each, gravity)) for each in zip(starts, velocities, strict=True)]),
+        gravity,
+    )
+
+
+def spinning_capsule(rng: np.random.Generator) -> Flight:
+    """Let a capsule spin across its axis on its way past a small fixed ball."""
+    radii, length, velocity = 10 ** rng.uniform(-3, -2, 2), rng.uniform(0.02, 0.2), _velocity(rng)
+    meets, spin, surface = 10 ** rng.uniform(-1.5, 0.5), float(rng.normal() * 10 ** rng.uniform(-1, 2)), _surface(rng)
+    start = rng.uniform(-0.5, 0.5, 3) * length - velocity * meets
+    capsule = Object(
+        shape="capsule",
+        radius=radii[0],
+        length=length,
+        mass=0.1,
+        position=tuple(start),
+        velocity=tuple(velocity),
+        angular_velocity=(0.0, spin, 0.0),
+        surface=surface,
+    )
+    post = Object(shape="sphere", radius=radii[1], surface=surface)
+
+    def gap(q: Array) -> Array:
+        half = turned(q[:, 3:7], np.array([0.0, 0.0, 0.5 * length]))
+        return from_segment(np.zeros(3), q[:, :3] - half, q[:, :3] + half) - radii.sum()
+
+    return Flight(
+        {"post": post, "capsule": capsule},
+        2.0 * meets,
+        gap,
+        lambda t: pose(thrown(t, start, velocity, 0.0), spin * t),
+    )
+
+
+def tumbling_box(rng: np.random.Generator) -> Flight:
+    """Throw a tumbling box up from a floor: its corners reach it at some time."""
+    sides, spin, surface = 10 ** rng.uniform(-2.3, -1, 3), float(rng.normal() * 10 ** rng.uniform(-1, 2)), _surface(rng)
+    velocity = _velocity(rng)
+    start = np.array([0.0, 0.0, 0.51 * np.linalg.norm(sides) + 10 ** rng.uniform(-6, 0)])
+    up = max(velocity[2], 0.0)
+    duration = 1.2 * (up + np.sqrt(up**2 + 2.0 * G * start[2])) / G
+    box = Object(
+        shape="box",
+        sides=tuple(sides),
+        mass=0.1,
+        position=tuple(start),
+        velocity=tuple(velocity),
+        angular_velocity=(0.0, spin, 0.0),
+        surface=surface,
+    )
+    corners = 0.5 * sides * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+
+    def gap(q: Array) -> Array:
+        return np.asarray(q[:, 2] + np.min([turned(q[:, 3:7], corner)[:, 2] for corner in corners], axis=0))
+
+    floor = Object(shape="half_space", surface=surface)
+    exact = lambda t: pose(thrown(t, start, velocity, G), spin * t)  # noqa: E731
+    return Flight({"floor": floor, "box": box}, duration, gap, exact, G)
+
+
+def paddle(rng: np.random.Generator) -> Flight:
+    """Let a thin paddle swing to and fro through a ball at rest."""
+    radius, thick, surface = 10 ** rng.uniform(-2.5, -1.5), 10 ** rng.uniform(-3, -2), _surface(rng)
+    path = PathSignal(amplitude=rng.uniform(0.1, 0.3), frequency=10 ** rng.uniform(-0.5, 1))
+    assert path.frequency is not None
+    sides, amplitude, circular = np.array([thick, 0.1, 0.1]), path.amplitude, 2.0 * np.pi * path.frequency
+    place = np.array([float(rng.choice([-1.0, 1.0]) * rng.uniform(0.6, 0.9) * amplitude), *rng.uniform(-0.03, 0.03, 2)])
+    blade = Object(shape="box", sides=tuple(sides), path={"x": path}, surface=surface)
+    ball = Object(shape="sphere", radius=radius, mass=0.05, position=tuple(place), surface=surface)
+
+    def exact(t: Array) -> Array:
+        swung = np.column_stack([amplitude * np.sin(circular * t), 0.0 * t, 0.0 * t])
+        return np.hstack([pose(swung), pose(np.tile(place, (len(t), 1)))])
+
+    gap = lambda q: from_box(q[:, 7:10] - q[:, :3], sides) - radius  # noqa: E731
+    return Flight({"paddle": blade, "ball": ball}, 1.0 / path.frequency, gap, exact, path=path, margin=0.5 * radius)
+
+
+def sweeping_link(rng: np.random.Generator) -> Flight:
+    """Let a link sweep around a joint, past a small free ball at rest."""
+    radius, speed, surface = 10 ** rng.uniform(-3, -2), 10 ** rng.uniform(-1, 2), _surface(rng)
+    speed *= float(rng.choice([-1, 1]))
+    far, angle = rng.uniform(0.03, 0.12), rng.uniform(0.5, 2.0 * np.pi - 0.5)
+    place = np.array([far * np.cos(angle), far * np.sin(angle), 1.2 * rng.uniform(-1, 1) * (radius + 0.005)])
+    ball = Object(shape="sphere", radius=radius, mass=0.05, position=tuple(place), surface=surface)
+
+    def gap(q: Array) -> Array:
+        tip = 0.095 * np.column_stack([np.cos(q[:, 0]), np.sin(q[:, 0]), 0.0 * q[:, 0]])
+        return from_segment(q[:, 1:4], np.zeros(3), tip) - radius - 0.005
+
+    def exact(t: Array) -> Array:
+        return np.hstack([speed * t[:, None], pose(np.tile(place, (len(t), 1)))])
+
+    return Flight({"ball": ball}, 2.0 * np.pi / abs(speed), gap, exact, speed=speed)
+
+
+#: Each makes a flight of a generator of random numbers.
+FAMILIES = (ball_and_plate, two_balls, spinning_capsule, tumbling_box, paddle, sweeping_link)
