@@ -2,8 +2,10 @@
 
 import logging
 import os
+import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -151,6 +153,52 @@ def test_a_full_disk_is_named_and_costs_nothing_else(folder):
     assert done.stdout == "42\n"
     assert f"the compile cache {folder} cannot be used: File too large; " in done.stderr
     assert code_in(folder) == []
+
+
+DOUBLE = """
+import os, pathlib, signal, time
+from finger_pin.core.jit import Unit
+
+@Unit
+def double(address, number):
+    return int(2.0 * number) + address
+"""
+
+
+def test_processes_that_compile_at_once_into_an_empty_folder_both_compute_and_leave_code_that_a_later_one_finds(
+    folder, tmp_path
+):
+    gate = tmp_path / "gate"
+    code = (
+        f"{DOUBLE}\nkept = double.kept\n(pathlib.Path({str(tmp_path)!r}) / str(os.getpid())).touch()\n"
+        f"while not pathlib.Path({str(gate)!r}).exists():\n    time.sleep(0.001)\nprint(kept, double(1, 21.0))"
+    )
+    running = [subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    while not all((tmp_path / str(each.pid)).exists() for each in running):
+        assert all(each.poll() is None for each in running)
+        time.sleep(0.001)
+    gate.touch()
+    assert [each.communicate()[0] for each in running] == ["False 43\n", "False 43\n"]
+    later = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (later.stdout, later.stderr) == ("True 43\n", "")
+
+
+@pytest.mark.parametrize("file", [1, 2], ids=["the first file", "the last one"])
+def test_a_process_that_is_killed_as_it_puts_code_in_place_leaves_none_that_is_broken(folder, file):
+    """The cache writes two files for a function: what code there is, and the code."""
+    killed = (
+        f"{DOUBLE}\nreplace, left = os.replace, [{file}]\n"
+        "def put(*names):\n"
+        "    left[0] -= 1\n"
+        "    return replace(*names) if left[0] else os.kill(os.getpid(), signal.SIGKILL)\n"
+        "os.replace = put\ndouble(1, 21.0)"
+    )
+    assert subprocess.run([sys.executable, "-c", killed], capture_output=True).returncode == -signal.SIGKILL
+    assert code_in(folder) == [] and len(list(folder.rglob("*.nbi"))) == file - 1
+    for kept in (False, True):
+        code = f"{DOUBLE}\nprint(double.kept, double(1, 21.0))"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout == f"{kept} 43\n"
 
 
 def test_what_one_process_has_compiled_a_later_one_runs_without_a_word():
