@@ -40,8 +40,9 @@ def summarize_identification(result: xr.Dataset) -> str:
     for name, noise, count, independent, unit in _signals(result):
         rows.append((name, noise, count, f"{independent} free", unit))
     width = max(len(row[0]) for row in rows)
+    doubt = [] if _borne_out(result) else [_agreement(result), ""]
     lines = [f"  {a.ljust(width)}{b.rjust(13)}{c.rjust(13)}{d.rjust(13)}  {e}".rstrip() for a, b, c, d, e in rows]
-    return "\n".join([*lines, "", *_words(result)])
+    return "\n".join([*doubt, *lines, "", *_words(result)])
 
 
 def write_report(result: xr.Dataset, path: str | Path) -> Path:
@@ -49,7 +50,10 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
     sections = [
         (
             "What was found",
-            _found(result) + _image(plot_profiles(result), "Profiles") + f"<p class='soft'>{_PROFILES}</p>",
+            ("" if _borne_out(result) else f"<p class='open'><strong>{escape(_agreement(result))}</strong></p>")
+            + _found(result)
+            + _image(plot_profiles(result), "Profiles")
+            + f"<p class='soft'>{_PROFILES}</p>",
         ),
         ("What the recordings leave open", "".join(f"<p>{escape(line)}</p>" for line in _words(result))),
         ("How well every signal is met", _met(result) + _image(plot_identification(result), "Signals")),
@@ -100,7 +104,7 @@ def _end(value: float) -> str:
 
 
 def _words(result: xr.Dataset) -> list[str]:
-    """Return in sentences what is open, whether the searches agree, and which law is to be preferred."""
+    """Return in sentences what is open, that the searches agree if they do, and which law is to be preferred."""
     undetermined = (
         [str(each) for each in np.atleast_1d(result.attrs["undetermined"])] if "undetermined" in result.attrs else []
     )
@@ -110,8 +114,9 @@ def _words(result: xr.Dataset) -> list[str]:
         if sides:
             words.append(f"{name} is not bounded from {' nor from '.join(sides)} by these recordings.")
     if not words:
-        words.append("The recordings determine every parameter.")
-    words.append(f"{result.attrs['starts']}.")
+        words.append(f"{'The' if _borne_out(result) else 'Near this place the'} recordings determine every parameter.")
+    if _borne_out(result):
+        words.append(_agreement(result))
     for name, repeated, noise in zip(
         *(result[each].values for each in ("signal", "replicate_noise", "noise")), strict=True
     ):
@@ -128,6 +133,26 @@ def _words(result: xr.Dataset) -> list[str]:
     if "unfinished" in result.attrs:
         words.append(f"{result.attrs['unfinished'].capitalize()}.")
     return words
+
+
+def _agreement(result: xr.Dataset) -> str:
+    """Return in a sentence how far the searches bear each other out."""
+    alike, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
+    if count == 1:
+        return "There was one search: whether the recordings are met better elsewhere is not known."
+    if _borne_out(result):
+        return f"{alike} of {count} searches end at the same place."
+    return (
+        f"Do not trust these intervals: only {alike} of {count} searches end at this place, the others where the "
+        "recordings are met worse. There may be a better place still, and an interval says nothing of it. "
+        "Narrower bounds, shorter windows or more starts help."
+    )
+
+
+def _borne_out(result: xr.Dataset) -> bool:
+    """Return whether at least two searches, and half of them, end at the same place; one alone is not doubted."""
+    alike, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
+    return count == 1 or (alike >= 2 and 2 * alike >= count)
 
 
 def _table(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:

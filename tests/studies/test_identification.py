@@ -122,6 +122,28 @@ def test_wrong_benches_are_refused_in_one_line(change, said):
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+def test_weights_on_a_servo_tell_what_its_gears_lose_either_way():
+    """Written out by hand: 12 mN m, 4.6 mN m s/rad, 0.22 lifting, 0.08 letting down, a noise of 4 mA."""
+    result = fp.identify("weights", starts=1)
+    truth = [0.012, 4.6e-3, 0.22, 0.08]
+    assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
+    assert result.noise.values == pytest.approx([4e-3], rel=0.2)
+    # Equal readings are those of one weight, one direction and one speed.
+    assert result.replicate_noise.values == pytest.approx([4e-3], rel=0.2)
+    assert np.diff(result.law_bic)[0] > 50.0
+
+
+def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
+    result = found(readings(np.random.default_rng(2)), starts=3)
+    assert (result.attrs["searches"], result.attrs["searches_alike"]) == (3, 3)
+    assert summarize_identification(result).endswith("3 of 3 searches end at the same place.")
+    result.attrs["searches_alike"] = 1
+    told = summarize_identification(result)
+    assert told.startswith("Do not trust these intervals: only 1 of 3 searches end at this place")
+    page = write_report(result, tmp_path / "page.html").read_text("utf-8")
+    assert page.index("Do not trust these intervals") < page.index("estimate")
+
+
 def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path):
     data, asked = readings(np.random.default_rng(2)), []
     whole = found(data, starts=3)
@@ -233,6 +255,52 @@ def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
     truth = [0.12, 0.4, 0.03]
     assert np.all((result.lower.values <= truth) & (truth <= result.upper.values))
     assert result.signal_correlation.values == pytest.approx([0.6, 0.0], abs=0.15)
+
+
+def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interruption(tmp_path):
+    """A third of the samples is missing in one; the other is another pull of the same canal."""
+    rng, truth, asked = np.random.default_rng(12), [0.15, 0.5], []
+    data = {name: ramp(rng, *truth) for name in ("one", "two")}
+    missing = rng.uniform(size=data["one"]["t"].size) < 1.0 / 3.0
+    data["one"]["f"] = np.where(missing, np.nan, data["one"]["f"])
+    given = {"parameters": BOUNDS, "recordings": dict.fromkeys(data, MOTION), "data": data, "starts": 1}
+    whole = fp.identify("canal", **given)
+    np.testing.assert_allclose(whole.estimate, truth, rtol=0.03)
+    later = data["one"]["t"] - data["one"]["t"][0] >= MOTION["settle"]
+    samples = dict(zip(whole.signal.values, whole.signal_samples.values, strict=True))
+    assert samples["one.tendon_tension.T1"] == np.sum(later & ~missing)
+    assert samples["two.tendon_tension.T1"] == np.sum(later)
+
+    def stop():
+        asked.append(0)
+        return len(asked) == 16
+
+    part = fp.identify("canal", **given, output=tmp_path, stop=stop)
+    assert "unfinished" in part.attrs and len(asked) == 16
+    again = fp.identify("canal", **given, output=tmp_path)
+    assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]
+    for name in ("estimate", "lower", "upper"):
+        np.testing.assert_allclose(again[name], whole[name], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"start": "recorded", "outputs": {"joint_position.drum": "q"}}, "cannot be reached: drum begins at"),
+        ({"start": "recorded", "outputs": {"tendon_tension.T1": "f"}}, "needs joint_position among the outputs"),
+        ({"inputs": {"joint_position.drum": "q"}}, "a motion is given tendon_command, joint_reference"),
+        ({"time": "f"}, "times must increase"),
+        ({"outputs": {"joint_position.wheel": "q"}}, "there is no wheel; there are drum"),
+    ],
+)
+def test_wrong_recordings_of_motions_are_refused_in_one_line(change, said):
+    recordings = {"pull": {**MOTION, **change}}
+    data = ramp(np.random.default_rng(1), 0.15, 0.5)
+    data["f"][3:5] = data["f"][3]
+    data["q"] = data["q"] + 500.0
+    with pytest.raises(fp.InputError) as refused:
+        fp.identify("canal", parameters=BOUNDS, recordings=recordings, data={"pull": data}, starts=1)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_windows_of_one_motion_are_held_out_in_turn_where_laws_are_compared():

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.stepping.stepper import in_threads
 from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array
@@ -24,7 +27,13 @@ from finger_pin.studies.identification.intervals import Side, covariance, profil
 from finger_pin.studies.identification.ledger import Ledger, digest
 from finger_pin.studies.identification.motions import RecordedMotion, windows
 from finger_pin.studies.identification.outcome import outcome, write_outcome
-from finger_pin.studies.identification.problem import Problem, RecordedSignal, RecordingModel, Stopped
+from finger_pin.studies.identification.problem import (
+    Problem,
+    RecordedSignal,
+    RecordingModel,
+    Stopped,
+    minus_twice_likelihood,
+)
 from finger_pin.studies.identification.readings import SteadyReadings
 from finger_pin.studies.identification.recordings import Recording, read_recording, unit_of
 
@@ -34,6 +43,9 @@ if TYPE_CHECKING:
 #: Called with what is being done, how much of it is finished, and how much there is.
 Progress = Callable[[str, int, int], None]
 Data = Mapping[str, Mapping[str, Any]]
+_Found = TypeVar("_Found")
+# So many places are tried for each further search, by one evaluation each.
+_TRIED = 4
 
 
 def identify(
@@ -57,7 +69,7 @@ def identify(
 
     Every signal has a noise of its own, estimated with the parameters. Neighbouring residuals of a motion are
     correlated: n of them count as n (1 - rho) / (1 + rho) (Bartlett). Parameters whose least value is positive are
-    searched for as logarithms, from the scenario's own numbers and from a Latin hypercube.
+    searched for as logarithms, from the scenario's own numbers and from the best of a Latin hypercube.
 
     Args:
         bench: Name of a bench or scenario that ships, or path of a TOML file; its table ``[identify]`` says the rest.
@@ -96,10 +108,11 @@ def identify(
     scenario = described_by(scenario, own)
     taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
     problem = build_problem(scenario, settings, taken, own)
-    problem.stop = stop or (lambda: False)
+    problem.stop = _latched(stop or (lambda: False))
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Ledger(None if output is None else Path(output), asked, restart) as ledger:
-        result = _work(problem, settings, _starts(problem, starts, seed), _Work(problem, ledger, loss, progress))
+        work = _Work(problem, ledger, loss, progress)
+        result = _work(problem, settings, _starts(problem, starts, seed), starts, work)
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
             write_outcome(result, Path(output), bench, problem)
@@ -141,8 +154,10 @@ def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.int
     loads = [each for key, each in recording.inputs.items() if unit_of(key) == "N"]
     load = loads[0] if len(loads) == 1 else np.full(len(values), np.nan)
     instant = np.arange(len(values), dtype=float) if steady else recording.time
+    given = np.stack([*recording.inputs.values(), recording.speed, recording.time], axis=1)
+    alike = np.unique(given[at], axis=0, return_inverse=True)[1].ravel()
     return RecordedSignal(
-        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], ordered=not steady
+        recording.name, name, unit_of(name), values[at], there, instant[at], load[at], alike, ordered=not steady
     )
 
 
@@ -161,12 +176,30 @@ class _Work:
     def best(self) -> Fit:
         return min(self.fits, key=lambda each: each.objective)
 
+    def screened(self, places: Sequence[Array], count: int) -> list[Array]:
+        """Return the first place, and those of the others where the recordings are met best."""
+
+        def one(item: tuple[int, Problem]) -> float:
+            residuals = item[1].residuals(places[1 + item[0]])
+            met = all(np.isfinite(each).all() for each in residuals)
+            return minus_twice_likelihood(residuals, np.ones(len(residuals)), item[1].groups) if met else np.inf
+
+        met = self._side_by_side("trying starts", one, len(places) - 1)
+        return [places[0], *(places[1 + k] for k in np.argsort(met, kind="stable")[: count - 1])]
+
     def search(self, starts: Sequence[Array]) -> None:
         """Search from all starts."""
-        for k, start in enumerate(starts):
-            self.tell("searching", k, len(starts))
-            work = partial(fit, self.problem, start, loss=self.loss)
-            self.fits.append(self.ledger.fit(f"start {k}", self.problem, work))
+        found: dict[int, Fit] = {}
+
+        def one(item: tuple[int, Problem]) -> None:
+            k, twin = item
+            work = partial(fit, twin, starts[k], loss=self.loss)
+            found[k] = self.ledger.fit(f"start {k}", twin, work)
+
+        try:
+            self._side_by_side("searching", one, len(starts))
+        finally:
+            self.fits += [found[k] for k in sorted(found)]
         if not np.isfinite(self.best.objective):
             raise InputError(
                 "identify.recordings", "the motion fails wherever the search starts; narrow the parameters"
@@ -178,16 +211,39 @@ class _Work:
         best = self.best
         self.spread = covariance(self.problem, best)
         ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
-        for place, (k, way) in enumerate(ends):
-            self.tell("following the likelihood", place, len(ends))
-            work = partial(profile, self.problem, best, k, way, self.spread)
+
+        def one(item: tuple[int, Problem]) -> Fit | None:
+            (k, way), twin, spread = ends[item[0]], item[1], self.spread
+            assert spread is not None
+            work = partial(profile, twin, best, k, way, spread)
             side = self.ledger.side(f"side {k} {way} {len(self.fits)}", work)
-            if side.better is not None:
-                self.fits.append(fit(self.problem, side.better.z, loss=self.loss))
-                self.sides.clear()
-                return self.follow()
-            self.sides[k, way] = side
-        return None
+            if side.better is None:
+                self.sides[k, way] = side
+            return side.better
+
+        better = [each for each in self._side_by_side("following the likelihood", one, len(ends)) if each is not None]
+        if better:
+            lowest = min(better, key=lambda each: each.objective)
+            self.fits.append(fit(self.problem, lowest.z, loss=self.loss))
+            self.sides.clear()
+            self.follow()
+
+    def _side_by_side(self, words: str, task: Callable[[tuple[int, Problem]], _Found], count: int) -> list[_Found]:
+        """Do a task by number, each with a problem of its own; where runs are made, in threads."""
+        twins, finished = [self.problem.alone() for _ in range(count)], itertools.count(1)
+        self.tell(words, 0, count)
+
+        def one(item: tuple[int, Problem]) -> _Found:
+            found = task(item)
+            self.tell(words, next(finished), count)
+            return found
+
+        runs, items = any(signal.ordered for signal in self.problem.signals), list(enumerate(twins))
+        try:
+            return in_threads(one, items) if runs else [one(item) for item in items]
+        finally:
+            for twin in twins:
+                self.problem.join(twin)
 
     def compare(self, settings: IdentifySettings) -> None:
         """Fit other laws, if there are any."""
@@ -197,10 +253,12 @@ class _Work:
             self.comparison = self.ledger.comparison(work)
 
 
-def _work(problem: Problem, settings: IdentifySettings, starts: Sequence[Array], work: _Work) -> xr.Dataset:
+def _work(
+    problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: _Work
+) -> xr.Dataset:
     unfinished = ""
     try:
-        work.search(starts)
+        work.search(work.screened(places, starts))
         work.follow()
         work.compare(settings)
     except Stopped:
@@ -213,12 +271,24 @@ def _work(problem: Problem, settings: IdentifySettings, starts: Sequence[Array],
 
 
 def _starts(problem: Problem, count: int, seed: int) -> list[Array]:
-    """Return the starts of the search: the scenario's own numbers, and a Latin hypercube."""
+    """Return the points to start from, in turn: the scenario's own numbers, and a Latin hypercube to choose from."""
     low, high = problem.box
     rng = np.random.default_rng(seed)
-    further = max(count - 1, 0)
+    further = _TRIED * max(count - 1, 0)
     cells = np.array([rng.permutation(further) for _ in low]).T + rng.uniform(size=(further, len(low)))
     return [problem.start, *(low + (high - low) * cells / max(further, 1))]
+
+
+def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:
+    """Return what asks until it is told to stop once: threads end together."""
+    told = threading.Event()
+
+    def asked() -> bool:
+        if not told.is_set() and stop():
+            told.set()
+        return told.is_set()
+
+    return asked
 
 
 def _check_felt(problem: Problem, places: Sequence[Array]) -> None:

@@ -63,7 +63,8 @@ def outcome(
     attrs = {
         "scenario": problem.scenario.name,
         "undetermined": [words for words, _ in free],
-        "starts": f"{alike} of {len(fits)} searches end at the same place",
+        "searches": len(fits),
+        "searches_alike": alike,
         "evaluations": problem.evaluations,
         "bic": best.objective + count * math.log(max(sum(w * len(e) for e, w in _pairs(best)), 1.0)),
     }
@@ -174,11 +175,9 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
 
 
 def _replicates(signal: RecordedSignal) -> float:
-    """Return the rms by which readings of the same load differ from their mean: what no law can explain."""
-    if signal.ordered or not np.isfinite(signal.load).all():
-        return math.nan
-    groups = np.unique(signal.load, return_inverse=True)[1]
-    if groups.max() + 1 == len(groups):
+    """Return the rms by which readings of the same inputs differ from their mean: what no law can explain."""
+    groups = signal.alike
+    if signal.ordered or groups.max() + 1 == len(groups):
         return math.nan
     means = np.bincount(groups, signal.measured) / np.bincount(groups)
     spread = np.sum((signal.measured - means[groups]) ** 2)

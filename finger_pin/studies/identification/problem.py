@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -68,6 +69,7 @@ class RecordedSignal:
         rows: Which rows of the recording they are, shape (m,).
         instant: Time of each, s; of steady readings its number.
         load: What fed the model there; not a number where several inputs do.
+        alike: The number of the group of equal readings that each is of, shape (m,).
         ordered: Whether its samples follow each other in time, so that neighbours may err alike.
     """
 
@@ -78,6 +80,7 @@ class RecordedSignal:
     rows: NDArray[np.intp]
     instant: Array
     load: Array
+    alike: NDArray[np.intp]
     ordered: bool
 
 
@@ -208,6 +211,21 @@ class Problem:
         self._slopes = (z.copy(), slopes)
         return slopes
 
+    def alone(self) -> Problem:
+        """Return the same problem with a memory of its own, for another thread."""
+        twin = copy.copy(self)
+        twin.models, twin.evaluations, twin.best = (
+            [copy.copy(model) for model in self.models],
+            0,
+            (math.inf, np.zeros(0)),
+        )
+        return twin
+
+    def join(self, twin: Problem) -> None:
+        """Add what another one has done to what this one has."""
+        self.evaluations += twin.evaluations
+        self.best = min(self.best, twin.best, key=lambda each: each[0])
+
     def _places(self) -> list[At]:
         def of(family: Family) -> At:
             def at(values: Array) -> tuple[Scenario, dict[str, float]]:
@@ -221,7 +239,9 @@ class Problem:
     def subset(self, kept: Sequence[NDArray[np.bool_]]) -> Problem:
         """Return the problem with some of the samples of every signal."""
         signals = [
-            RecordedSignal(s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.ordered)
+            RecordedSignal(
+                s.recording, s.name, s.unit, s.measured[k], s.rows[k], s.instant[k], s.load[k], s.alike[k], s.ordered
+            )
             for s, k in zip(self.signals, kept, strict=True)
         ]
         asked = slice(0, self.asked)
