@@ -1,10 +1,11 @@
 """Sensitivities of a run: derivatives of what is recorded by the numbers that the run is given.
 
-They obey a linear equation along the motion, which is solved on its own steps: S' = A S + E, where A is exact and E a
-difference of rates (`core.stepping.collocation`). Sampled controllers and loops of motors act in between, in Python or
-with a memory of their own, and some numbers give a mechanism more rows than it has: there the run is made again for
-every number, changed a little, on the same steps, which is the derivative of what the integrator has computed (internal
-numerical differentiation: Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981).
+They obey a linear equation along the motion, which is solved by itself: S' = A S + E, where A is exact and E a
+difference of rates (`core.stepping.collocation`), with relative errors of about the root of the run's tolerance.
+Sampled controllers and loops of motors act in between, in Python or with a memory of their own, and some numbers give a
+mechanism more rows than it has: there the run is made again for every number, changed a little, on the same steps,
+which is the derivative of what the integrator has computed (internal numerical differentiation: Bock, "Numerical
+treatment of inverse problems in chemical reaction kinetics", 1981).
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ def changed(
     return found, np.array(changes)
 
 
-def nearby(setup: Setup, trajectory: Trajectory, others: Sequence[Setup], changes: Array) -> list[Trajectory]:
+def nearby(
+    setup: Setup, trajectory: Trajectory, others: Sequence[Setup], changes: Array, allowed: float = 0.0
+) -> list[Trajectory]:
     """Return the motions that changed numbers make of one, to first order.
 
     Args:
@@ -71,6 +74,7 @@ def nearby(setup: Setup, trajectory: Trajectory, others: Sequence[Setup], change
         trajectory: How.
         others: The same with one number changed each.
         changes: By how much, shape (p,).
+        allowed: Relative error of the derivatives, roughly; at the least the root of the run's tolerance.
     """
     motions = [each for each in trajectory.islands if isinstance(each, IslandMotion)]
     steppers = [each.stepper() for each in (setup, *others)] if motions else []
@@ -79,7 +83,8 @@ def nearby(setup: Setup, trajectory: Trajectory, others: Sequence[Setup], change
     if near:
         chosen = [steppers[0], *(steppers[k + 1] for k in near)]
         knots = [each.loop.knots(each.scenario.simulation.rtol) for each in (setup, *(others[k] for k in near))]
-        linear = _linear(motions, chosen, knots, changes[near])
+        allowed = max(allowed, float(np.sqrt(setup.scenario.simulation.rtol)))
+        linear = _linear(motions, chosen, knots, changes[near], allowed)
         for k, stepper, moved in zip(near, chosen[1:], linear, strict=False):
             found[k] = replace(trajectory, interpolate=joined(stepper, moved), islands=())
     steps = [each.times for each in motions] or [trajectory.breakpoints]
@@ -91,13 +96,17 @@ def nearby(setup: Setup, trajectory: Trajectory, others: Sequence[Setup], change
 
 
 def _linear(
-    motions: Sequence[IslandMotion], steppers: Sequence[Stepper], knots: Sequence[Array], changes: Array
+    motions: Sequence[IslandMotion],
+    steppers: Sequence[Stepper],
+    knots: Sequence[Array],
+    changes: Array,
+    allowed: float,
 ) -> list[list[NearbyMotion]]:
     """Return the motions of all islands with each number changed; none if a linear system is singular."""
 
     def of(island: int) -> list[NearbyMotion]:
         motion = motions[island]
-        derivative = differentiate(motion, [each.parts[island] for each in steppers], knots, changes)
+        derivative = differentiate(motion, [each.parts[island] for each in steppers], knots, changes, allowed)
         if derivative is None:
             return []
         return [NearbyMotion(motion, derivative, k, float(change)) for k, change in enumerate(changes)]

@@ -109,6 +109,10 @@ def test_columns_have_units_scales_and_offsets():
         ({"recordings": {"pull": steady(speed=0.0)}}, "friction has the sign of sliding"),
         ({"data": {"pull": {"in": [3.0, 6.0], "out": [2.0, 4.0]}}}, "2 readings for 2 parameters"),
         ({"parameters": {COULOMB: (0.005, 20.0)}}, "must be at most 10"),
+        (
+            {"parameters": {"finger.joint_friction.coulomb": (0.0, 0.01)}},
+            "with it finger.joint_friction.stiction must be",
+        ),
         ({"parameters": {"finger.tendon_friction.colomb": (0.1, 1.0)}}, "finger.tendon_friction.coulomb"),
         ({"parameters": {**BOUNDS, "finger.joint_friction.viscous": (1e-5, 1e-3)}}, "no output of any recording feels"),
         ({"parameters": {COULOMB: (1.0, 0.1)}}, "the least value must be below the greatest"),
@@ -136,7 +140,7 @@ def test_weights_on_a_servo_tell_what_its_gears_lose_either_way():
 def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
     result = found(readings(np.random.default_rng(2)), starts=3)
     assert (result.attrs["searches"], result.attrs["searches_alike"]) == (3, 3)
-    assert summarize_identification(result).endswith("3 of 3 searches end at the same place.")
+    assert "3 of 3 searches end at the same place." in summarize_identification(result)
     result.attrs["searches_alike"] = 1
     told = summarize_identification(result)
     assert told.startswith("Do not trust these intervals: only 1 of 3 searches end at this place")
@@ -259,12 +263,12 @@ def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
 
 def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interruption(tmp_path):
     """A third of the samples is missing in one; the other is another pull of the same canal."""
-    rng, truth, asked = np.random.default_rng(12), [0.15, 0.5], []
+    rng, truth, asked, before = np.random.default_rng(12), [0.15, 0.5], [], []
     data = {name: ramp(rng, *truth) for name in ("one", "two")}
     missing = rng.uniform(size=data["one"]["t"].size) < 1.0 / 3.0
     data["one"]["f"] = np.where(missing, np.nan, data["one"]["f"])
     given = {"parameters": BOUNDS, "recordings": dict.fromkeys(data, MOTION), "data": data, "starts": 1}
-    whole = fp.identify("canal", **given)
+    whole = fp.identify("canal", **given, stop=lambda: bool(before.append(0)))
     np.testing.assert_allclose(whole.estimate, truth, rtol=0.03)
     later = data["one"]["t"] - data["one"]["t"][0] >= MOTION["settle"]
     samples = dict(zip(whole.signal.values, whole.signal_samples.values, strict=True))
@@ -273,10 +277,10 @@ def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interrup
 
     def stop():
         asked.append(0)
-        return len(asked) == 16
+        return len(asked) == len(before) - 2
 
     part = fp.identify("canal", **given, output=tmp_path, stop=stop)
-    assert "unfinished" in part.attrs and len(asked) == 16
+    assert "unfinished" in part.attrs and len(asked) == len(before) - 2
     again = fp.identify("canal", **given, output=tmp_path)
     assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]
     for name in ("estimate", "lower", "upper"):
@@ -290,7 +294,7 @@ def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interrup
         ({"start": "recorded", "outputs": {"tendon_tension.T1": "f"}}, "needs joint_position among the outputs"),
         ({"inputs": {"joint_position.drum": "q"}}, "a motion is given tendon_command, joint_reference"),
         ({"time": "f"}, "times must increase"),
-        ({"outputs": {"joint_position.wheel": "q"}}, "there is no wheel; there are drum"),
+        ({"start": "rest", "outputs": {"joint_position.wheel": "f"}}, "there is no wheel; there are drum"),
     ],
 )
 def test_wrong_recordings_of_motions_are_refused_in_one_line(change, said):

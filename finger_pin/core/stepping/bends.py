@@ -16,15 +16,17 @@ _NEAR, _MOST = 1e-6, 40
 
 
 @compiled
-def _begin(b: Any, step: int) -> Any:
+def begin_of(b: Any, step: int) -> Any:
     """Return the time at which a step begins."""
     return b.begin if step == 0 else b.ends[step - 1]
 
 
 @compiled
 def state_at(b: Any, step: int, time: float, out: Any) -> None:
-    """Fill the state at a time of a step."""
-    first = _begin(b, step)
+    """Fill the state at a time of a step, or of a later one."""
+    while step < b.ends.size - 1 and time > b.ends[step]:
+        step += 1
+    first = begin_of(b, step)
     for c in range(b.before.size):
         b.before[c] = b.start[c] if step == 0 else b.states[step - 1, c]
     if step > 0:
@@ -43,7 +45,7 @@ def rate_at(address: int, time: float, state: Any) -> None:
 
 @compiled
 def look(col: Any, model: Any, step: int, time: float, out: Any) -> None:
-    """Fill what changes its sign where the motion bends, at a time of a step."""
+    """Fill what changes its sign where the motion bends, at a time of a step or of a later one."""
     state_at(col.motion, step, time, col.state)
     rate_at(col.model, time, col.state)
     first, control = col.rows.size, model.control
@@ -94,7 +96,7 @@ def hold_all(col: Any) -> None:
 
 @compiled
 def last_before(col: Any, model: Any, step: int, begin: float, end: float) -> Any:
-    """Return a time just before the first change of sign between two times of a step; ``after`` is just behind it."""
+    """Return a time just before the first change of sign between two times; ``after`` is just behind it."""
     first, low, high = begin, begin, end
     look(col, model, step, low, col.before)
     for trial in range(_MOST):

@@ -1,15 +1,10 @@
-"""Derivatives of a motion by numbers, S' = A S + E along its steps, by collocation (Radau IIA), compiled.
+"""Derivatives of a motion by numbers, S' = A S + E along it, by collocation (Radau IIA), compiled.
 
 Rosenbrock methods keep their order only with the exact Jacobian, and that of state and derivatives together has the
-block dA/dx S, which nobody wants to form. But along a motion that is known, S obeys a linear equation in time. The
-method of three nodes, of order five and stiff accuracy (Hairer and Wanner, Solving Ordinary Differential Equations II,
-1996, IV.5), solves it from the exact A at its nodes alone. The equation of an interval h, with W the inverse of the
-method's matrix,
-
-    (W_aa / h - A_a) Y_a = sum_b W_ab / h S - sum_(b != a) W_ab / h Y_b + E_a,
-
-is what the condensed linear systems of a step solve, node by node; what joins the nodes is eliminated by blocks. All
-numbers share that: each adds its own E, a difference of rates at every node, and back-substitutions.
+block dA/dx S, which nobody wants to form. But along a motion that is known, S obeys a linear equation in time. A method
+that is stiffly accurate solves it from the exact A at its nodes alone, in intervals of its own: as long as a polynomial
+follows S, mostly several steps. At each node the condensed linear system of a step gives
+(g - A)^-1, and every number adds its own E, a difference of rates (`radau`).
 
 S is continuous where laws bend, but A is not: intervals end where a sliding speed or the kink of a law changes its
 sign. Where an input jumps at a time that depends on a number, S jumps by the difference of the rates times dt/dp.
@@ -23,15 +18,17 @@ from finger_pin.core.evaluation.charts import place_bodies, turn_small
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.bends import cross, hold_all, last_before, look, rate_at, state_at, turned_after
+from finger_pin.core.stepping.bends import begin_of, cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.broad_phase import list_awake
 from finger_pin.core.stepping.interpolation import Between
-from finger_pin.core.stepping.radau import join, multiply
+from finger_pin.core.stepping.radau import copy, curvature, relax
 
 # Entries of the memory.
-STEP, TIME, SPLIT, MEMORY_SIZE = range(4)
+STEP, TIME, SPLIT, LENGTH, MEMORY_SIZE = range(5)
 # In how many parts a step is cut at most.
 _SPLITS = 12.0
+# How many steps long an interval is at most and at least, and how much more curved than is allowed S may be in it.
+_LONGEST, _SHORTEST, _TOO_CURVED = 10.0, 0.05, 2.0
 # How short an interval is not worth one, of the time.
 _NOTHING = 1e-13
 SINGULAR = -1
@@ -52,22 +49,26 @@ class Collocation(NamedTuple):
         columns: What changes its sign there, columns of the table of rows, shape (r,).
         held: Whether the row can be held on a side, shape (r,).
         leaders: Memory, the tension that sets lambda in (22), by controller, shape (l,); w = r + l bends in all.
-        weights: `radau.WEIGHTS`.
         nodes: `radau.NODES`.
         memory: The step, the time, and how often the step has been cut so far; kept between calls.
         sides: Memory, on which side of each bend the motion is, shape (w,).
         before, between, after: Scratch, what changes its sign at each, shape (w,).
-        derivative: S, changed in place, shape (n, p).
+        derivative: S, changed in place, shape (p, n).
+        rate: Memory, its rate, shape (p, n).
+        largest: Memory, the largest S so far, shape (p, n).
+        scale: Sizes of the states, shape (n,).
+        allowed: How curved S may be in an interval, of its largest.
+        matrix, sweep, back: Of the method, as in `radau`; s nodes.
         state: Scratch, shape (n,).
         right: Scratch, shape (n + 1,).
         part: Scratch, shape (n,).
-        resolvents: Scratch, shape (3, n, n).
-        given: Scratch, shape (3, n, p).
-        square: Scratch, shape (2, n, n).
-        wide: Scratch, shape (2, n, n + p).
-        pivots: Scratch, shape (n,).
+        source: Scratch, shape (n,).
+        found: Scratch, shape (p, n).
+        resolvents: Scratch, transposed, shape (s, n, n).
+        given: Scratch, E at the nodes, shape (s, p, n).
+        known, nodal, rates: Scratch, S at the nodes and its rates there, shape (s, p, n).
         ends: Filled with the ends of the intervals, shape (m,), s.
-        solution: Filled with S at their begins and nodes, shape (4 m, n, p).
+        solution: Filled with S at their begins and nodes, shape ((s + 1) m, p, n).
     """
 
     model: int
@@ -80,7 +81,6 @@ class Collocation(NamedTuple):
     columns: Indices
     held: Indices
     leaders: Indices
-    weights: Matrix
     nodes: Vector
     memory: Vector
     sides: Vector
@@ -88,14 +88,23 @@ class Collocation(NamedTuple):
     between: Vector
     after: Vector
     derivative: Matrix
+    rate: Matrix
+    largest: Matrix
+    scale: Vector
+    allowed: float
+    matrix: Matrix
+    sweep: Matrix
+    back: Vector
     state: Vector
     right: Vector
     part: Vector
+    source: Vector
+    found: Matrix
     resolvents: Layers
     given: Layers
-    square: Layers
-    wide: Layers
-    pivots: Indices
+    known: Layers
+    nodal: Layers
+    rates: Layers
     ends: Vector
     solution: Layers
 
@@ -105,40 +114,29 @@ COLLOCATION = Kind(Collocation)
 
 @compiled
 def _node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
-    """Fill the resolvent at a node that is evaluated, and R (sum_b W_ab / h S + E); false if it is singular."""
-    size, count = col.derivative.shape
-    given, total = col.given[a], (col.weights[a, 0] + col.weights[a, 1] + col.weights[a, 2]) / h
+    """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
+    count, size = col.derivative.shape
     for k in range(count):
-        for c in range(size):
-            given[c, k] = total * col.derivative[c, k]
-        if col.changed[k] == 0:
-            continue
-        rate_at(col.changed[k], time, col.state)
-        other = bound_at(col.changed[k], MODEL)
-        for c in range(size):
-            given[c, k] += (other.rate[c] - model.rate[c]) / col.changes[k]
+        if col.changed[k] != 0:
+            rate_at(col.changed[k], time, col.state)
+            other = bound_at(col.changed[k], MODEL)
+            for c in range(size):
+                col.given[a, k, c] = (other.rate[c] - model.rate[c]) / col.changes[k]
     call_at(model.linearise, col.model, time)
-    if call_at(model.condense, col.model, col.weights[a, a] / h) == 0:
+    if call_at(model.condense, col.model, 1.0 / (h * col.sweep[a, a])) == 0:
         return False
     resolvent = col.resolvents[a]
     if model.linear.blocks.touches.size == 0:
         for i in range(size):
             for c in range(size):
-                resolvent[i, c] = model.linear.solution[i, c]
-    else:
-        for c in range(size + 1):
-            col.right[c] = 0.0
-        for c in range(size):
-            col.right[c] = 1.0
-            solve(model.linear, col.right, col.part)
-            col.right[c] = 0.0
-            for i in range(size):
-                resolvent[i, c] = col.part[i]
-    wide = col.wide[0]
-    multiply(resolvent, given, count, wide)
-    for i in range(size):
-        for k in range(count):
-            given[i, k] = wide[i, k]
+                resolvent[c, i] = model.linear.solution[i, c]
+        return True
+    for c in range(size + 1):
+        col.right[c] = 0.0
+    for c in range(size):
+        col.right[c] = 1.0
+        solve(model.linear, col.right, resolvent[c])
+        col.right[c] = 0.0
     return True
 
 
@@ -181,7 +179,7 @@ def _jump(col: Any, model: Any, step: int, corner: int) -> None:
     rate_at(col.model, end * (1.0 + 2.0**-51), col.state)
     for c in range(col.state.size):
         for k in range(col.changes.size):
-            col.derivative[c, k] += (col.part[c] - model.rate[c]) * col.shifts[corner, k]
+            col.derivative[k, c] += (col.part[c] - model.rate[c]) * col.shifts[corner, k]
 
 
 @compiled
@@ -194,34 +192,91 @@ def _turn(col: Any, step: int) -> None:
         for k in range(col.changes.size):
             angles, rates = col.right[:3], col.part[:3]
             for r in range(3):
-                angles[r], rates[r] = col.derivative[i + r, k], col.derivative[b.width + i + r, k]
+                angles[r], rates[r] = col.derivative[k, i + r], col.derivative[k, b.width + i + r]
             turn_small(x[i], x[i + 1], x[i + 2], x[b.width + i], x[b.width + i + 1], x[b.width + i + 2], angles, rates)
             for r in range(3):
-                col.derivative[i + r, k], col.derivative[b.width + i + r, k] = angles[r], rates[r]
+                col.derivative[k, i + r], col.derivative[k, b.width + i + r] = angles[r], rates[r]
 
 
 @compiled
-def _interval(col: Any, model: Any, taken: int, step: int, begin: float, end: float, evaluated: bool) -> Any:
-    """Carry S from one time of a step to another, maybe evaluated; false where a linear system is singular."""
-    size, count = col.derivative.shape
+def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: bool) -> Any:
+    """Solve for S at the nodes between two times, of which the first is in a step.
+
+    Returns:
+        0 if it is solved, `SINGULAR` if a linear system is; else before which node the motion bends, from 1.
+    """
     h = end - begin
-    for a in range(2, -1, -1):
-        time = end if a == 2 else begin + col.nodes[a] * h
-        if a < 2 or not evaluated:
+    for a in range(col.nodes.size):
+        time = end if a == col.nodes.size - 1 else begin + col.nodes[a] * h
+        if looks:
+            look(col, model, step, time, col.after)
+            if turned_after(col, col.after, col.after) < 1.0:
+                return a + 1
+        else:
             state_at(col.motion, step, time, col.state)
             rate_at(col.model, time, col.state)
         if not _node(col, model, a, time, h):
-            return False
-    if not join(col, h):
-        return False
-    for c in range(size):
-        for k in range(count):
-            col.solution[4 * taken, c, k] = col.derivative[c, k]
-            for a in range(3):
-                col.solution[4 * taken + 1 + a, c, k] = col.given[a, c, k]
-            col.derivative[c, k] = col.given[2, c, k]
+            return SINGULAR
+    relax(col, h)
+    return 0
+
+
+@compiled
+def _keep(col: Any, taken: int, end: float) -> None:
+    """Take an interval that is solved."""
+    nodes = col.nodes.size
+    first, last = taken * (nodes + 1), nodes - 1
+    copy(col.derivative, col.solution[first])
+    for a in range(nodes):
+        copy(col.nodal[a], col.solution[first + 1 + a])
+    copy(col.nodal[last], col.derivative)
+    copy(col.rates[last], col.rate)
+    for k in range(col.largest.shape[0]):
+        for c in range(col.largest.shape[1]):
+            col.largest[k, c] = max(col.largest[k, c], abs(col.derivative[k, c]))
     col.ends[taken] = end
-    return True
+
+
+@compiled
+def _latest(col: Any, step: int) -> Any:
+    """Return when the interval that begins in a step ends at the latest: where inputs bend, or angles begin anew."""
+    b, close = col.motion, col.motion.charts.size > 0 or col.memory[SPLIT] >= _SPLITS
+    while step < b.ends.size - 1 and not close and col.corners[step] == 0:
+        step += 1
+    return b.ends[step]
+
+
+@compiled
+def _solved(col: Any, model: Any, step: int, begin: float) -> Any:
+    """Solve over an interval from a time in a step, as long as S is smooth enough.
+
+    Returns:
+        Its end, no later than the begin if it is nothing, and 1 if the motion bends there; `SINGULAR`.
+    """
+    memory, least, latest = col.memory, begin + _NOTHING * max(1.0, abs(begin)), _latest(col, step)
+    own = col.motion.ends[step] - begin_of(col.motion, step)
+    shortest = _SHORTEST * own
+    length, bends = min(max(memory[LENGTH], shortest), _LONGEST * own), 0
+    while True:
+        end = begin + length
+        if end + 0.1 * length >= latest:
+            end = latest
+        if end <= least:
+            return end, bends
+        found = _interval(col, model, step, begin, end, bends == 0 and memory[SPLIT] < _SPLITS)
+        if found > 0:
+            behind = end if found == col.nodes.size else begin + col.nodes[found - 1] * (end - begin)
+            latest, bends = last_before(col, model, step, begin, behind), 1
+            length = latest - begin
+            continue
+        if found == SINGULAR:
+            return end, SINGULAR
+        curved = curvature(col) / col.allowed
+        factor = min(max(0.9 * max(curved, 1e-6) ** (-1.0 / col.nodes.size), 0.3), 3.0)
+        memory[LENGTH] = (end - begin) * factor
+        if curved <= _TOO_CURVED or length <= shortest:
+            return end, bends
+        length, bends = max(memory[LENGTH], shortest), 0
 
 
 @Unit
@@ -237,26 +292,26 @@ def collocate(address: int, _time: float) -> int:
     hold_all(col)
     while memory[STEP] <= last and taken < col.ends.size:
         step, begin = int(memory[STEP]), memory[TIME]
-        if memory[SPLIT] == 0.0 and b.charts.size > 0:
+        if b.charts.size > 0 and begin == begin_of(b, step):
             _place(col, step)
-        end, crossed = b.ends[step], False
-        look(col, model, step, end, col.after)
-        turned = turned_after(col, col.after, col.after) < 1.0
-        if turned and memory[SPLIT] < _SPLITS:
-            end, crossed = last_before(col, model, step, begin, end), True
-        if end - begin > _NOTHING * max(1.0, abs(end)):
-            if not _interval(col, model, taken, step, begin, end, not crossed):
-                return SINGULAR
+        end, bends = _solved(col, model, step, begin)
+        if bends == SINGULAR:
+            return SINGULAR
+        if end > begin + _NOTHING * max(1.0, abs(begin)):
+            _keep(col, taken, end)
             taken += 1
-        memory[TIME] = end
-        if turned:
+        memory[TIME], anew = end, bends == 1
+        if anew:
             cross(col)
-        if crossed:
             memory[SPLIT] += 1.0
-            continue
-        memory[SPLIT] = 0.0
-        memory[STEP] += 1.0
-        if col.corners[step] > 0:
-            _jump(col, model, step, col.corners[step] - 1)
-        _turn(col, step)
+        while step <= last and end >= b.ends[step]:
+            if col.corners[step] > 0:
+                _jump(col, model, step, col.corners[step] - 1)
+                anew = True
+            _turn(col, step)
+            step += 1
+            memory[SPLIT] = 0.0
+        if anew and step <= last:
+            memory[LENGTH] = b.ends[step] - begin_of(b, step)
+        memory[STEP] = step
     return taken

@@ -13,6 +13,7 @@ from finger_pin.core.evaluation.law_code import SPEED
 from finger_pin.core.jit import call
 from finger_pin.core.stepping.collocation import (
     COLLOCATION,
+    LENGTH,
     MEMORY_SIZE,
     SINGULAR,
     TIME,
@@ -22,7 +23,7 @@ from finger_pin.core.stepping.collocation import (
 from finger_pin.core.stepping.interpolation import Between
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part
-from finger_pin.core.stepping.radau import NODES, WEIGHTS
+from finger_pin.core.stepping.radau import BACK, MATRIX, NODES, SWEEP
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 from finger_pin.description.routing import Array
 
@@ -41,7 +42,7 @@ class Derivative:
     Attributes:
         ends: Ends of the intervals, shape (m,), s.
         begins: Their begins, shape (m,), s.
-        solution: S at the begin and the nodes of each, shape (m, 4, n, p).
+        solution: S at the begin and the nodes of each, shape (m, s + 1, p, n).
     """
 
     ends: Array
@@ -52,8 +53,8 @@ class Derivative:
         """Return S of a number, shape (t, n)."""
         place = np.clip(np.searchsorted(self.ends, times, side="right"), 0, len(self.ends) - 1)
         share = (times - self.begins[place]) / (self.ends[place] - self.begins[place])
-        weights = np.vander(np.clip(share, 0.0, 1.0), 4, increasing=True) @ _POLYNOMIAL
-        found: Array = np.einsum("tj,tjn->tn", weights, self.solution[place, :, :, k])
+        weights = np.vander(np.clip(share, 0.0, 1.0), len(_POLYNOMIAL), increasing=True) @ _POLYNOMIAL
+        found: Array = np.einsum("tj,tjn->tn", weights, self.solution[place, :, k])
         return found
 
 
@@ -88,7 +89,7 @@ def fits(motions: Sequence[IslandMotion], parts: Sequence[Part]) -> bool:
 
 
 def differentiate(
-    motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array
+    motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array, allowed: float
 ) -> Derivative | None:
     """Return the derivatives of an island's motion by numbers; None where its linear systems are singular.
 
@@ -97,29 +98,38 @@ def differentiate(
         parts: The island where it starts, then the same with one number changed each.
         knots: Of each of these, when inputs bend or jump, s.
         changes: By how much each number is changed, shape (p,).
+        allowed: Relative error of the derivatives, roughly.
     """
-    begins, ends, solutions = [motion.begin], [np.zeros(0)], [np.zeros((0, 4, len(motion.start), len(parts) - 1))]
-    collocation = _collocation(motion, parts, knots, changes)
+    begins, ends, solutions = (
+        [motion.begin],
+        [np.zeros(0)],
+        [np.zeros((0, len(NODES) + 1, len(parts) - 1, len(motion.start)))],
+    )
+    collocation = _collocation(motion, parts, knots, changes, allowed)
     while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
         ends.append(collocation.ends[:taken].copy())
-        solutions.append(collocation.solution[: 4 * taken].reshape(taken, *solutions[0].shape[1:]).copy())
+        solutions.append(
+            collocation.solution[: (len(NODES) + 1) * taken].reshape(taken, *solutions[0].shape[1:]).copy()
+        )
         if taken < _ROOM:
             found = np.concatenate(ends)
             return Derivative(found, np.concatenate([begins, found[:-1]]), np.concatenate(solutions))
     return None
 
 
-def _collocation(motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array) -> Collocation:
+def _collocation(
+    motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array, allowed: float
+) -> Collocation:
     """Return what `collocate` reads and fills, at the start of a motion; arguments as for `differentiate`."""
     own, others = parts[0], parts[1:]
-    size, count = len(motion.start), len(others)
+    size, count, nodes = len(motion.start), len(others), len(NODES)
     rows, columns, held = _bends(own.tables)
     bends = len(rows) + len(own.control.level)
     corners, shifts = _corners(motion.record.times, knots[0], knots[1:], changes)
     width = len(own.tables.parents) + len(own.tables.lumps)
     felt = [not (_alike(own.tables, each.tables) and _alike(own.control, each.control)) for each in others]
     memory = np.zeros(MEMORY_SIZE)
-    memory[TIME] = motion.begin
+    memory[TIME], memory[LENGTH] = motion.begin, motion.record.times[0] - motion.begin
     return Collocation(
         model=own.model.address,
         changed=np.array(
@@ -133,7 +143,6 @@ def _collocation(motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Ar
         columns=columns,
         held=held,
         leaders=np.zeros(len(own.control.level), dtype=np.int64),
-        weights=WEIGHTS,
         nodes=NODES,
         memory=memory,
         sides=np.zeros(bends),
@@ -141,16 +150,25 @@ def _collocation(motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Ar
         between=np.zeros(bends),
         after=np.zeros(bends),
         derivative=_start(motion, others, changes, width),
+        rate=np.zeros((count, size)),
+        largest=np.zeros((count, size)),
+        scale=own.atol,
+        allowed=allowed,
+        matrix=MATRIX,
+        sweep=SWEEP,
+        back=BACK,
         state=np.zeros(size),
         right=np.zeros(size + 1),
         part=np.zeros(size),
-        resolvents=np.zeros((3, size, size)),
-        given=np.zeros((3, size, count)),
-        square=np.zeros((2, size, size)),
-        wide=np.zeros((2, size, size + count)),
-        pivots=np.zeros(size, dtype=np.int64),
+        source=np.zeros(size),
+        found=np.zeros((count, size)),
+        resolvents=np.zeros((nodes, size, size)),
+        given=np.zeros((nodes, count, size)),
+        known=np.zeros((nodes, count, size)),
+        nodal=np.zeros((nodes, count, size)),
+        rates=np.zeros((nodes, count, size)),
         ends=np.zeros(_ROOM),
-        solution=np.zeros((4 * _ROOM, size, count)),
+        solution=np.zeros(((nodes + 1) * _ROOM, count, size)),
     )
 
 
@@ -174,15 +192,15 @@ def _steps(motion: IslandMotion, own: Part, width: int) -> Between:
 
 
 def _start(motion: IslandMotion, others: Sequence[Part], changes: Array, width: int) -> Array:
-    """Return S at the start, shape (n, p)."""
-    found = np.stack([(each.x - motion.start) / change for each, change in zip(others, changes, strict=True)], axis=1)
+    """Return S at the start, shape (p, n)."""
+    found = np.stack([(each.x - motion.start) / change for each, change in zip(others, changes, strict=True)])
     for k, (other, change) in enumerate(zip(others, changes, strict=True)):
         for f, first in enumerate(other.tables.charts):
             # Half of a small turn q^-1 q' about the body's axes is its vector part.
             vector, scalar = motion.attitude[f, :3], motion.attitude[f, 3]
             moved, rest = other.attitude[f, :3], other.attitude[f, 3]
             turn = scalar * moved - rest * vector - np.cross(vector, moved)
-            found[first : first + 3, k] = 2.0 * np.sign(scalar * rest + vector @ moved) * turn / change
+            found[k, first : first + 3] = 2.0 * np.sign(scalar * rest + vector @ moved) * turn / change
     return np.ascontiguousarray(found)
 
 

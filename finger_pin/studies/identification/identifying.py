@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.stepping.stepper import in_threads
+from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array

@@ -37,6 +37,8 @@ _INPUTS = {
 _NEAR = 0.3
 # Samples at a window's start that its position and velocity are read from.
 _FIRST = 9
+# Relative error of slopes: a search needs no more, and at its end residuals and slopes are nearly orthogonal.
+_ALLOWED = 1e-2
 # Where slopes are wilder than so many ranges of the signal, a larger change and steps of their own serve.
 _WILD, _COARSE = 30.0, 1e-3
 
@@ -103,7 +105,7 @@ class RecordedMotion:
             k for k, (scenario, own) in enumerate(there) if self._with_start(scenario, own) != motion[0].scenario
         ]
         others = {k: self._setup(*there[k]) for k in feeling}
-        near = dict(zip(feeling, nearby(*motion, list(others.values()), changes[feeling]), strict=True))
+        near = dict(zip(feeling, nearby(*motion, list(others.values()), changes[feeling], _ALLOWED), strict=True))
         ranges = [float(np.ptp(each)) for each in computed]
 
         def column(k: int) -> list[Array]:

@@ -146,7 +146,8 @@ class Problem:
                 try:
                     alone.at([float(bound)])
                 except InputError as error:
-                    raise InputError(f"identify.parameters.{key}", error.allowed, float(bound)) from None
+                    allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
+                    raise InputError(f"identify.parameters.{key}", allowed, float(bound)) from None
         known = dict(zip(keys, self._families[0].values, strict=True)) | {own.key: own.start for own in further}
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
