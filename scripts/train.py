@@ -38,8 +38,8 @@ class Training(NamedTuple):
     discount: float = 0.9
 
 
-TRAININGS = {"Reach": Training(100_000, 50, -1.0), "Press": Training(120_000, 50, -2.0)}
-TRAININGS["Grasp"] = Training(80_000, 50, -2.0, 0.97)
+TRAININGS = {"Reach": Training(100_000, 50, -1.0), "Press": Training(400_000, 50, -2.0)}
+TRAININGS["Grasp"] = Training(80_000, 50, -2.0)
 
 
 class Goal(NamedTuple):

@@ -99,7 +99,7 @@ class Study(NamedTuple):
 
 
 _WITHOUT, _ONE, _ANEW = "without friction", "at one friction", "with all drawn anew"
-_FACTORS = "friction over its own", (0.0, 0.5, 1.0, 2.0, 3.0)
+_FACTORS = "friction over its own", (0.0, 1.0, 2.0, 3.0)
 
 
 def studies() -> dict[str, Study]:
@@ -128,7 +128,7 @@ def studies() -> dict[str, Study]:
     return {
         "tensions": Study(
             {},
-            TRAININGS["Reach"]._replace(steps=80_000),
+            TRAININGS["Reach"]._replace(steps=50_000),
             {_WITHOUT: friction(0.0, 0.0), _ONE: friction(1.0, 1.0), _ANEW: friction(0.25, 3.0)},
             {label: (factors, friction)},
         ),
@@ -137,7 +137,7 @@ def studies() -> dict[str, Study]:
             Training(40_000, 20, -2.0, 0.8),
             {_WITHOUT: friction(0.0, 0.0), _ONE: friction(1.0, 1.0), _ANEW: anew},
             {
-                label: (factors[::2], friction),
+                label: ((0.0, 1.0, 3.0), friction),
                 "slack (mm)": ((0.0, 0.5, 1.0), slack),
                 "gain over its own": ((0.2, 1.0, 2.0), gain),
             },
