@@ -113,7 +113,7 @@ def _words(result: xr.Dataset) -> list[str]:
         sides = [side for side, end in (("below", low), ("above", high)) if end == "open"]
         if sides:
             words.append(f"{name} is not bounded from {' nor from '.join(sides)} by these recordings.")
-    if not words:
+    if not words and "unfinished" not in result.attrs:
         words.append(f"{'The' if _borne_out(result) else 'Near this place the'} recordings determine every parameter.")
     if _borne_out(result):
         words.append(_agreement(result))

@@ -158,6 +158,7 @@ def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path)
 
     part = found(data, starts=3, output=tmp_path, stop=stop)
     assert "unfinished" in part.attrs and (tmp_path / NAME).exists() and len(asked) == 60
+    assert "determine every parameter" not in summarize_identification(part)
     again = found(data, starts=3, output=tmp_path)
     assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]
     np.testing.assert_allclose(again.estimate, whole.estimate, rtol=1e-5)
