@@ -25,9 +25,12 @@ from finger_pin.mujoco.registration import register
 
 Keys = Mapping[str, Mapping[str, Any]]
 
+# From so many times the mass over the step on, dampers and servos let rows stop too little.
+_STIFF = 5.0
+
 
 class MujocoWarning(ScenarioWarning):
-    """A MuJoCo model has an option with which friction is less than it could be."""
+    """A MuJoCo model has an option, or a step, with which friction is less than it could be."""
 
 
 def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = None) -> None:
@@ -73,7 +76,35 @@ def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = N
     )
     if not found:
         raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
+    stiff = sorted({each.row for each in found if _damping(model, each) > _STIFF})
+    if stiff:
+        told = "a step is long for the dampers or servos there, and friction stops too little: take shorter steps"
+        warnings.warn(MujocoWarning(f"spec.option.timestep: {', '.join(stiff)}: {told}"), stacklevel=2)
     _write(spec, model, found)
+
+
+def _damping(model: Any, friction: PluginFriction) -> float:
+    """Return h D / m of a friction: dampers and servos on it and its row are implicit, and its solver sees none."""
+    places = {(friction.of_joint, friction.name), (friction.row_of_joint, friction.row)}
+    return float(model.opt.timestep * sum(_damping_rate(model, *each) for each in places))
+
+
+def _damping_rate(model: Any, of_joint: bool, name: str) -> float:
+    """Return D / m of a joint or a tendon, 1/s."""
+    kinds = mujoco.mjtTrn
+    if of_joint:
+        element = model.joint(name).id
+        at = int(model.jnt_dofadr[element])
+        gain, weight = model.dof_damping[at], model.dof_invweight0[at]
+        acting = (model.actuator_trntype == kinds.mjTRN_JOINT) | (model.actuator_trntype == kinds.mjTRN_JOINTINPARENT)
+    else:
+        element = model.tendon(name).id
+        gain, weight = model.tendon_damping[element], model.tendon_invweight0[element]
+        acting = model.actuator_trntype == kinds.mjTRN_TENDON
+    acting &= (model.actuator_trnid[:, 0] == element) & (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE)
+    if model.opt.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
+        gain = gain - np.sum(model.actuator_biasprm[acting, 2] * model.actuator_gear[acting, 0] ** 2)
+    return float(gain * weight)
 
 
 def _name_all(spec: Any) -> None:

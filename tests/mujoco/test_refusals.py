@@ -56,6 +56,24 @@ def test_what_cannot_be_is_refused_and_what_is_less_is_warned_of():
         fp.mujoco.add_friction(rope(noslip_iterations=3), tendons={"rope": {}})
 
 
+@pytest.mark.parametrize("gain, integrator, told", [(240.0, "IMPLICITFAST", False), (260.0, "IMPLICIT", True)])
+@pytest.mark.parametrize("tendon", ["rope", "pair"])
+def test_servos_too_stiff_for_the_step_are_warned_of_from_five_times_the_mass_over_the_step(
+    gain, integrator, told, tendon, recwarn
+):
+    """A mass of 0.1 kg at 2 ms: 250 N s/m is five; two sliders that a tendon pulls together move as half of one."""
+    pair = tendon == "pair"
+    body = '<body><joint name="{0}" type="slide" axis="1 0 0"/><geom size="0.01" mass="0.1"/></body>'
+    over = '<joint joint="a" coef="1"/>' + pair * '<joint joint="b" coef="1"/>'
+    spec = mujoco.MjSpec.from_string(
+        f"<mujoco><worldbody>{body.format('a')}{body.format('b')}</worldbody><tendon><fixed name='t'>{over}</fixed>"
+        f"</tendon><actuator><velocity tendon='t' kv='{0.5 * gain if pair else gain}'/></actuator></mujoco>"
+    )
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    fp.mujoco.add_friction(spec, tendons={"t": {}})
+    assert [str(each.message).count("spec.option.timestep: ") for each in recwarn] == [1] * told
+
+
 def test_a_tendon_that_nothing_pulls_is_passed_over_by_stars_and_refused_by_name():
     for pattern in ("rope*", "rope"):
         spec = rope()
