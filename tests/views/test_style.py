@@ -84,6 +84,17 @@ def test_what_a_user_has_set_for_figures_is_above_the_style_and_sizes_follow_it(
     assert not angles.spines["top"].get_visible()
 
 
+def nothing_overlaps(figure):
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    boxes += [legend.get_window_extent() for part in figure.findobj(SubFigure) for legend in part.legends]
+    for box in boxes:
+        assert figure.bbox.padded(1.0).count_contains([box.min, box.max]) == 2
+    for first, second in itertools.combinations(boxes, 2):
+        shared = Bbox.intersection(first, second)
+        assert shared is None or min(shared.width, shared.height) < 1.0
+
+
 @pytest.mark.parametrize("width", ["column", "page"])
 @pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
 def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_resizing(draw, width):
@@ -92,14 +103,17 @@ def test_nothing_overlaps_and_nothing_is_cut_off_at_any_width_and_after_resizing
     assert not any(axes.get_title(loc=side) for axes in figure.axes for side in ("left", "center", "right"))
     for factor in (1.0, 1.4):
         figure.set_size_inches(factor * figure.get_size_inches())
-        figure.draw_without_rendering()
-        boxes = [axes.get_tightbbox() for axes in figure.axes]
-        boxes += [legend.get_window_extent() for part in figure.findobj(SubFigure) for legend in part.legends]
-        for box in boxes:
-            assert figure.bbox.padded(1.0).count_contains([box.min, box.max]) == 2
-        for first, second in itertools.combinations(boxes, 2):
-            shared = Bbox.intersection(first, second)
-            assert shared is None or min(shared.width, shared.height) < 1.0
+        nothing_overlaps(figure)
+
+
+@pytest.mark.parametrize("draw", [plots.plot_fig6, plots.plot_losses, plots.plot_energy])
+def test_a_figure_that_is_made_half_as_wide_has_its_titles_and_legends_in_more_lines(draw):
+    figure = draw(synthetic())
+    before = [legend.get_window_extent().width for part in figure.findobj(SubFigure) for legend in part.legends]
+    figure.set_size_inches(0.45 * figure.get_figwidth(), figure.get_figheight())
+    nothing_overlaps(figure)
+    after = [legend.get_window_extent().width for part in figure.findobj(SubFigure) for legend in part.legends]
+    assert len(before) == len(after) and max(after) < max(before)
 
 
 def test_a_width_that_is_none_is_refused():

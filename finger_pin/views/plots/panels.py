@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from functools import partial
+from typing import Literal
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -13,7 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from finger_pin.views.plots.style import Width, inches, new_figure, power_of_ten, settings
+from finger_pin.views.plots.style import Width, fit, inches, new_figure, power_of_ten, settings
 
 # Parts are drawn at this share of their own width before they go below each other.
 _NARROWEST = 0.62
@@ -104,29 +106,31 @@ def title(axes: Axes, text: str) -> None:
     """Write a title, unless the figure has none."""
     figure = axes.get_figure(root=True)
     if getattr(figure, "titled", True):
-        spot = axes.get_subplotspec()
-        share = 1.0 if spot is None else 1.0 / spot.get_gridspec().ncols
-        part = axes.get_figure()
-        assert part is not None
-        # Axes in space have a place of their own for titles.
-        wrapped = _wrap(text, _letters(part, share * 0.86, "axes.titlesize"))
-        axes.set_title(wrapped, loc=settings["axes.titlelocation"])
+        fit(figure, partial(_write_title, axes, text, _points("axes.titlesize"), settings["axes.titlelocation"]))
+
+
+def _write_title(axes: Axes, text: str, points: float, place: Literal["left", "center", "right"]) -> None:
+    spot, part = axes.get_subplotspec(), axes.get_figure()
+    assert part is not None
+    width = part.bbox.width / part.dpi / (1.0 if spot is None else spot.get_gridspec().ncols)
+    # Left of the panel are the labels of ticks and of the axis, of two lines at most; letters of titles are wide.
+    axes.set_title(_wrap(text, min(0.86 * width, width - 8.0 * points / 72.0), points), loc=place)
 
 
 def heading(figure: Figure, text: str) -> None:
     """Write a title of a whole figure, unless it has none."""
     if getattr(figure, "titled", True):
-        figure.suptitle(_wrap(text, _letters(figure, 0.92, "figure.titlesize")), x=0.02, ha="left")
+        fit(figure, partial(_write_heading, figure, text, _points("figure.titlesize")))
 
 
-def _wrap(text: str, letters: int) -> str:
+def _write_heading(figure: Figure, text: str, points: float) -> None:
+    figure.suptitle(_wrap(text, 0.92 * figure.get_figwidth(), points), x=0.02, ha="left", fontsize=points)
+
+
+def _wrap(text: str, width: float, points: float) -> str:
+    """Return a text in lines that fit into a width, in, in letters of a size."""
+    letters = max(12, int(72.0 * width / (_LETTER * points)))
     return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.splitlines())
-
-
-def _letters(part: Figure | SubFigure, share: float, size: str) -> int:
-    """Return the number of letters that a share of a part's width holds, in a size of the style."""
-    points = _points(size)
-    return max(12, int(72.0 * share * part.bbox.width / part.dpi / (_LETTER * points)))
 
 
 def _points(size: str) -> float:
@@ -141,15 +145,20 @@ def flatten_rounding(axes: Axes) -> None:
 
 def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
     """Write a legend below a part, in as many columns as its width holds, if there is anything to name."""
-    if not handles:
-        return
+    if handles:
+        fit(part.get_figure(root=True), partial(_write_legend, part, handles, _points("legend.fontsize")))
+
+
+def _write_legend(part: Figure | SubFigure, handles: Sequence[Artist], points: float) -> None:
+    for earlier in list(part.legends):
+        earlier.remove()
     longest = max(len(str(each.get_label())) for each in handles)
-    entry = _HANDLE + _LETTER * _points("legend.fontsize") * longest / 72.0
+    entry = _HANDLE + _LETTER * points * longest / 72.0
     columns = max(1, min(len(handles), int(part.bbox.width / part.dpi / entry)))
     # As many columns as the rows that these make need: the last one is no stump.
     columns = -(-len(handles) // -(-len(handles) // columns))
     part.legend(handles=handles, ncols=columns, columnspacing=1.2, handletextpad=0.5, borderaxespad=0.2, frameon=False,
-                loc="outside lower center")  # fmt: skip
+                loc="outside lower center", fontsize=points)  # fmt: skip
 
 
 def logarithmic(axes: Axes) -> None:

@@ -93,14 +93,29 @@ class Picture(Figure):
 
     Attributes:
         titled: Whether its panels have titles.
+        fitted: What writes the text that depends on its size: titles in lines, legends in columns.
     """
 
     titled = True
+    fitted: tuple[Callable[[], None], ...] = ()
+
+    def set_size_inches(self, w: Any, h: float | None = None, forward: bool = True) -> None:
+        """Set the size as `Figure.set_size_inches` does, and fit titles and legends into it."""
+        super().set_size_inches(w, h, forward=forward)
+        for write in self.fitted:
+            write()
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
         self.savefig(buffer, format="png")
         return buffer.getvalue()
+
+
+def fit(figure: Any, write: Callable[[], None]) -> None:
+    """Write text that depends on a figure's size, now and whenever that changes."""
+    write()
+    if isinstance(figure, Picture):
+        figure.fitted = (*figure.fitted, write)
 
 
 def new_figure(
