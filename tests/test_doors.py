@@ -29,6 +29,15 @@ def proposed(given, **more):
     return float(fp.propose(given, {"as it is": {}}, numbers, {"tendon_tension.T1": 0.05}, **more).deviation.squeeze())
 
 
+def learned(given, **task):
+    """Return the observations of an episode, under numbers that are drawn if there are any."""
+    from finger_pin.learning import Environment
+
+    environment = Environment(given, reward=lambda signals: np.zeros(1), **task)
+    environment.reset(seed=1)
+    return np.array([environment.step(np.array([1.0, 1.0, 4.0, 3.0]))[0] for _ in range(2)])
+
+
 #: Every door that takes a scenario, with what comes out.
 DOORS = {
     "simulate": lambda given: fp.simulate(given).joint_position.values,
@@ -42,6 +51,7 @@ DOORS = {
     "linearise": lambda given: fp.linearise(given, fp.Finger("ub").rest_state(POSTURE), [1.0, 1.0, 4.0, 3.0]).A.values,
     "build_controller": lambda given: fp.control.build_controller(given).gain,
     "Run": lambda given: fp.studies.METRICS["tension_peak"].measure(fp.studies.Run(given)),
+    "Environment": learned,
     "load_scenario": lambda given: fp.simulate(fp.load_scenario(given, {"controller.gain": 0.7})).joint_position.values,
 }
 #: Every door that takes a scenario and a finger in place of its own, with the largest tension.
@@ -143,6 +153,45 @@ def test_what_would_be_learned_is_that_of_a_finger_of_ones_own(heavy):
     described = fp.load_scenario("fig6", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
     assert proposed(scenario, finger=heavy) == pytest.approx(proposed(described), rel=0.05)
     assert proposed(scenario, finger=heavy) != proposed(scenario)
+
+
+@pytest.mark.parametrize("drawn", [None, 0.1])
+def test_an_environment_of_a_finger_of_ones_own_is_that_of_one_described_so(heavy, drawn):
+    from finger_pin.learning import Choice
+
+    task = {"randomise": {COULOMB: Choice([drawn])}} if drawn else {}
+    scenario = fp.load_scenario("fig6", SHORT)
+    described = fp.load_scenario("fig6", SHORT | {"finger.joints.medial.link.mass": 0.2, COULOMB: 0.3})
+    expected = learned(described, **task)
+    assert (expected != learned(scenario, **task)).any()
+    for given in (heavy, heavy.description):
+        same(learned(scenario, finger=given, **task), expected)
+
+
+def test_rows_of_ones_own_stay_where_numbers_of_an_environment_are_drawn():
+    """A spring that pulls the medial joint, as the simulator has it."""
+    from finger_pin.learning import Choice
+
+    def slopes(row, p, signals):
+        return (-p[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 6
+
+    law = fp.Law(
+        "spring",
+        ("stiffness",),
+        lambda row, p: (-p[0] * row.length, 0.0 * row.length),
+        slopes,
+        lambda row, p, force, rate, signals: (p[0] * row.length**2 / 2.0,),
+    )
+    arm = np.eye(1, fp.Finger("ub").mechanism.coordinates, 2)
+    rows = [fp.Rows("spring", law, ("medial",), [[0.1]], arm)]
+    scenario = fp.load_scenario("fig6")
+    found = learned(scenario, finger=fp.Finger("ub", rows=rows), randomise={COULOMB: Choice([0.1])})
+    settings = scenario.simulation
+    changed = fp.Finger(fp.load_finger("ub", {COULOMB: 0.1}), rows=rows)
+    sim = fp.Simulator(changed, method=settings.method, rtol=settings.rtol, atol_scale=settings.atol_scale)
+    sim.reset(fp.prepare(scenario).start)
+    for each in found:
+        same(each[:4], np.float32(sim.step([1.0, 1.0, 4.0, 3.0], 0.02).position))
 
 
 def test_convergence_is_that_of_a_finger_of_ones_own(heavy):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -10,9 +9,10 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from finger_pin.description.scenario import Scenario
+from finger_pin.description.loading import ScenarioLike
 from finger_pin.learning.task import Task
 from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
+from finger_pin.mechanism.finger_like import FingerLike
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,13 +34,22 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
-    def __init__(self, scenario: Scenario | str | Path, *, render_mode: str | None = None, **task: Any) -> None:
+    def __init__(
+        self,
+        scenario: ScenarioLike,
+        *,
+        finger: FingerLike | None = None,
+        render_mode: str | None = None,
+        **task: Any,
+    ) -> None:
         """Prepare a scenario for episodes.
 
         Args:
             scenario: What is simulated: from `load_scenario`, or the name of one, or the path of a file. Its controller
                 and reference do not act; the reference's start is where episodes begin. Its tolerances are those of
                 the motion.
+            finger: Replaces the finger that the scenario describes, as for `fp.simulate`, and its objects where it is
+                built already; what is drawn changes both.
             render_mode: ``"rgb_array"`` for pictures, or None.
             task: The fields of `Task`:
 
@@ -71,7 +80,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             InputError: Naming the argument, key or variable that is wrong.
         """
         self.task, self.render_mode = Task(**task), read_render_mode(render_mode)
-        self._worlds = Worlds(scenario, self.task, 1)
+        self._worlds = Worlds(scenario, self.task, 1, finger)
         self.observation_space, self._actions = self._worlds.spaces()
         self.action_space = self._actions
         self._begun = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from finger_pin.description.scenario import Scenario
+from finger_pin.description.loading import ScenarioLike
 from finger_pin.exceptions import InputError
 from finger_pin.learning.task import Task
 from finger_pin.learning.worlds import Worlds, read_actions, read_render_mode
+from finger_pin.mechanism.finger_like import FingerLike
 
 
 class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
@@ -27,13 +27,20 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     """
 
     def __init__(
-        self, num_envs: int, scenario: Scenario | str | Path, *, render_mode: str | None = None, **task: Any
+        self,
+        num_envs: int,
+        scenario: ScenarioLike,
+        *,
+        finger: FingerLike | None = None,
+        render_mode: str | None = None,
+        **task: Any,
     ) -> None:
         """Prepare worlds.
 
         Args:
             num_envs: How many.
             scenario: As for `Environment`.
+            finger: As for `Environment`.
             render_mode: As for `Environment`.
             task: As for `Environment`.
 
@@ -43,7 +50,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InputError("num_envs", "must be a whole number above 0", num_envs)
         self.task, self.num_envs, self.render_mode = Task(**task), int(num_envs), read_render_mode(render_mode)
-        self._worlds = Worlds(scenario, self.task, self.num_envs)
+        self._worlds = Worlds(scenario, self.task, self.num_envs, finger)
         self.single_observation_space, self._single = self._worlds.spaces()
         self.single_action_space = self._single
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)

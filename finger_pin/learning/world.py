@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.family import Family
-from finger_pin.description.loading import load_scenario
+from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
@@ -29,6 +28,7 @@ from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
 from finger_pin.views.viewer.video import draw_picture
@@ -56,10 +56,15 @@ class World:
     """
 
     def __init__(
-        self, family: Family, task: Task, randomisation: Randomisation, origin: ClosedLoop | None = None
+        self,
+        family: Family,
+        task: Task,
+        randomisation: Randomisation,
+        finger: Finger | None,
+        origin: ClosedLoop | None = None,
     ) -> None:
         """Build the scenario, unless another world's loop serves; use `of` or `twin`."""
-        self.task, self._family, self._randomisation = task, family, randomisation
+        self.task, self._family, self._randomisation, self._given = task, family, randomisation, finger
         self.drawn: dict[str, Any] = {}
         self.context: dict[str, Array] = {}
         self.sensors: dict[str, Sensor] = {}
@@ -70,21 +75,26 @@ class World:
         self.stepper = self._stepper_at(self.origin.initial_state(), self._bindings)
 
     @classmethod
-    def of(cls, scenario: Scenario | str | Path, task: Task) -> World:
-        """Return a world of a scenario.
+    def of(cls, scenario: ScenarioLike, task: Task, finger: FingerLike | None = None) -> World:
+        """Return a world of a scenario, with another finger in place of its own if one is given.
 
         Raises:
             InputError: Naming the key or variable that is wrong.
         """
-        scenario = load_scenario(scenario)
+        given = load_scenario(scenario)
+        own = own_finger(finger, given)
+        scenario = _with_parts(given, own)
         if scenario.simulation.method not in TABLEAUS:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)
+        for key in randomisation.keys if _is_other_hand(own, scenario) else ():
+            if key.startswith("hand."):
+                raise InputError("randomise", "does not act: the hand that was given is not the scenario's", key)
         family = Family(scenario, randomisation.keys)
         for values in randomisation.ends():
             # What cannot be drawn is said now, not at the hundredth reset.
             family.at(values)
-        world = cls(family, task, randomisation)
+        world = cls(family, task, randomisation, own)
         known = known_variables(world.origin)
         for name in task.variables:
             if name not in known:
@@ -97,7 +107,7 @@ class World:
     def twin(self) -> World:
         """Return another world of the same scenario and task; all share what no reset draws anew."""
         origin = None if self._randomisation.keys else self.origin
-        return World(self._family, self.task, self._randomisation, origin)
+        return World(self._family, self.task, self._randomisation, self._given, origin)
 
     @property
     def rebuilt(self) -> bool:
@@ -107,8 +117,14 @@ class World:
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
         """Build what moves, under inputs that are held."""
         if origin is None:
-            known = self._nominal and self._nominal[0].changed(scenario.finger, scenario.environment.objects)
-            origin = ClosedLoop.from_scenario(scenario, finger=known).compiled(self._bindings)
+            finger = self._given
+            if self._nominal is not None:
+                known = self._nominal[0].description
+                described = known if _is_other_hand(self._given, self._family.scenario) else scenario.finger
+                finger = self._nominal[0].changed(described, scenario.environment.objects)
+                if finger.layout.names != self._nominal[0].layout.names:
+                    raise InputError("randomise", "must keep what the state consists of", self.drawn)
+            origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled(self._bindings)
         self._scenario, self.origin = scenario, origin
         finger, family = self.origin.finger, self._family.scenario
         # Drives know what the scenario says, not what was drawn.
@@ -262,3 +278,16 @@ class World:
         limiter, body = self.origin.finger.stroke_limiter, self.origin.finger.rigid_body
         corners = np.array([limiter.lower, limiter.upper, 0.5 * (limiter.lower + limiter.upper)])
         return np.array([body.tip_position(corner) for corner in corners]).reshape(-1, 3)
+
+
+def _with_parts(scenario: Scenario, finger: Finger | None) -> Scenario:
+    """Return a scenario with the description and the objects of the finger that replaces its own."""
+    if finger is None:
+        return scenario
+    environment = scenario.environment.model_copy(update={"objects": finger.made_of[2]})
+    return described_by(scenario, finger).model_copy(update={"environment": environment})
+
+
+def _is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
+    """Return whether a hand is given that the scenario does not describe."""
+    return finger is not None and scenario.hand is not None and finger.description != scenario.finger

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,14 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from finger_pin.core.stepping.batch import RESTING, Together
+from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.learning.instant import SideBySide, known_variables
 from finger_pin.learning.sensors import measurements
 from finger_pin.learning.task import Task
 from finger_pin.learning.world import World
+from finger_pin.mechanism.finger_like import FingerLike
 
 _Places = NDArray[np.int64]
 
@@ -30,13 +30,13 @@ class Worlds:
         each: The worlds.
     """
 
-    def __init__(self, scenario: Scenario | str | Path, task: Task, count: int) -> None:
+    def __init__(self, scenario: ScenarioLike, task: Task, count: int, finger: FingerLike | None) -> None:
         """Build them.
 
         Raises:
             InputError: Naming the key or variable that is wrong.
         """
-        first = World.of(scenario, task)
+        first = World.of(scenario, task, finger)
         self.task, self.each = task, [first, *(first.twin() for _ in range(count - 1))]
         loops, actions = [world.origin for world in self.each], [world.action for world in self.each]
         self._now = SideBySide.of(loops, actions, task.variables, apart=first.rebuilt)

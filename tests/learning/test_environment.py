@@ -46,6 +46,12 @@ def test_a_step_moves_the_finger_as_the_simulator_does():
     np.testing.assert_array_equal(observation, np.float32([*state.position, *state.velocity]))
 
 
+def test_numbers_that_would_make_another_state_are_refused_when_an_environment_is_made():
+    """A plate that rests has no state, and one that is led has."""
+    with pytest.raises(fp.InputError, match="what the state consists of"):
+        Environment("press", reward=nothing, randomise={"environment.objects.plate.path.z.phase": Uniform(0.0, 1.0)})
+
+
 def test_an_action_arrives_after_its_delay():
     environment = Environment(FIG6, reward=nothing, delay=0.005)
     environment.reset(seed=0)
