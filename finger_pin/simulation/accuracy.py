@@ -72,7 +72,7 @@ class Attempt:
         scenario: With the tolerances that it took.
         trajectory: Its solution.
         result: What was recorded of it.
-        left: Which share of all energy exchanged its account leaves open.
+        left: Which share of the energy its account leaves open (`left_open`).
         coarser: What it replaces, if it is a repetition.
     """
 
@@ -115,7 +115,7 @@ def close_account(
         result.attrs |= {name: getattr(tighter.simulation, name) for name in TOLERANCES}
         result.attrs["repeated"] = (
             f"repeated at rtol {tighter.simulation.rtol:g}: at {settings.rtol:g} the energy account closes only to "
-            f"{first.left:.2g} of the energy exchanged"
+            f"{first.left:.2g} of {_compared(result)}"
         )
         run = Attempt(tighter, other, result, left_open(result), run.trajectory)
     # Of a power that is booked wrong, say, the tolerances know nothing.
@@ -203,23 +203,29 @@ def left_open(result: xr.Dataset) -> float:
 
     Of bodies that exchange none, such as one that flies freely, it is the share of the most that is stored.
     """
-    stored, exchanged = (
-        [float(np.abs(each.values).max()) for each in entries(result, *kinds).values()]
-        for kinds in ((STORED,), (SUPPLIED, LOST))
-    )
+    stored, exchanged = _most(result, STORED), _most(result, SUPPLIED, LOST)
     residual, most = float(np.abs(result.variables["energy_residual"].values).max()), max(*stored, *exchanged)
     if not residual > _ROUNDING * most:
         return 0.0
     return residual / (sum(exchanged) or most)
 
 
-def open_account(share: float) -> str:
+def _most(result: xr.Dataset, *kinds: str) -> list[float]:
+    return [float(np.abs(each.values).max()) for each in entries(result, *kinds).values()]
+
+
+def _compared(result: xr.Dataset) -> str:
+    """Return the name of the energy of which `left_open` is a share."""
+    return "the energy exchanged" if any(_most(result, SUPPLIED, LOST)) else "the energy stored, as none is exchanged"
+
+
+def open_account(result: xr.Dataset, share: float) -> str:
     """Return the warning if an energy account leaves more than a ten thousandth open; a share from `left_open`."""
     if not share > _OPEN:
         return ""
     return (
-        f"the energy account closes only to {share:.1g} of the energy exchanged: an impact or a kink was passed too "
-        "coarsely; try a smaller simulation.rtol and atol_scale"
+        f"the energy account closes only to {share:.1g} of {_compared(result)}: an impact, a kink or a quick turn was "
+        "passed too coarsely; try a smaller simulation.rtol and atol_scale"
     )
 
 

@@ -105,7 +105,7 @@ def run(
         result.attrs["self_locking_margin"] = margin
     if np.isfinite(error):
         result.attrs["estimated_error"] = error
-    gap = "" if trajectory.failure else open_account(closed.left)
+    gap = "" if trajectory.failure else open_account(closed.result, closed.left)
     told = {"self_locking": close, "micro_damping": driving, "accuracy": inaccurate, "account": gap, "ringing": slow}
     told["own"] = own
     result.attrs |= {name: text for name, text in told.items() if text}

@@ -115,7 +115,7 @@ class Told:
         if trajectory.failure:
             reached = float(trajectory.breakpoints[-1])
             raise IntegrationError(reached, trajectory.failure, "fewer steps", result)
-        gap = open_account(left_open(result))
+        gap = open_account(result, left_open(result))
         if gap:
             result.attrs["account"] = gap
         return result

@@ -164,6 +164,25 @@ def share_left_open(result):
     return float(abs(result.energy_residual).max()) / float(sum(works))
 
 
+def test_a_body_that_flies_freely_is_told_that_its_account_is_of_what_it_stores(tmp_path):
+    """Nothing pulls, touches or weighs: a share of the energy exchanged would be one of nothing."""
+    path = tmp_path / "brick.toml"
+    path.write_text("""
+finger = {base = "planar", gravity = [0, 0, 0]}
+controller = {kind = "tensions"}
+simulation = {duration = 10, rtol = 1e-3, atol_scale = 1e-3}
+[environment.objects.brick]
+shape = "box"
+sides = [0.02, 0.04, 0.08]
+position = [0, 0, 1]
+mass = 0.1
+angular_velocity = [0.001, 5, 0]
+""")
+    with pytest.warns(fp.exceptions.AccuracyWarning, match="a body that tumbles"):
+        result = fp.simulate(path)
+    assert result.attrs["repeated"].endswith(" of the energy stored, as none is exchanged")
+
+
 def test_an_account_that_does_not_close_is_told():
     for law, tells in ((JOINT_SPRING, False), (replace(JOINT_SPRING, account=forgetful), True)):
         rows = Rows("band", law, ("medial",), np.array([[0.05], [0.0], [2e-3]]), np.eye(5)[2:3])
