@@ -128,7 +128,7 @@ def studies() -> dict[str, Study]:
     return {
         "tensions": Study(
             {},
-            TRAININGS["Reach"]._replace(steps=50_000),
+            TRAININGS["Reach"]._replace(steps=150_000),
             {_WITHOUT: friction(0.0, 0.0), _ONE: friction(1.0, 1.0), _ANEW: friction(0.25, 3.0)},
             {label: (factors, friction)},
         ),
@@ -286,7 +286,7 @@ def draw(chosen: Mapping[str, Study], trials: list[Trial], path: Path) -> None:
                 axes.fill_between(values, rows.min(axis=0), rows.max(axis=0), color=line.get_color(), alpha=0.2, lw=0)
             axes.set(xlabel=varied, ylim=(0.0, 1.02), title=f"by {name}")
         places[0].set_ylabel("episodes within 5 mm of the goal")
-        places[0].legend()
+        places[-1].legend()
         return figure
 
     save_figure(plot(), path)
