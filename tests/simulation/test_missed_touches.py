@@ -5,6 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 import finger_pin as fp
+from finger_pin.core.stepping.rosenbrock import DONE, STEP
+from finger_pin.simulation.setup import Setup
 
 SURFACE = "{ stiffness = 1e5, damping = 0.0 }"
 OBJECTS = "[environment.objects."
@@ -75,6 +77,21 @@ position = [0.3, 0.0, 0.02]
 surface = {SURFACE}
 [simulation]
 duration = 2.0
+"""
+#: A ball is dropped 1 m onto a thin plate, far from a finger at rest.
+THIN = f"""
+finger = "ub"
+{OBJECTS}plate]
+shape = "box"
+sides = [0.1, 0.1, 0.005]
+position = [30.0, 0.0, -1.0075]
+surface = {SURFACE}
+{OBJECTS}ball]
+shape = "sphere"
+radius = 0.005
+mass = 0.01
+position = [30.0, 0.0, 0.0]
+surface = {SURFACE}
 """
 
 
@@ -148,3 +165,20 @@ def test_a_body_that_flies_freely_has_an_account_that_closes(tmp_path):
         'extends = "fig6"', 'extends = "fig6"\ncontroller.gain = 0.1'
     )
     assert "account" not in result_of(tmp_path, text, duration=0.2).attrs
+
+
+def test_what_sleeps_and_is_met_and_left_within_one_step_is_met(tmp_path):
+    """A ball falls fast at a thin plate, with a step that would end far behind it, and is thrown back as fast."""
+    path = tmp_path / "case.toml"
+    path.write_text(THIN)
+    (part,) = (each for each in Setup.of(fp.load_scenario(path)).stepper().parts if len(each.objects))
+    width = len(part.tables.parents) + len(part.tables.lumps)
+    assert part.advance(0.3)[0] == DONE and np.all(part.work.paths.asleep[: part.tables.touching])
+    # Only the ball is integrated as exactly as ever, so that nothing else makes this step short.
+    exact = np.concatenate([part.objects, width + part.objects])
+    part.atol[np.setdiff1d(np.arange(len(part.atol)), exact)] = 1.0
+    part.memory[STEP] = 0.3
+    assert part.advance(0.6)[0] == DONE
+    fall, stay = np.sqrt(2.0 * 1.0 / 9.81), np.pi * np.sqrt(0.01 / 1e5)
+    up = 9.81 * (2.0 * fall + stay - 0.6)
+    assert part.x[width + part.objects[2]] == pytest.approx(up, rel=2e-3)

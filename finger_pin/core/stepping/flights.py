@@ -185,7 +185,7 @@ def survey(integration: Any, model: Any) -> float:
     It is `UNSEEN` if a contact slept that is closed at the end, or may be: it is awake now.
     """
     tables, own, rows, state = model.tables, model.work.paths, model.work.rows, model.state
-    paths, size, first = tables.paths, tables.parents.size, NOTHING
+    paths, size, first, woken = tables.paths, tables.parents.size, NOTHING, False
     trace(integration.tableau, integration.k, integration.x, state, size, own)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
@@ -198,8 +198,9 @@ def survey(integration: Any, model: Any) -> float:
                 continue
             share = _scan(integration, model, e, True)
             if share < NOTHING or own.ahead[e] < 0.0:
+                # Until it is listed again it exerts nothing, whatever else the step has met.
                 set_asleep(k, 0, own.asleep)
-                share = min(share, UNSEEN)
+                woken = True
         else:
             start, end = own.clear[e], own.out[e, 0]
             own.ahead[e] = end - KNOWN - path
@@ -213,4 +214,4 @@ def survey(integration: Any, model: Any) -> float:
         first = min(first, share)
     for j in range(size):
         state[j] = own.control[j, 4]
-    return first
+    return UNSEEN if woken else first
