@@ -122,6 +122,8 @@ def run_scenario(text, name):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, capsys):
     monkeypatch.setattr("finger_pin.views.viewer.write_animation", not_moved)
+    # The package keeps what it has found once: its own is put back as well.
+    monkeypatch.setattr("finger_pin.views.plots.draw_all", quick_figures)
     monkeypatch.setattr("finger_pin.views.plots.saving.draw_all", quick_figures)
     text, names, file = page.read_text("utf-8"), {"__name__": "__main__", "fp": fp}, ""
     for found in SHOWN.finditer(text):
