@@ -5,6 +5,7 @@ Run as a script this file is that process.
 
 import builtins
 import importlib
+import importlib.util
 import os
 import pkgutil
 import signal
@@ -55,8 +56,10 @@ def main():
 
     builtins.__import__ = imported
     package = importlib.import_module("finger_pin")
+    needs = {"finger_pin.learning.stable_baselines": "stable_baselines3"}
     for module in pkgutil.walk_packages(package.__path__, "finger_pin."):
-        if not module.name.endswith("__main__"):
+        missing = module.name in needs and importlib.util.find_spec(needs[module.name]) is None
+        if not missing and not module.name.endswith("__main__"):
             importlib.import_module(module.name)
     run = importlib.import_module("finger_pin.commands.application").run
     short = ["simulate", "fig6", "--duration", "0.02"]

@@ -147,7 +147,7 @@ def test_the_compiled_search_finds_the_piece_of_any_time_on_uneven_knots():
     random = np.random.default_rng(1)
     for power in (1, 3, 9):
         knots = np.unique(random.uniform(-1.0, 1.0, 30) ** power)
-        signal = core.Signal(np.zeros((0, 4)), knots, np.zeros((6, len(knots) - 1, 0)))
+        signal = core.SignalTable(np.zeros((0, 4)), knots, np.zeros((6, len(knots) - 1, 0)))
         for time in (*random.uniform(-1.2, 1.2, 50), *knots):
             piece, since = core._piece.py_func(signal, time)
             expected = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)

@@ -77,6 +77,8 @@ def _globals(code: CodeType, known: dict[str, Any]) -> Iterator[tuple[str, Any]]
     """Give the globals that code reads, of modules what it takes from them."""
     module = None
     for step in dis.get_instructions(code):
+        if step.opname == "EXTENDED_ARG":
+            continue
         if step.opname == "LOAD_GLOBAL" and step.argval in known:
             value = known[step.argval]
         elif step.opname in ("LOAD_ATTR", "LOAD_METHOD") and module is not None:
