@@ -98,7 +98,8 @@ def run(
     trajectory, result = closed.trajectory, closed.result
     error, inaccurate = estimate_error(scenario, closed, repeated, margin=math.inf if margin is None else margin)
     slow = ringing(loop, trajectory)
-    inaccurate = inaccurate or too_stiff(result, loop.finger, scenario.simulation.atol_scale)
+    # It says why, where an error that is large or unknown says that alone.
+    inaccurate = too_stiff(result, loop.finger, scenario.simulation.atol_scale) or inaccurate
     if inaccurate:
         warnings.warn(inaccurate, AccuracyWarning, stacklevel=5)
     if margin is not None:

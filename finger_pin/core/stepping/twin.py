@@ -18,6 +18,8 @@ from finger_pin.description.routing import Array
 
 # So many steps lie between two looks.
 _STEPS = 128
+# So many times as many may a second motion take between them.
+_MOST = 8
 # An error of more than so many tolerances, rad or m, or at any tolerance of more than that, is looked into from where
 # it was less than so large a share of that, or from so many looks ago; if it was more than another share then: of what
 # was less, most has been added by the steps themselves since.
@@ -83,7 +85,8 @@ class Twin:
         twin.memory[core.STEP] = begin.memory[core.STEP]
         sums, error, time = begin.memory[[core.DRIFT, core.OBJECT_DRIFT]], begin.drift, begin.time
         for moment in later:
-            if twin.advance(moment.time)[0] != core.DONE:
+            # What takes so much longer is no neighbour any more.
+            if twin.advance(moment.time, part.room(_MOST * _STEPS))[0] != core.DONE:
                 return
             other = difference(part, moment, twin)
             means = [max(_mean(each[places]) for each in (error, other)) for places in (part.joints, part.objects)]
