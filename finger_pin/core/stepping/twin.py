@@ -84,9 +84,10 @@ class Twin:
         twin.restart(begin.x + begin.drift, begin.attitude, begin.time)
         twin.memory[core.STEP] = begin.memory[core.STEP]
         sums, error, time = begin.memory[[core.DRIFT, core.OBJECT_DRIFT]], begin.drift, begin.time
+        # What takes so much longer is no neighbour any more.
+        room = part.room(_MOST * _STEPS)
         for moment in later:
-            # What takes so much longer is no neighbour any more.
-            if twin.advance(moment.time, part.room(_MOST * _STEPS))[0] != core.DONE:
+            if twin.advance(moment.time, room)[0] != core.DONE:
                 return
             other = difference(part, moment, twin)
             means = [max(_mean(each[places]) for each in (error, other)) for places in (part.joints, part.objects)]
