@@ -62,9 +62,8 @@ def _value(touch: Touch, p: Any) -> Any:
     level = friction * pressing
     share = level / np.maximum(np.maximum(stiffness * bend, level), floor)
     tip_1, tip_2 = share * bend_1, share * bend_2
-    # The force bends sharply where the surfaces meet, and where the contact would begin to pull. Like the force itself,
-    # this goes through both smoothly: where it is zero follows from its values on either side.
-    grip = -touch.gap * (1.0 + (np.minimum(factor, 1.0) - 1.0) * (touch.gap < 0.0))
+    # The force bends sharply where the surfaces meet, and where the contact would begin to pull.
+    grip = np.minimum(-touch.gap, factor)
     return (
         normal,
         -stiffness * tip_1,

@@ -47,9 +47,8 @@ def _seen(row: Row, p: Any) -> Any:
 
 def _value(row: Row, p: Any) -> Any:
     end, past, factor = _seen(row, p)
-    # The torque bends where the joint meets its limit, and where the limiter would begin to pull; this goes through
-    # both smoothly, as that of a contact.
-    grip = past * (1.0 + (np.minimum(factor, 1.0) - 1.0) * (past > 0.0))
+    # The torque bends where the joint meets its limit, and where the limiter would begin to pull.
+    grip = np.minimum(past, factor)
     torque = p[2] * end * past * factor * beyond(grip, row.side)
     return -torque, 0.0 * row.length, end * np.maximum(past, 0.0), grip
 

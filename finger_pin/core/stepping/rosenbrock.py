@@ -24,8 +24,6 @@ HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, OBJECT_DRIFT, BEHIND, MEMORY_S
 DONE, FULL, UNDERFLOW, NOT_FINITE, CREEPING, RUNAWAY = range(6)
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
-# A step that is cut at a kink keeps this share at least.
-_LEAST_SHARE = 0.02
 
 # So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
 WINDOW, LEAST_MEAN_STEP = 20_000, 1e-9
@@ -173,7 +171,7 @@ def advance(address: int, end: float) -> int:
     k, start, reached, drift = integration.k, integration.start, model.state, integration.drift
     size, count = x.size, tableau.nodes.size
     exponent = 1.0 / tableau.order
-    fresh, whole, dearest = True, 0.0, np.inf
+    fresh, whole = True, 0.0
     list_awake(tables, model.work.paths)
     # Right after a full record nothing has jumped.
     jumped = control.kind == HELD and memory[HELD_STEP] >= 0.0
@@ -243,14 +241,7 @@ def advance(address: int, end: float) -> int:
                 memory[CULPRIT] = -1.0
                 whole = max(whole, h)
                 # Of a touch nothing has seen the next step's end is inside, and sees it.
-                if touch < NOTHING:
-                    memory[STEP] = h * touch
-                else:
-                    # It is to end past the kink by a fiftieth of what this one did. Where that was no cheaper than
-                    # before, the kink is not where it seems.
-                    most = 1.0 if cost < 0.5 * dearest else 0.9
-                    memory[STEP] = h * min(most, max(_LEAST_SHARE, share + 0.02 * (1.0 - share)))
-                    dearest = cost
+                memory[STEP] = h * (touch if touch < NOTHING else min(0.9, max(0.1, 1.02 * share)))
                 continue
         if not error <= 1e30:
             factor = 0.1
@@ -295,7 +286,6 @@ def advance(address: int, end: float) -> int:
             memory[TIME] = end if last else time + h
             memory[LAST_STEP], memory[LAST_ERROR] = h, max(error, 1e-2)
             memory[ACCEPTED] += 1
-            dearest = np.inf
             if not last or factor < 1.0:
                 memory[STEP] = h * factor
             else:
