@@ -1,4 +1,4 @@
-"""Everything that finger_pin raises on purpose, under one root."""
+"""The exceptions and warnings of finger_pin, under one root."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FingerPinError(_Whole, Exception):
 
 
 class ScenarioWarning(UserWarning):
-    """Root of what the project warns of: a scenario that runs, but not as its author may expect."""
+    """Root of the project's warnings: a scenario that runs, but not as its author may expect."""
 
 
 class MicroDampingWarning(ScenarioWarning):
@@ -50,8 +50,8 @@ class InputError(FingerPinError, ValueError):
 
     Attributes:
         entry: Dotted name of the entry, such as ``controller.gain``.
-        value: What was given; None where the entry is missing or unknown.
-        allowed: What would be accepted.
+        value: The value given; None where the entry is missing or unknown.
+        allowed: The values that are accepted, in words.
     """
 
     def __init__(self, entry: str, allowed: str, value: Any = None) -> None:
@@ -68,8 +68,8 @@ class IntegrationError(FingerPinError, RuntimeError):
 
     Attributes:
         time: Simulated time reached, s.
-        reason: What the integrator reported.
-        advice: What to try.
+        reason: Report of the integrator.
+        advice: A remedy to try.
         result: Everything up to ``time``, or None if nothing was computed.
     """
 
@@ -93,7 +93,7 @@ class Interrupted(_Whole, KeyboardInterrupt):
     """
 
     def __init__(self, time: float, result: xr.Dataset | None = None, reached: str = "") -> None:
-        """Keep what was computed, and say how far that goes."""
+        """Keep the part that was computed, and say how far it goes."""
         self.time = time
         self.result = result
         super().__init__(f"interrupted {reached or f'at t = {time:.6g} s'}")
@@ -103,7 +103,7 @@ class StudyError(FingerPinError):
     """Every run of a study failed.
 
     Attributes:
-        result: What the study returns otherwise, with the reason of every run.
+        result: The study's usual result, with the reason of every run.
     """
 
     def __init__(self, reason: str, result: xr.Dataset) -> None:

@@ -28,7 +28,7 @@ def publish(stage: Path, folder: Path, earlier: Callable[[], Iterable[str]]) -> 
 
     Args:
         stage: A folder inside the other one, on the same file system; the set is below ``stage / NEW``. Gone after it.
-        folder: Where the files go.
+        folder: Folder of the files.
         earlier: Lists the names, relative to the folder, that the earlier set has.
 
     Raises:

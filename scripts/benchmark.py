@@ -87,7 +87,7 @@ def stage(name: str) -> Any:
 
 
 def surroundings() -> dict[str, Any]:
-    """Return what the times depend on besides the code."""
+    """Return the circumstances of the times: processor, system, versions."""
     versions = {}
     for name in PACKAGES:
         try:

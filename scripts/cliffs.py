@@ -21,7 +21,7 @@ SLOW, OPEN = 20.0, 1e-5
 
 @dataclass(frozen=True)
 class Run:
-    """How one finger went: processor time, s, steps, residual over the energy exchanged, and why it ended early."""
+    """The run of one finger: processor time, s, steps, residual over the energy exchanged, cause of an early end."""
 
     seed: int
     seconds: float

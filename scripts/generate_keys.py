@@ -88,7 +88,7 @@ _FILE_KEYS = {
 
 
 def _models(annotation: Any, path: str) -> Iterator[tuple[type[Description], str]]:
-    """Yield the models in a type, with what stands between an entry and theirs."""
+    """Yield the models in a type, each with the keys between an entry and its own."""
     if inspect.isclass(annotation) and issubclass(annotation, Description):
         yield annotation, path
         return

@@ -27,17 +27,17 @@ _TIGHTER, _TIGHTEST, _AGREES = 1e-3, 1e-10, 0.1
 
 @dataclass(frozen=True)
 class Judged:
-    """How well a run judged itself.
+    """The error that a run estimated of itself, and its true one.
 
     Attributes:
         family: Which scenarios it is of.
         seed: Which of them.
-        tolerance: What was asked for.
+        tolerance: Tolerance asked for.
         error: The true one, rad or m rms; not a number where no tolerance gives the truth.
         estimate: The run's own; not a number where it says that it cannot judge.
-        steps: How many.
+        steps: Number of steps.
         seconds: Processor time of the run, s.
-        said: What it said of its accuracy, or why it ended early.
+        said: Its verdict on its accuracy, or the cause of an early end.
     """
 
     family: str
@@ -56,7 +56,7 @@ class Judged:
 
 
 def difference(one: xr.Dataset, other: xr.Dataset) -> float:
-    """Return how far two runs are apart as estimates count it: of joints or of objects, whichever is more, rms."""
+    """Return the distance of two runs as estimates count it: of joints or of objects, whichever is more, rms."""
     found = float(np.sqrt(np.mean((one.joint_position.values - other.joint_position.values) ** 2)))
     if "object_position" not in one:
         return found

@@ -1,4 +1,4 @@
-"""How often 95 % intervals hold the truth: identification of made-up recordings, whose numbers are known.
+"""Coverage of 95 % intervals: identification of made-up recordings, whose numbers are known.
 
 Steady readings come from the capstan law with a drag, with a wrong zero of the load cell and noise. Motions come from
 the same canal on a drum with a spring, integrated by scipy: bristles of the tendon, a load cell that tells late, and
@@ -75,11 +75,11 @@ def held(
     truths: list[tuple[float, float]],
     seed: int = 0,
 ) -> np.ndarray:
-    """Return which intervals hold the truth, shape (count, p).
+    """Return whether each interval holds the truth, shape (count, p).
 
     Args:
         count: Of data sets.
-        make: What makes one.
+        make: Function that makes one.
         recording: As in a file.
         bounds: Of the parameters, by key.
         truths: Between which numbers the truth of each is drawn.

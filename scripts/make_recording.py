@@ -16,7 +16,7 @@ def to_and_fro() -> Made:
 
 
 def weights() -> Made:
-    """Return readings of a servo that lifts weights and lets them down: what its torque pays for, written out."""
+    """Return readings of a servo that lifts weights and lets them down, by its torque balance written out."""
     radius, gravity, constant, dry, viscous, lifting, lowering = 0.008, 9.80665, 0.37, 0.012, 4.6e-3, 0.22, 0.08
     weight, speed, way = (
         each.ravel()

@@ -23,13 +23,13 @@ COLUMNS = ("steps", "seconds", "reward")
 
 
 class Training(NamedTuple):
-    """How a task is learned.
+    """The settings of a training.
 
     Attributes:
         steps: Control steps of all worlds together.
         rollout: Steps of each world between improvements of the policy.
         spread: Logarithm of the first standard deviation of actions, over half their range.
-        discount: What a reward counts a step later.
+        discount: Worth of a reward a step later.
     """
 
     steps: int
@@ -43,11 +43,11 @@ TRAININGS["Grasp"] = Training(80_000, 50, -2.0)
 
 
 class Goal(NamedTuple):
-    """When a task is solved: an observed error is small, on average over the last part of an episode, `_LAST`.
+    """The criterion of a solved task: a small observed error, averaged over the last part of an episode, `_LAST`.
 
     Attributes:
         columns: Of the observation, where the error stands.
-        within: How small, SI.
+        within: Largest error of a solved episode, SI.
         scale, unit: To print it.
     """
 
@@ -66,7 +66,7 @@ _LAST = 0.25
 
 
 class Found(NamedTuple):
-    """What a policy does in new episodes: mean reward per step, part that is solved, median of the last error."""
+    """The scores of a policy in new episodes: mean reward per step, share solved, median of the last error."""
 
     reward: float
     solved: float
@@ -103,7 +103,7 @@ def train(
 
 
 class Policy:
-    """A policy and how it was trained.
+    """A policy and its training.
 
     Attributes:
         model: Of stable-baselines3.
@@ -129,10 +129,10 @@ class Policy:
         """Return a policy that has made some steps, of which those that a folder has kept count.
 
         Args:
-            folder: Where it is kept, again and again.
+            folder: Folder in which it is kept, again and again.
             task: Name.
-            training: How it is learned.
-            worlds: How many.
+            training: Settings of the training.
+            worlds: Number of worlds.
             seed: Of everything that is drawn.
             restart: Whether to forget what the folder has kept.
             fields: Of the task, in place of its own.
@@ -170,11 +170,11 @@ class Policy:
         return cls(model, folder)
 
     def evaluate(self, task: str, episodes: int, **fields: Any) -> Found:
-        """Return how the policy does in new episodes, without exploration.
+        """Return the scores of the policy in new episodes, without exploration.
 
         Args:
             task: Name.
-            episodes: How many, with the same seeds at every call.
+            episodes: Number of episodes, with the same seeds at every call.
             fields: Of the task, in place of its own.
         """
         from stable_baselines3.common.vec_env import VecNormalize
@@ -215,7 +215,7 @@ def build_worlds(task: str, count: int, **fields: Any) -> Any:
 
 
 def build_keeper(curve: list[tuple[float, ...]], kept: list[Path]) -> Any:
-    """Return what keeps policy and curve now and then, and says how far it is."""
+    """Return the callback that keeps policy and curve now and then, and prints progress."""
     from stable_baselines3.common.callbacks import BaseCallback
 
     class Keeper(BaseCallback):

@@ -1,4 +1,4 @@
-"""What policies know of friction, slack and servos: trained without, at one, and with them drawn anew; then tried."""
+"""Transfer of policies over friction, slack and servos: trained without, at one value, or with them drawn anew."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def friction(low: float, high: float) -> dict[str, Any]:
 
 
 def slack(low: float, high: float) -> dict[str, Any]:
-    """Return the distribution of how much longer tendons are than servos are told, mm."""
+    """Return the distribution of the tendons' length beyond the one that servos assume, mm."""
     from finger_pin.learning import Uniform
 
     return {_PRETENSION: Uniform(_TOLD - _STIFFNESS * high, _TOLD - _STIFFNESS * low)}
@@ -83,7 +83,7 @@ def gain(low: float, high: float) -> dict[str, Any]:
 
 
 class Study(NamedTuple):
-    """Policies, and what they are tried on.
+    """Policies, and the numbers that they are tried on.
 
     Attributes:
         task: Fields of Reach, in place of its own.
@@ -146,16 +146,16 @@ def studies() -> dict[str, Study]:
 
 
 class Trial(NamedTuple):
-    """How a policy did.
+    """A policy tried at one value of a number, and its score.
 
     Attributes:
         driven: The study.
-        trained: On what.
-        seed: Of the training.
-        steps: Of the training.
-        varied: What was varied.
-        value: Of that.
-        episodes: How many were tried.
+        trained: Friction that it was trained on.
+        seed: Seed of the training.
+        steps: Steps of the training.
+        varied: Key of the varied number.
+        value: Its value.
+        episodes: Number of episodes tried.
         solved: The part of them that ended within 5 mm.
     """
 
@@ -249,7 +249,7 @@ class _Tried(NamedTuple):
 
 
 def _solved(trials: list[Trial], *which: str) -> tuple[Any, Any]:
-    """Return values and what was solved there by each seed, shapes (k,) and (seeds, k)."""
+    """Return values and the share solved there by each seed, shapes (k,) and (seeds, k)."""
     own = [trial for trial in trials if (trial.driven, trial.varied, trial.trained) == which]
     seeds = dict.fromkeys(trial.seed for trial in own)
     rows = [[trial.solved for trial in own if trial.seed == seed] for seed in seeds]

@@ -69,7 +69,7 @@ def chosen(names: str) -> tuple[str, ...]:
 
 
 def measured(names: tuple[str, ...]) -> tuple[Family, ...]:
-    """Return what the named families of checks found; on a terminal, show how far it is."""
+    """Return the results of the named families of checks; on a terminal, show progress."""
     from validation.check import Section, failed
     from validation.progress import bar
     from validation.report import Family

@@ -1,4 +1,4 @@
-"""Statics: what a finger can do, without a run. Self-locking, fingertip forces, and how good (17) is.
+"""Statics, without a run: self-locking, fingertip forces, equilibria, and the error of (17).
 
 It reads descriptions, fingers, scenarios and results, and nothing of the simulation.
 """

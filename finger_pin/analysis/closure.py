@@ -50,7 +50,7 @@ class ClosureRange(BriefRepr):
         return np.asarray(self.positions[np.argmin(self.margin)])
 
     def __str__(self) -> str:
-        """Say in one line whether it holds, and where it is least or lost."""
+        """Return a sentence: whether there is force closure, and the posture where it is least or lost."""
         where = ", ".join(f"{name} {angle:.3g}" for name, angle in zip(self.joints, self.worst, strict=True))
         if self.holds:
             return f"force closure everywhere, tensions differ at most {1 / self.margin.min():.3g}-fold, at {where}"

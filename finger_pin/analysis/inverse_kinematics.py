@@ -30,7 +30,7 @@ class TipPosture(BriefRepr):
 
     Attributes:
         position: theta, shape (n,), rad.
-        tip: Where the fingertip is, shape (3,), m, base frame.
+        tip: Position of the fingertip, shape (3,), m, base frame.
         distance: From the point, m.
     """
 

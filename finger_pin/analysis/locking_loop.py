@@ -55,7 +55,7 @@ _TURNS = 12
 
 @dataclass(frozen=True, eq=False)
 class FrictionLoop:
-    """The loop of a finger in matrices; cells first, then what a cell's f = V tau needs.
+    """The matrices of a finger's friction loop, from torques to tensions and back.
 
     Attributes:
         command: f_hat = command[i] @ tau where tendon i attains the maximum of (22), shape (t, t, n).

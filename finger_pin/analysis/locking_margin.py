@@ -35,7 +35,7 @@ class SelfLockingMargin(BriefRepr):
     Attributes:
         margin: Factor by which every M^c could be raised until the finger locks somewhere on its reference; infinite
             where nothing moves or nothing locks.
-        time: Where the margin is least, s.
+        time: Time of the least margin, s.
         position: theta^d there, shape (n,), rad.
         directions: Directions of the joints there, shape (n,).
     """
@@ -115,7 +115,7 @@ def self_locking_margin(
 def _within_reach(
     scenario: Scenario, loop: FrictionLoop, position: Array, weights: Array, sliding: Array, critical: Array
 ) -> Array:
-    """Return the scale of joint friction, shape (m,), up to which motors can pull what moves the finger slowly.
+    """Return the scale of joint friction, shape (m,), up to which motors can move the finger slowly.
 
     Where that is close to the critical scale, it is the critical one.
     """

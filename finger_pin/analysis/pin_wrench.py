@@ -1,4 +1,4 @@
-"""The whole force and moment on the pin of every joint: what (17) approximates.
+"""The whole force and moment on the pin of every joint, which (17) approximates.
 
 Cut a joint open and free everything that it carries. On it act its weight, the fingertip force F, the tendons that
 cross the cut, each with its tension along its path, and the pin. Newton and Euler give what the pin must exert:
@@ -79,7 +79,7 @@ def pin_wrench(
         acceleration: theta'', shape (m, n), rad/s2.
         strands: f, shape (m, s), N.
         fingertip_force: F, shape (3,) or (m, 3), N, base frame.
-        groove: What the grooves are part of.
+        groove: Link that the grooves are part of.
 
     Raises:
         InputError: If a joint carries no link.

@@ -28,7 +28,7 @@ class ForcePolytope(BriefRepr):
     Attributes:
         position: theta, shape (n,), rad.
         tip: Fingertip, shape (3,), m, base frame.
-        friction: What was assumed of friction.
+        friction: Part of friction in it.
         basis: Orthonormal directions that the set spans, shape (3, r), base frame: r = 3 for a body, 2 for a polygon,
             as of a finger whose two joints are parallel, 1 for a line, as of a finger of one joint.
         vertices: Shape (v, 3), N, base frame.
@@ -48,7 +48,7 @@ class ForcePolytope(BriefRepr):
     offsets: Array
 
     def contains(self, force: Sequence[float] | Array, tolerance: float = 1e-6) -> bool:
-        """Return whether a force, shape (3,), N, lies in the set; what the structure carries of it does not count."""
+        """Return whether a force, shape (3,), N, lies in the set, apart from the part that the structure carries."""
         return bool(np.all(self.normals @ np.asarray(force, dtype=float) <= self.offsets + tolerance))
 
     def support(self, direction: Sequence[float] | Array) -> float:

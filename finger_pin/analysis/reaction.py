@@ -138,7 +138,7 @@ def joint_reactions(result: xr.Dataset) -> JointReactions:
     """Return the reactions by (17) and in full along a result.
 
     Args:
-        result: What `simulate` returned, of a finger whose joints all carry links.
+        result: Dataset of `simulate`, of a finger whose joints all carry links.
 
     Raises:
         InputError: If something is missing in the result, or a joint carries no link.

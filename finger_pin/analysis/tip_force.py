@@ -1,4 +1,4 @@
-"""One fingertip force: how large along a direction, and what tension it needs."""
+"""One fingertip force: its largest size along a direction, and the tensions that it needs."""
 
 from __future__ import annotations
 

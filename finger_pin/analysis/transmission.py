@@ -63,7 +63,7 @@ class TransmissionInMotion(BriefRepr):
     Attributes:
         curvature: phi, rad.
         ratio: f / f^a; of a passive tendon f5_4 / f5_3.
-        settled: What steady sliding at this posture and speed would deliver.
+        settled: Share that steady sliding at this posture and speed would deliver.
         sliding: Whether the tendon has slid far enough since its last reversal for that to be comparable.
         direction: Sign of v: 1 towards the actuator.
     """

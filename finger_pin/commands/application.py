@@ -49,7 +49,7 @@ COMMANDS = (
 
 
 def run(name: str | None = None, arguments: Sequence[str] | None = None) -> int:
-    """Do what a command line says; return the exit code.
+    """Run a command line; return the exit code.
 
     0: done. 1: results cannot be written or drawn. 2: the input is wrong. 3: the integration failed. 130: interrupted.
 
@@ -61,7 +61,7 @@ def run(name: str | None = None, arguments: Sequence[str] | None = None) -> int:
 
 
 def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] | None = None) -> int:
-    """Do what a command line for one function says, or without it one that begins with a command; as `run`."""
+    """Run a command line for one function, or for any command where none is given; return the exit code."""
     program = "finger-pin" if function is None else f"{function.__name__}.py"
     given = list(sys.argv[1:] if arguments is None else arguments)
     app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=False, rich_markup_mode=None)
@@ -78,7 +78,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
 
 
 def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
-    """Return a command that prints what stopped it in one line, with all notes, and returns an exit code."""
+    """Return a command that prints an exception in one line, with all notes, and returns an exit code."""
 
     @wraps(command)
     def told(*arguments: Any, **options: Any) -> int:

@@ -43,7 +43,7 @@ def conclusions(
     format: Format = None,
     quiet: Quiet = False,
 ) -> None:
-    """Put the paper's three conclusions to the test: figures, and a table of what was claimed, measured and found."""
+    """Put the paper's three conclusions to the test: figures, and a table of claims, measurements and verdicts."""
     shown = talks(quiet)
     from finger_pin.description.hand import one_finger
     from finger_pin.description.loading import load_scenario

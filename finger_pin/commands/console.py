@@ -114,7 +114,7 @@ def complain(program: str, message: str) -> None:
 
 @contextmanager
 def noted(note: str) -> Iterator[None]:
-    """Add a note to any exception raised meanwhile, such as where finished work is."""
+    """Add a note to any exception raised meanwhile, such as the folder of finished work."""
     try:
         yield
     except BaseException as error:

@@ -65,7 +65,7 @@ def runs(shown: bool) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def note(rows: list[Comparison]) -> str:
-    """Say in words what stays of the error once friction is compensated, and why."""
+    """Return a sentence on the error that stays once friction is compensated, and its cause."""
     row = next(each for each in rows if each.name == DRAWN[1])
     share, tension = (row.passive_error / row.error) ** 2, " and ".join(f"{each:.1f}" for each in row.passive_tension)
     return (

@@ -61,7 +61,7 @@ def export(
 
 
 def described(source: str, settings: list[str]) -> FingerDescription | HandDescription | Scenario:
-    """Return the finger, hand or scenario of a name, or of what stands in a file."""
+    """Return the finger, hand or scenario of a name or a file."""
     from finger_pin.description.loading import list_fingers, list_hands, load_finger, load_hand, load_scenario
 
     changed, tables = overrides(settings), {"joints", "tendons", "base", "fingers"}

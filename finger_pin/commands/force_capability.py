@@ -1,4 +1,4 @@
-"""The command force-capability: what a fingertip can push."""
+"""The command force-capability: the forces that a fingertip can exert."""
 
 from __future__ import annotations
 

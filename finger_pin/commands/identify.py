@@ -1,4 +1,4 @@
-"""The command identify: find the numbers of a scenario in what was recorded, and say how sure they are."""
+"""The command identify: find the numbers of a scenario in recordings, with intervals."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def identify(
     quiet: Quiet = False,
     listed: Annotated[bool, typer.Option("--list", help="List the benches that ship, and exit.")] = False,
 ) -> None:
-    """Find the numbers of a scenario in what was recorded, and say how sure they are.
+    """Find the numbers of a scenario in recordings, with intervals.
 
     BENCH has a table [identify]: which numbers, and which columns of which files. The same command again goes on where
     an earlier one was interrupted. For example: identify transmission

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take, and how their text is read."""
+"""Arguments and options of several commands, and the readers of their text."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def number(option: str, text: str | float, *, positive: bool = False) -> float:
 
 
 def folder_name(name: str, *variants: str) -> str:
-    """Return the name of a folder for a scenario and what is changed of it.
+    """Return the name of a folder for a scenario and its changes.
 
     Args:
         name: Of the scenario, or of a study on it.

@@ -1,4 +1,4 @@
-"""The command reaction: how good the joint reaction (17) is along a scenario."""
+"""The command reaction: the error of the joint reaction (17) along a scenario."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def reaction(
     format: Format = None,
     quiet: Quiet = False,
 ) -> None:
-    """Measure how good the joint reaction (17) is along a scenario: against weight, inertia and tendons' real paths."""
+    """Measure the error of the joint reaction (17) along a scenario: weight, inertia and tendons' real paths."""
     changed, shown = overrides(settings), talks(quiet)
     sizes = numbers("--forces", forces) if forces else []
     import numpy as np

@@ -37,7 +37,7 @@ def reproduce(output: Output = Path("results/paper"), format: Format = None) -> 
 
 
 def comparison(result: xr.Dataset) -> list[str]:
-    """Return lines with the largest tracking errors and the ranges of the tensions, beside what is expected."""
+    """Return lines with the largest tracking errors and the ranges of the tensions, beside those expected."""
     import numpy as np
 
     settled = result.sel(time=slice(SETTLED, None))

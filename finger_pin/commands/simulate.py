@@ -86,7 +86,7 @@ def simulate(
 
 
 def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
-    """Return a scenario that moves the hand of a MuJoCo model, and say what of the model is not carried over."""
+    """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
     from finger_pin.description.exercise import exercise
     from finger_pin.description.loading import read_scenario
     from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
@@ -99,7 +99,7 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
 
 
 def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
-    """Return the name of the folder of results: the scenario's, and of what was overridden besides it."""
+    """Return the name of the folder of results: the scenario's, and its overrides."""
     short = [f"{name}={text}" for name, text in (("duration", duration), ("method", method)) if text is not None]
     return folder_name(scenario.name, *(each for each in settings if each.partition("=")[0].strip() != "name"), *short)
 
@@ -107,7 +107,7 @@ def default_name(scenario: Scenario, settings: list[str], duration: str | None, 
 def compute(
     scenario: Scenario, interrupts: Interrupts, quiet: bool, live: bool, check: bool
 ) -> tuple[xr.Dataset | None, BaseException | None]:
-    """Return the result as far as it goes, with its convergence if asked, and what stopped it if anything did."""
+    """Return the result as far as it goes, its convergence if asked, and the exception that stopped it, or None."""
     from finger_pin.simulation.convergence import check_convergence
     from finger_pin.simulation.running import run
 
@@ -141,7 +141,7 @@ def compute(
 def draw(
     result: xr.Dataset, folder: ResultFolder, interrupts: Interrupts, figures: bool, format: str | None
 ) -> BaseException | None:
-    """Draw animation and figures, all or none; return what went wrong if anything did."""
+    """Draw animation and figures, all or none; return the exception that prevented it, or None."""
     try:
         if interrupts.requested:
             # After an interruption the data are kept, and the views are not drawn: that takes too long.

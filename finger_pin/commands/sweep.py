@@ -1,4 +1,4 @@
-"""The command sweep: run a scenario at many points, measure every run, and draw what came out."""
+"""The command sweep: run a scenario at many points, and draw the metrics of the runs."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def sweep(
     quiet: Quiet = False,
     listed: Annotated[bool, typer.Option("--list", help="List metrics, and exit.")] = False,
 ) -> None:
-    """Run a scenario at many points, measure every run, and draw what came out.
+    """Run a scenario at many points, and draw the metrics of the runs.
 
     The same command again continues where an earlier one ended, however it ended. For example:
 

@@ -1,4 +1,4 @@
-"""Controllers: from a desired motion to tensions, by the paper's (19)-(22) and by what adds to it.
+"""Controllers: from a desired motion to tensions, by the paper's (19)-(22) and by additions to it.
 
 A torque law (`TorqueLaw`), the friction of joints (`JointCompensation`) and tendons (`TendonFeedforward`), the
 distribution over tendons (`PseudoInverse`, or `LimitedDistribution` of `limited_distribution`), a loop around the

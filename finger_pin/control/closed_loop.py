@@ -32,7 +32,7 @@ _Acting = tuple[Array, Array, Array | None]
 
 
 class Dynamics(Protocol):
-    """Anything that evaluates a finger: `Finger`, or the compiled core."""
+    """An evaluator of a finger: `Finger`, or the compiled core."""
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -55,7 +55,7 @@ class Dynamics(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LoopSignals:
-    """Everything at one instant or at many: what was desired, what was commanded, what the finger does."""
+    """The signals of a loop at one instant or at many: desired motion, commands, and the finger's own."""
 
     reference: ReferenceSignals
     control: ControlSignals
@@ -70,13 +70,13 @@ class ClosedLoop:
         finger: The finger.
         controller: Turns reference and motion into tensions.
         reference: The desired motion.
-        fingertip_force: F, or what is constant of it, shape (3,), of several fingers (f, 3), N, base frame.
-        dynamics: What evaluates the finger.
-        varying_force: What varies of F, three signals for each finger, N; None for nothing.
+        fingertip_force: F, or its constant part, shape (3,), of several fingers (f, 3), N, base frame.
+        dynamics: Evaluator of the finger.
+        varying_force: The varying part of F, three signals for each finger, N; None for nothing.
         start: The packed state at the start, shape (size,); None for rest on the reference.
-        drives: Of motors in position drive; None without any.
-        palm: Along which path the palm of a hand moves; None at rest.
-        guides: Along which paths objects are moved; None without any.
+        drives: Loops of motors in position drive; None without any.
+        palm: Path of the palm of a hand; None at rest.
+        guides: Paths of moved objects; None without any.
     """
 
     finger: Finger
@@ -151,7 +151,7 @@ class ClosedLoop:
         return loop
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
-        """Return the packed state at a posture, with tendons on spools stretched by what is commanded there."""
+        """Return the packed state at a posture, with tendons on spools stretched by the tensions commanded there."""
         controller, tension = self.controller.without_memory(), None
         if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
@@ -162,7 +162,7 @@ class ClosedLoop:
         return x if self.guides is None else self.guides.place(self.finger, x)
 
     def compiled(self, bindings: Bindings | None = None) -> ClosedLoop:
-        """Return the same loop, whose finger is evaluated by the compiled core, by what has served others if given."""
+        """Return the same loop on the compiled core, on bindings of earlier loops if given."""
         return replace(self, dynamics=(bindings or Bindings()).evaluating(self.finger))
 
     def initial_state(self) -> Array:
@@ -202,7 +202,7 @@ class ClosedLoop:
         return LoopSignals(reference, control, evaluate(x, *acting))
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:
-        """Return reference and plan, and what acts: inputs of the mechanism, F, the motion of palm or objects.
+        """Return reference, plan, inputs of the mechanism, F, and the motion of palm or objects.
 
         Inputs are tensions, voltages of motors in position drive, inputs of a tree.
         """

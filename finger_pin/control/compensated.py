@@ -36,7 +36,7 @@ class CompensatedController(LoopController):
         minimum: f0, shape (t,), N.
         tendons: Compensates tendon friction; None to leave it.
         joints: Compensates joint friction; None to leave it.
-        fingertip: What the fingertip is to exert besides; None for nothing.
+        fingertip: Force that the fingertip is to exert besides; None for nothing.
     """
 
     routing: Routing

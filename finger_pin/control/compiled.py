@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class Bindings:
-    """What is bound to compiled code for one finger after the other; it stays where they differ in numbers alone.
+    """Compiled code bound to one finger after the other; it stays where they differ in numbers alone.
 
     Of each finger the work is done when the next one comes.
 
     Attributes:
-        dynamics: What evaluates the finger.
-        stepper: What steps it.
+        dynamics: Evaluator of the finger.
+        stepper: Its stepper.
     """
 
     dynamics: CompiledFinger | None = None
@@ -79,13 +79,13 @@ def compiled_control(loop: ClosedLoop) -> Control | None:
 
 
 def sampled_control(loop: ClosedLoop) -> Control:
-    """Return inputs that hold what a sampled controller says, with the loop's varying force."""
+    """Return inputs that hold the commands of a sampled controller, with the loop's varying force."""
     mechanism = loop.finger.mechanism
     return with_force(held_control(mechanism.channels, mechanism.coordinates), loop)
 
 
 def with_force(control: Control, loop: ClosedLoop) -> Control:
-    """Return inputs with the path of the palm and what varies of the force at the fingertip, with its constant part."""
+    """Return inputs with the path of the palm and the force at the fingertip, its varying and its constant part."""
     if loop.palm is not None:
         control = control._replace(palm=core_signal(loop.palm.signal))
     if loop.guides is not None:

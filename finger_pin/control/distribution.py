@@ -17,7 +17,7 @@ class Plan:
 
     Attributes:
         tension: f_hat, shape (..., t), N; H_c^T f_hat is the wanted torque less the shortfall.
-        shortfall: What limits keep from being exerted, shape (..., n), N m.
+        shortfall: Torque that limits keep from being exerted, shape (..., n), N m.
         slope: df_hat / dtau while the same tendons are at their limits, shape (..., t, n), 1/m.
     """
 
@@ -27,7 +27,7 @@ class Plan:
 
 
 class TensionDistribution(Protocol):
-    """Anything that shares a torque out to tendons."""
+    """A rule that shares a torque out to tendons."""
 
     def plan(self, torque: Array, minimum: Array) -> Plan:
         """Return tensions of at least f0, shape (t,) or (..., t), for torques of shape (..., n)."""

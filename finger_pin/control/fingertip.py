@@ -13,7 +13,7 @@ from finger_pin.references.signal import Signal
 
 @dataclass(frozen=True, eq=False)
 class FingertipForce:
-    """tau = J^T F: what the fingertip exerts on what it touches, at rest and without friction.
+    """tau = J^T F, the force that the fingertip exerts on its surroundings, at rest and without friction.
 
     Where it touches nothing, the finger yields to the torque until K_P holds it.
 

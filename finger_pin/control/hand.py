@@ -53,7 +53,7 @@ class HandController(LoopController):
         return ControlSignals(torque, tension, shortfall if limited else None)
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
-        """Pass on what sensors read of each finger, with the time since the last readings, s."""
+        """Pass on the readings of each finger's sensors, with the time since the last ones, s."""
         for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
             of = {"tendon_tension": tendons, "joint_position": joints, "joint_velocity": joints}
             controller.sense({name: readings[name][places] for name, places in of.items()}, elapsed)

@@ -1,4 +1,4 @@
-"""Joint friction, (9) and (17), as a torque to add: what the tensions that cross a joint cost it."""
+"""Joint friction, (9) and (17), as a torque to add: the loss at a joint under the tensions that cross it."""
 
 from __future__ import annotations
 

@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 class LoopController(ABC):
-    """A controller in a loop: it commands, and says what those who run it have to know.
+    """A controller in a loop: its commands, its sensors, its knots, its compiled form.
 
     A new kind of controller needs `command`, and overrides what it can answer better: by default it is Python, and may
     remember what it was asked.
 
     Attributes:
-        measures: Whether it listens to sensors, by `sense`; then it has to be sampled.
-        sensors: Those of its own, besides encoders and tension sensors.
-        problem: What has gone wrong inside, or empty; the motion ends there.
+        measures: Whether it takes readings of sensors, by `sense`; then it has to be sampled.
+        sensors: Its own sensors, besides encoders and tension sensors.
+        problem: Message of an error inside, or empty; the motion ends there.
         problem_time: When, s.
     """
 
@@ -42,14 +42,14 @@ class LoopController(ABC):
         """Return the commands for shapes (..., n)."""
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:  # noqa: B027 - most do not listen
-        """Take what sensors read, by their names, ``tendon_tension`` among them, and the time since the last, s."""
+        """Take the sensors' readings, by their names, ``tendon_tension`` among them, and the time since the last, s."""
 
     def measured(self, name: str, times: Array) -> Array:
         """Return the last readings of a sensor at times (m,), shape (m,) or (m, k); of a sampled controller."""
         raise LookupError(name)
 
     def as_control(self, reference: LoopReference, finger: Finger) -> Control | None:
-        """Return it as arrays for the compiled core, with a reference; None of what is Python."""
+        """Return its arrays for the compiled core, with a reference; None if it is Python."""
         return None
 
     def signals(self) -> tuple[Signal, ...]:

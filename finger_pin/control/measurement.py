@@ -43,13 +43,13 @@ class Instant:
 
     @cached_property
     def signals(self) -> FingerSignals:
-        """Everything that the finger does; of motors in position drive without their voltages."""
+        """All signals of the finger; of motors in position drive without their voltages."""
         loop = self.loop
         return loop.dynamics.evaluate(self.x, self.tension, loop.force(self.time), loop.base(self.time))
 
 
 class SampledSensor(ABC):
-    """A sensor of a sampled controller: what it reads is recorded, and told to a controller that listens.
+    """A sensor of a sampled controller: its readings are recorded, and passed to a controller with `sense`.
 
     A controller of one's own names its own in ``sensors``. One object belongs to one simulation: it may remember.
 

@@ -1,4 +1,4 @@
-"""Objects that are moved along prescribed paths, whatever pushes them."""
+"""Objects that are moved along prescribed paths, under any load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tensions over time, whatever the finger does."""
+"""Tensions over time, in open loop."""
 
 from __future__ import annotations
 

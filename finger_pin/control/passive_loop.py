@@ -14,7 +14,7 @@ from finger_pin.references.reference import ReferenceSignals
 
 
 class PassiveTensionLoop(LoopController):
-    """Raises or lowers the internal tension until the passive tendons carry what is desired.
+    """A PI loop from the measured tension of the passive tendons to the internal tension.
 
     A passive tendon cannot be commanded; (20) only chooses an angle of the follower joint at which, free of friction
     and with the actuated tendons in balance, it would carry f5^d. Here f5^d is also planned: it is the least tension of

@@ -47,7 +47,7 @@ class DriveSignals(Protocol):
 
 @dataclass(eq=False)
 class GivenVoltages:
-    """Voltages that a caller sets, as `Simulator.step` does: nothing is planned for their tendons.
+    """Voltages that a caller sets, as `Simulator.step` does, without planned tensions.
 
     Attributes:
         channels: The inputs that are voltages, shape (m,).

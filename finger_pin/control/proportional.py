@@ -27,7 +27,7 @@ class ControlSignals:
     Attributes:
         torque: tau^d, shape (..., n), N m.
         tension: f_hat, shape (..., t), N: commands of the actuated tendons, then the planned passive tensions.
-        shortfall: What tension limits keep from being exerted of tau^d, shape (..., n), N m; None without limits.
+        shortfall: Part of tau^d beyond the tension limits, shape (..., n), N m; None without limits.
         inputs: Of the actuators of a tree, shape (..., k); None without any.
     """
 
@@ -38,7 +38,7 @@ class ControlSignals:
 
 
 class Controller(Protocol):
-    """Anything that turns references and measured motion into tendon tensions."""
+    """A controller: from references and measured motion to tendon tensions."""
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array

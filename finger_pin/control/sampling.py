@@ -24,13 +24,13 @@ _COINCIDENT = 1e-9
 class SampledController(LoopController):
     """A controller that is asked at multiples of a period, in order, and then answers for any time up to the next.
 
-    What it says at a sample acts after the delay, and holds until what it says at the next one acts. Before the first
+    Its tensions of a sample act after the delay, and are held until those of the next one act. Before the first
     arrives, it acts already.
 
     Attributes:
         period: Sampling period, s.
-        instant: When it is to act next, s: at a sample, or when tensions arrive.
-        sensors: What is read at every sample, in this order.
+        instant: Time of its next action, s: a sample, or the arrival of tensions.
+        sensors: Sensors that are read at every sample, in this order.
     """
 
     def __init__(self, loop: ClosedLoop, settings: SamplingSettings) -> None:

@@ -16,7 +16,7 @@ _MOST = 0.9
 
 
 def undivided(routing: Routing) -> Array:
-    """Return W, shape (s, t), without friction: both halves of a passive tendon carry what is planned for it."""
+    """Return W, shape (s, t), without friction: both halves of a passive tendon carry its planned tension."""
     return routing.strand_tension(np.eye(len(routing.tendons))).T
 
 
@@ -67,7 +67,7 @@ class TendonFeedforward:
         return np.concatenate([command, planned[..., actuated:]], axis=-1)
 
     def strand_matrix(self, position: Array, desired_velocity: Array) -> Array:
-        """Return W, shape (..., s, t): the tensions of the strands are W f_hat when what is planned is delivered."""
+        """Return W, shape (..., s, t): the strands' tensions are W f_hat where the plan f_hat is delivered."""
         routing = self.tendons.routing
         plain = undivided(routing)
         rows = np.arange(routing.actuated, len(plain))

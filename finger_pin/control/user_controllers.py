@@ -35,7 +35,7 @@ class OwnReference:
     Attributes:
         reference: Asked for one time, s, at a time.
         joints: Names, n of them.
-        start: What its clock shows when the simulation begins, s.
+        start: Its time when the simulation begins, s.
     """
 
     def __init__(self, reference: Reference, joints: Sequence[str], start: float) -> None:
@@ -90,12 +90,12 @@ class OwnController(LoopController):
 
     Attributes:
         controller: Asked for one time at a time: time, s, `ReferenceSignals`, theta and theta', shape (n,).
-        problem: What has gone wrong after the first answer, or empty.
+        problem: Message of an error after the first command, or empty.
         problem_time: When, s.
     """
 
     def __init__(self, controller: Controller, routing: Routing, start: float) -> None:
-        """Take a controller; ``start`` is what its clock shows when the simulation begins, s.
+        """Take a controller; ``start`` is its time when the simulation begins, s.
 
         Raises:
             InputError: If it has no ``command``.
@@ -131,7 +131,7 @@ class OwnController(LoopController):
         )
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
-        """Pass on what the sensors read; it listens."""
+        """Pass on the sensors' readings."""
         self.controller.sense(readings, elapsed)  # type: ignore[attr-defined]
 
     def _one(self, time: float, reference: ReferenceSignals, position: Array, velocity: Array) -> ControlSignals:

@@ -44,7 +44,7 @@ def given(table: Mapping[str, Description] | None) -> Any:
 
 
 def of_finger(settings: _Settings, name: str) -> _Settings:
-    """Return settings for all fingers with what the table ``fingers`` of them has for one on top.
+    """Return settings for all fingers with the entries for one, from their table ``fingers``, on top.
 
     A table of another ``kind`` replaces, rather than completes.
     """

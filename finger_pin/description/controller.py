@@ -1,4 +1,4 @@
-"""The controller as data: the paper's (19)-(22), what compensates its errors, and when it is executed."""
+"""The controller as data: the paper's (19)-(22), compensations of its errors, and its sampling."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Share = Annotated[float, real(0.0, 2.0)]
 
 
 class TendonFeedforwardSettings(Description):
-    """Tendon friction by (9) and (16), added to the commands; what is left out is as in the finger."""
+    """Tendon friction by (9) and (16), added to the commands; entries left out are those of the finger."""
 
     share: Share = quantity(1.0, unit="1", source="chosen", doc="Part of the expected friction that is compensated.")
     reversal_speed: Annotated[float, real(0.0, 10.0, above=True)] = quantity(
@@ -43,7 +43,7 @@ class TendonFeedforwardSettings(Description):
 
 
 class JointCompensationSettings(Description):
-    """Joint friction by (9) and (17), added to the torque; what is left out is as in the finger."""
+    """Joint friction by (9) and (17), added to the torque; entries left out are those of the finger."""
 
     share: Share = quantity(1.0, unit="1", source="chosen", doc="Part of the expected friction that is compensated.")
     reversal_speed: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
@@ -97,7 +97,7 @@ class SamplingSettings(Description):
 
 
 class ControllerSettings(Description):
-    """The paper's controller (19)-(22), and what is built around it where a table or entry asks for it.
+    """The paper's controller (19)-(22), with compensations and limits where a table or entry asks for them.
 
     With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
     columns are ``time`` and actuated tendons, and become samples of ``tensions``.

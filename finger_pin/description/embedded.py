@@ -20,7 +20,7 @@ class Embedded(NamedTuple):
 
     Attributes:
         finger: The finger, or all fingers of a hand together.
-        objects: Those around it, by name.
+        objects: Objects around it, by name.
     """
 
     finger: FingerDescription

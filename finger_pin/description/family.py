@@ -1,4 +1,4 @@
-"""The scenarios that differ from one in what stands at some keys."""
+"""The scenarios that differ from one in the values at some keys."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Family:
         scenario: The scenario itself.
         keys: Dotted keys, as of `load_scenario`; ``[2]`` at the end of one stands for one number of a list, a star for
             every name.
-        values: What stands there now; None where there is nothing.
+        values: Their present values; None where there is nothing.
     """
 
     def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:

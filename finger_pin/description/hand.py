@@ -89,7 +89,7 @@ class Palm(Description):
 
 
 class PlacedFinger(Description):
-    """A finger and where its base frame stands on the palm."""
+    """A finger and the place of its base frame on the palm."""
 
     finger: FingerDescription
 
@@ -216,7 +216,7 @@ class HandDescription(Description):
 
 
 def one_finger(description: FingerDescription) -> None:
-    """Raise where something is asked of a hand that only a finger has.
+    """Refuse to give a hand's fingers together for a single one.
 
     Raises:
         InputError: If it is a hand of several fingers.

@@ -140,7 +140,7 @@ def _shipped_scenario(name: str) -> Scenario:
 def load_bench(
     name: ScenarioLike, overrides: Mapping[str, Any] | None = None, identify: Mapping[str, Any] | None = None
 ) -> tuple[Scenario, IdentifySettings]:
-    """Load a scenario with its table ``[identify]``: what was recorded of it, and what is to be found.
+    """Load a scenario with its table ``[identify]``: its recordings, and the numbers to be found.
 
     Args:
         name: Name of a bench or scenario that ships, path of a TOML file, or a scenario.
@@ -165,7 +165,7 @@ def load_bench(
 
 
 def _scenario(table: Table, folder: Path, name: str, overrides: Table) -> Scenario:
-    """Return the scenario of a file's table; what is to be identified by it is none of its business."""
+    """Return the scenario of a file's table, without its table ``[identify]``."""
     table.pop("identify", None)
     table.setdefault("name", as_name(Path(name).stem))
     override(overrides, table, folder)

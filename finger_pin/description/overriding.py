@@ -103,7 +103,7 @@ def _apply(overrides: Mapping[str, Any], table: Table) -> None:
 
 
 def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
-    """Raise where an override would bring a joint, a tendon or the like into being: only a file does."""
+    """Refuse an override that would bring a joint, a tendon or the like into being: only a file does."""
     *owner, name = path
     finger = as_table(table.get("finger"))
     hand = {key: as_table(each).get("finger") for key, each in _fingers(table).items()}
@@ -150,7 +150,7 @@ def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
 
 
 def _placed(overrides: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield overrides, tables of a hand's fingers entry by entry: they go on top of what there is, as in a file."""
+    """Yield overrides, tables of a hand's fingers entry by entry: they go on top of earlier entries, as in a file."""
     for key, value in overrides.items():
         if isinstance(value, Mapping) and (key == "hand.fingers" or _PLACE.fullmatch(key)):
             yield from _placed({f"{key}.{name}": entry for name, entry in value.items()})

@@ -1,4 +1,4 @@
-"""From files to tables: what ships, a user's TOML and CSV files, and what stands on top of what."""
+"""From files to tables: shipped data, a user's TOML and CSV files, and tables on top of others."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def shipped(kind: str) -> dict[str, str]:
 
 @cache
 def _shipped_texts(kind: str) -> dict[str, str]:
-    """Return the TOML of what ships of a kind, by name."""
+    """Return the TOML texts of a kind that ship, by name."""
     entries = resources.files("finger_pin.description").joinpath(kind).iterdir()
     texts = {entry.name: entry.read_text("utf-8") for entry in entries if entry.name.endswith(".toml")}
     return {name.removesuffix(".toml"): texts[name] for name in sorted(texts)}
@@ -280,7 +280,7 @@ def suggestion(name: Any, names: Iterable[str]) -> str:
 
 
 def as_table(value: Any) -> Table:
-    """Return a table, empty for what is none: validation says what is wrong with it."""
+    """Return a value that is a table, an empty one for any other: validation refuses that by name."""
     return value if isinstance(value, dict) else {}
 
 

@@ -13,7 +13,7 @@ _MOST = 128
 
 
 class Remembered(Generic[_Made]):
-    """The latest of what was made, by what it was made of: descriptions as objects, all else by value."""
+    """The latest things made, by the parts they were made of: descriptions as objects, all else by value."""
 
     def __init__(self, most: int = _MOST) -> None:
         """Remember nothing yet, and never more than so many."""

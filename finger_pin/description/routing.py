@@ -207,7 +207,7 @@ class ForceClosure:
         return len(self.tension) > 0 and bool(np.all(self.tension > _SLACK))
 
     def __str__(self) -> str:
-        """Say in one line what holds or what is missing."""
+        """Return a sentence: force closure, or the tendons that lack it."""
         if self.holds:
             listed = ", ".join(f"{n} {f:.3g}" for n, f in zip(self.tendons, self.tension, strict=True))
             return f"force closure: internal tensions in the ratio {listed}"

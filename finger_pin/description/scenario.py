@@ -1,4 +1,4 @@
-"""A scenario: a finger, its controller and reference, what acts on it, and how it is simulated."""
+"""A scenario: a finger, its controller and reference, forces and objects around it, and the simulation's settings."""
 
 from __future__ import annotations
 
@@ -220,7 +220,7 @@ class Scenario(Description):
         )
 
     def _check_names(self) -> None:
-        """Raise where a table is for a joint or a finger that is not there."""
+        """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
@@ -242,7 +242,7 @@ class Scenario(Description):
                     raise problem(f"{table}.{name}", f"no such {what}; {listed}{hint}")
 
     def _check(self) -> None:
-        """Raise where the tables of a finger do not fit each other."""
+        """Refuse tables of a finger that do not fit each other."""
         check_controller(self.controller, self.finger)
         routing = Routing.from_description(self.finger)
         # Tensions in open loop are what they are; (22) needs some that can be raised without turning a joint.

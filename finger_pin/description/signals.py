@@ -37,7 +37,7 @@ _FORCE = real(-_MOST_FORCE, _MOST_FORCE)
 
 
 class SignalSettings(Description):
-    """offset + amplitude sin(2 pi frequency t + phase) + what ``kind`` adds.
+    """offset + amplitude sin(2 pi frequency t + phase) + the function of ``kind``.
 
     A step adds ``height`` from ``time`` on; a ramp reaches it after ``duration``. Points are joined by motions of least
     jerk that rest at every point (Flash and Hogan, J. Neuroscience 5(7), 1985); samples by monotone cubics (Fritsch and

@@ -92,7 +92,7 @@ class BodyShape(Description):
 
 
 def check_sizes(described: Any, shape: str) -> None:
-    """Refuse what lacks a size that its shape needs, or has one that it has no use for."""
+    """Refuse a shape that lacks a size that it needs, or has one that it has no use for."""
     for entry in ("radius", "length", "sides"):
         given, needed = getattr(described, entry), entry in SIZES[shape]
         if given is None and needed:

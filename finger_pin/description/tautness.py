@@ -71,7 +71,7 @@ class Tautness:
         return self.spare >= 0.0 and bool(np.all(self.minimum + self.spare > 0.0))
 
     def __str__(self) -> str:
-        """Say in one line how well the springs keep the tendons taut, and where they do so least."""
+        """Return a sentence: the excess of tension under the springs, and the posture where it is least."""
         where = ", ".join(f"{name} {angle:.3g}" for name, angle in zip(self.joints, self.posture, strict=True))
         if self.spare == -np.inf:
             return f"no tensions hold it against its springs at {where} rad"

@@ -119,7 +119,7 @@ class TreeJoint(Description):
 
 
 class TreeTendon(Description):
-    """A tendon: a sum of joint positions, or a path through space; and what acts along it."""
+    """A tendon: a sum of joint positions, or a path through space, with spring, damper and friction along it."""
 
     joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = quantity(
         None, unit="m/rad", source="design", doc="Length gained per joint position."
@@ -202,7 +202,7 @@ class Tip(Description):
 
 
 class Tree(Description):
-    """Bodies and what moves them. Parents come before their children; joints in the order of the bodies."""
+    """Bodies with their joints, tendons and actuators. Parents precede children; joints are in the bodies' order."""
 
     bodies: dict[Name, Body] = Field(min_length=1, description="By name, parents first.")
     joints: dict[Name, TreeJoint] = Field(min_length=1, description="By name, those of parents first.")

@@ -46,8 +46,8 @@ def problem(entry: str, allowed: str, value: Any = None) -> PydanticCustomError:
 
     Args:
         entry: Dotted name relative to the model, such as ``stiction``; empty for the model itself.
-        allowed: What would be accepted.
-        value: What was given.
+        allowed: The values that are accepted, in words.
+        value: The value given.
     """
     return PydanticCustomError("entry", "{allowed}", {"entry": entry, "allowed": allowed, "value": _Opaque(value)})
 
@@ -157,7 +157,7 @@ def validate(model: type[_Model], table: Any, prefix: tuple[str, ...]) -> _Model
     Args:
         model: Which description.
         table: Keys and values as TOML has them.
-        prefix: Where the table lies in the whole input, for messages.
+        prefix: Place of the table in the whole input, for messages.
 
     Raises:
         InputError: Naming the first entry that is wrong.

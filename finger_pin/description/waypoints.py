@@ -52,7 +52,7 @@ class Waypoint(Description):
 
 
 def check_path(path: dict[str, Waypoint]) -> None:
-    """Raise where a path does not begin, end and go on with points, pulleys apart."""
+    """Refuse a path that does not begin, end and go on with points, pulleys apart."""
     before: str | None = None
     for name, each in path.items():
         wraps = each.kind in ("cylinder", "sphere")
@@ -70,7 +70,7 @@ def check_path(path: dict[str, Waypoint]) -> None:
 
 
 def inside(path: dict[str, Waypoint]) -> Iterator[tuple[str, str]]:
-    """Yield points next to a wrap that the same body carries, and that they lie inside of, with the wrap."""
+    """Yield the points of a path that lie inside of a neighbouring wrap on the same body, with the wrap."""
     for pair in pairwise(path):
         for point, wrap in (pair, pair[::-1]):
             wraps = path[wrap].kind in ("cylinder", "sphere") and path[point].kind == "point"

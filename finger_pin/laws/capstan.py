@@ -56,7 +56,7 @@ def delivered_tension(command: Any, loss: Any) -> Any:
 
 
 def _haste(p: Any) -> Any:
-    """Return what the level is at least, over the speed, N s/m: beyond the floor's reach, (9a) must not get faster.
+    """Return the least level over the speed, N s/m: beyond the floor's reach, (9a) must not get faster.
 
     As a driven tendon goes slack that slides against its stretched bristles, the tension in (14), y = |F^s| - b v,
     makes (9a) y' = -sigma_0 b v^2 / (M y): a root of time that ends with an infinite rate, e / (2 M) before which
@@ -67,7 +67,7 @@ def _haste(p: Any) -> Any:
 
 
 def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, drag: Any = 0.0, floor: Any = 0.0) -> Any:
-    """Return the f, N, that a driven tendon delivers in steady sliding, shape of what is given.
+    """Return the f, N, that a driven tendon delivers in steady sliding, in the shape of the arguments.
 
     From f = f^a - s max(M (f + f^a) + drag, g_min) - b v, with s the sign of v: where M = mu^d and b = 0, the capstan
     law less drag / (1 + mu^d) when pulling.
@@ -87,7 +87,7 @@ def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, dr
 
 
 def _level(normal: Any, sliding: Any, speed: Any, p: Any) -> Any:
-    """Return F^n M + drag, or what it is at least."""
+    """Return F^n M + drag, or its floor."""
     return friction_level(1.0, normal * sliding + p[8], np.maximum(p[5], _haste(p) * np.abs(speed)))
 
 

@@ -35,7 +35,7 @@ from finger_pin.laws.law import ContactLaw, Touch
 
 
 def _normal(touch: Touch, p: Any) -> Any:
-    """Return d where surfaces touch, else 0; spring force, damping factor, and whether the contact is not pulling."""
+    """Return d > 0 or 0, the spring force, the damping factor, and 1 where the contact pushes, else 0."""
     stiffness, damping, exponent = p[:3]
     depth = -touch.gap * ((touch.gap < 0.0) | (touch.side > 0.0))
     factor = 1.0 - damping * touch.speed
@@ -44,7 +44,7 @@ def _normal(touch: Touch, p: Any) -> Any:
 
 
 def _cone(touch: Touch, pressing: Any, p: Any) -> Any:
-    """Return w, |w|, the sliding speed x that lowers mu, mu, and by how much it has fallen, mu - mu_k."""
+    """Return w, |w|, the sliding speed x that lowers mu, mu, and its excess over kinetic friction, mu - mu_k."""
     _, _, _, static, kinetic, stiffness, lag, stribeck, _ = p
     bend_1, bend_2 = touch.state_1 + lag * touch.slip_1, touch.state_2 + lag * touch.slip_2
     bend = np.sqrt(bend_1 * bend_1 + bend_2 * bend_2)

@@ -50,7 +50,7 @@ def stribeck_share_slope(speed: Any, stribeck: Any, exponent: Any, share: Any) -
 
 
 def loss_share(pull: Any, speed: Any, driving: Any, driven: Any) -> Any:
-    """Return what is lost over the torque T of the tendons, by the direction in which power goes through the gears."""
+    """Return the share of the tendons' torque T that gears lose, by the direction of power through them."""
     way = np.sign(pull * speed)
     return 0.5 * ((1.0 + way) * driving + (1.0 - way) * driven)
 

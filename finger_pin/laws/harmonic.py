@@ -1,4 +1,4 @@
-"""A sinusoid about an offset, the motion that references are made of."""
+"""A sinusoid about an offset, the usual motion of references."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def beyond(kink: Any, side: Any) -> Any:
 
 @dataclass(frozen=True)
 class Law:
-    """A law and what it shows.
+    """A law of force: its function, slopes, energy and signals.
 
     Attributes:
         name: For messages.
@@ -84,7 +84,7 @@ class Law:
         return force, rate, tuple(signals)
 
     def book(self, row: Row, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
-        """Return stored energy and powers of what `act` has returned."""
+        """Return stored energy, J, and powers, W, from the results of `act`."""
         return self.account(row, p, force, rate, signals)
 
 
@@ -154,7 +154,7 @@ class ContactLaw:
         return _side_by_side(found[:3]), _side_by_side(found[3:5]), tuple(found[5:])
 
     def book(self, touch: Touch, p: Any, force: Any, rate: Any, signals: tuple[Any, ...]) -> Any:
-        """Return stored energy and powers of what `act` has returned."""
+        """Return stored energy, J, and powers, W, from the results of `act`."""
         forces, rates = ([all_[..., each::count] for each in range(count)] for all_, count in ((force, 3), (rate, 2)))
         return self.account(touch, p, forces, rates, signals)
 

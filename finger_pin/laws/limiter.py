@@ -39,7 +39,7 @@ def limiter_loss(torque: Any, depth: Any, velocity: Any, stiffness: Any) -> Any:
 
 
 def _seen(row: Row, p: Any) -> Any:
-    """Return on which side the nearer limit is, 1 or -1, how far the joint is beyond it, and 1 + c d'."""
+    """Return the side of the nearer limit, 1 or -1, the penetration d, and 1 + c d'."""
     lower, upper, _, damping = p
     end = 2.0 * (row.length > 0.5 * (lower + upper)) - 1.0
     return end, np.maximum(row.length - upper, lower - row.length), 1.0 + damping * row.speed * end

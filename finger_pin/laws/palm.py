@@ -1,4 +1,4 @@
-"""The motion of a palm along a prescribed path, as its own frame sees it: what a recursion over its bodies starts from.
+"""The motion of a palm along a prescribed path, in its own frame: the start of a recursion over its bodies.
 
 The path is the place p of the palm in the world and its attitude R = Rz(yaw) Ry(pitch) Rx(roll). In the palm's axes its
 velocity is (omega, w) with w = R^T p', and the rate of these numbers is its acceleration; gravity, R^T g, is taken off,

@@ -1,4 +1,4 @@
-"""A polynomial of degree five, the piece that steps, ramps, points and samples are made of."""
+"""A polynomial of degree five, the piece of steps, ramps, points and samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Servos that pull: rotors with motor and gearbox, spools, and the elastic tendons between spool and canal.
+"""Servos: rotors with motor and gearbox, spools, and the elastic tendons between spool and canal.
 
     tendon     e = r theta_m - l(q) + e0,   f^m = max(0, K e + D e')
     rotor      J theta_m'' = tau - tau_g - sum of r f^m
@@ -67,7 +67,7 @@ class Actuators:
 
     @classmethod
     def from_description(cls, description: FingerDescription, routing: Routing) -> Actuators:
-        """Read motors and what they pull."""
+        """Read motors and the tendons that they pull."""
         actuators, names = description.actuators.values(), list(description.actuators)
         strands = [(name, tendon) for name, each in description.actuators.items() for tendon in each.tendons]
 
@@ -152,7 +152,7 @@ class Actuators:
         return {"elastic_tendons": weights, **held}
 
     def tendon_rows(self, width: int) -> list[Rows]:
-        """Return the tables of elastic tendons, for coordinates (theta, p, theta_m), and of what they hold."""
+        """Return the tables of elastic tendons and of their hysteresis, for coordinates (theta, p, theta_m)."""
         if not self.names:
             return []
         arm = np.zeros((len(self.tendons), width))

@@ -1,4 +1,4 @@
-"""The books: by which names the energies and powers of the rows are booked, and what they are."""
+"""The books: names, units and kinds of the energies and powers of the rows."""
 
 from __future__ import annotations
 

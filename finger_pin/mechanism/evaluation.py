@@ -32,15 +32,15 @@ class Evaluation:
 
     Attributes:
         books: Its energies and powers.
-        rows: What the rows do, by table.
+        rows: Signals of the rows, by table.
         torque: Sum of A^T phi, shape (..., N).
         external: J^T F, shape (..., N).
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
-        base_power: That of a base that moves, shape (..., 1), W.
-        guided_power: That of what moves coordinates along paths, shape (...,), W.
+        base_power: Power of a base that moves, shape (..., 1), W.
+        guided_power: Power of the guides that move coordinates along paths, shape (...,), W.
         booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
-        touching: What contacts do in space, where it is known.
+        touching: Contacts in space, where they are known.
     """
 
     books: Books

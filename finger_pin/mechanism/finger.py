@@ -38,7 +38,7 @@ class Finger:
     """A tendon-driven finger: dynamics for any controller, solver or loop.
 
     Attributes:
-        description: What it was built from.
+        description: Description that it was built from.
         rigid_body: M, C, G, J and forward dynamics, on Pinocchio.
         routing: H_c, H_c2, curvature matrix, crossing sets, force closure.
         tendons: The tendon layer.
@@ -50,7 +50,7 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
-        pulled: How drives pull the actuated tendons, by table, shape (a, k).
+        pulled: Weights with which drives pull the actuated tendons, by table, shape (a, k).
         made_of: The rigid body, the rows and the objects that it was given.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         surroundings: Objects and contacts; None without any.
@@ -71,7 +71,7 @@ class Finger:
             rigid_body: A rigid body whose joints the description names in order; by default the one that the
                 description's links make.
             rows: Further tables of rows, with laws of one's own, for the coordinates (theta, p, theta_m).
-            objects: What its links may touch, by name; without any they do not touch each other either.
+            objects: Objects that its links may touch, by name; without any they do not touch each other either.
 
         Raises:
             InputError: If the joints of the two differ, or one has several coordinates; with objects, if a link has no
@@ -160,7 +160,7 @@ class Finger:
             model: For example a whole hand.
             joints: For every joint of the description, in the model's order, the name of the model's joint.
             tip_frame: Frame of the fingertip in the model.
-            configuration: Where the other joints are locked, shape (nq,); neutral by default.
+            configuration: Position at which the other joints are locked, shape (nq,); neutral by default.
             base_axis: e_1 of (17), the unit vector along which the tendons run at the base; model's base frame.
             visuals: Solids of the model, meshes among them, for `view` and `write_animation` with ``finger=``.
 
@@ -231,7 +231,7 @@ class Finger:
             inputs: u, shape (a,) or (m, a): tensions f^a, N; of a motor in position drive its voltage, V.
             fingertip_force: F, shape (3,) or (m, 3), of several fingers (f, 3) or (m, f, 3), N, base frame; none by
                 default.
-            base: How the palm of a hand moves, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
+            base: Motion of a hand's palm, the numbers of `laws.palm`, shape (27,) or (m, 27); at rest by default.
         """
         return self.signals(x, inputs, fingertip_force, self.mechanism.evaluate(x, inputs, fingertip_force, base))
 
@@ -254,7 +254,7 @@ class Finger:
         return "passive_halves", "driven_tendons", *self.pulled
 
     def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
-        """Return H_c2^T f at packed states, shape (..., n), N m, (11), of what the tendons' rows do."""
+        """Return H_c2^T f, the torque of the tendons (11), at packed states, shape (..., n), N m."""
         pulling = [rows[group] for group in self.pulling]
         torque = self._excursions.torque(x, pulling[0])
         for each in pulling[1:]:

@@ -1,4 +1,4 @@
-"""Fingers that are given in any way: built, described, by name or by file; and in place of a scenario's own."""
+"""Fingers from any argument: built, described, a name or a file; and in place of a scenario's own."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class MotorForces:
 
 @dataclass(frozen=True, eq=False)
 class FingerSignals:
-    """Everything that (18) is made of, at one state or at many (leading dimensions are kept).
+    """The terms of (18) at one state or at many (leading dimensions are kept).
 
     Attributes:
         state: The state, unpacked.
@@ -98,7 +98,7 @@ class FingerSignals:
         acceleration: theta'', shape (..., n), rad/s2, (18).
         rate: Time derivative of the packed state, shape (..., size).
         mechanism: The same of the mechanism, with what every row does.
-        motors: What motors do; None without any.
+        motors: Signals of the motors; None without any.
     """
 
     state: State
@@ -130,13 +130,13 @@ class FingerSignals:
         """Take the rows' signals apart by the paper's names.
 
         Args:
-            found: What evaluating the mechanism gave.
+            found: Evaluation of the mechanism.
             state: The state, unpacked.
             command: f^a, shape (..., a), N.
             force: F, N.
             torque: H_c2^T f, shape (..., n), N m.
             bodies: Number of velocities of the rigid body, before those of passive tendons.
-            pulled: How drives pull the tendons, by table, as of `rows.pulled`.
+            pulled: Weights with which drives pull the tendons, by table, as of `rows.pulled`.
         """
         joints, passive_tendons = torque.shape[-1], state.passive_position.shape[-1]
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)

@@ -69,7 +69,7 @@ class JointSprings:
         )
 
     def hysteresis_rows(self, names: tuple[str, ...], width: int) -> list[Rows]:
-        """Return the table of what springs hold against their motion, of those that do; no table without any."""
+        """Return the table of the springs' hysteresis, of those that have some; no table without any."""
         sprung = self._sprung
         held = np.flatnonzero(self.hysteresis[sprung] * self.stiffness[sprung])
         if not held.size:

@@ -155,7 +155,7 @@ class Mechanism:
             x: Shape (size,) or (m, size).
             command: Inputs u, shape (channels,) or (m, channels).
             force: At the tips, shape (3,) or (m, 3) for one, (t, 3) or (m, t, 3) for several, N, base frame.
-            base: How the base moves, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more), at rest by
+            base: Motion of the base, the numbers of `laws.palm`, shape (12 or more,) or (m, 12 or more), at rest by
                 default; after `GUIDES` of them the accelerations of what is moved along paths, zero by default.
         """
         q, v, z = self.split(x)
@@ -276,7 +276,7 @@ class Mechanism:
         return np.where(table.pins >= 0, magnitude, np.abs(load))
 
     def _passing(self, paths: Paths, pins: NDArray[np.int64]) -> Array:
-        """Return how many times a force on the first body of every path, less its reaction, passes each pin, (k, m)."""
+        """Return the count of passages of every path's force, less its reaction, through each pin, shape (k, m)."""
         supports = [set(each) for each in self.body.model.supports]
         pieces = [legs[0].piece for legs in paths]
         pairs = [[(pin + 1 in supports[p.ends[0].joint], pin + 1 in supports[p.joint]) for p in pieces] for pin in pins]

@@ -27,7 +27,7 @@ class PieceShape(Protocol):
         parameters: Names of its numbers.
         value: (y, p, out) fills what the points y, six numbers, give; see `spans` and `gaps`.
         slopes: (y, p, out) fills its derivatives by y.
-        columns: How many wrenches it has: one along a span; normal and two tangents of a gap.
+        columns: Count of its wrenches: one along a span; normal and two tangents of a gap.
     """
 
     columns: ClassVar[int]
@@ -65,9 +65,9 @@ class Piece:
         ends: The two points.
         joint: Of the body that carries the frame, 0 for the base.
         frame: Placement of the frame in that joint's.
-        reach: Where the middle of both points is further from the frame's origin, a gap is open and not asked, m.
-        breadth: How far from the points the first body's part reaches across, m.
-        extent: How far the frame's body reaches from the frame's origin, less the rounding that looks alike however it
+        reach: Distance of both points' middle from the frame's origin beyond which a gap is open and not asked, m.
+        breadth: Half width of the first body's part across its points, m.
+        extent: Extent of the frame's body from the frame's origin, less the rounding that looks alike however it
             turns, m; infinite for a half-space.
     """
 

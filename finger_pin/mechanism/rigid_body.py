@@ -99,7 +99,7 @@ class RigidBody:
 
         Args:
             parts: By name.
-            places: Where the base frames of parts stand on the common base; there itself by default. Gravity is that
+            places: Placements of the parts' base frames on the common base; there itself by default. Gravity is that
                 of the common base.
 
         Raises:

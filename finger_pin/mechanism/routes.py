@@ -58,7 +58,7 @@ class Routes:
     Attributes:
         body: The rigid body.
         routes: By name.
-        placed: Where the bodies of the tree stand, by name.
+        placed: Places of the tree's bodies, by name.
     """
 
     body: RigidBody

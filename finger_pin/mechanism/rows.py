@@ -1,4 +1,4 @@
-"""Rows: everything that exerts force, as tables. The wiring of (18) is what they hold.
+"""Rows: tables of all that exerts force, whose arms and indices are the wiring of (18).
 
 A row acts along its arm, tau = arm^T phi. What it sees is linear in earlier rows: its input and its load are sums of
 their forces. Rows that share a law stand together in one table, and tables stand in the order in which they are
@@ -72,7 +72,7 @@ class Rows:
     pulls: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Fill in what was left out, and check the sizes."""
+        """Fill in defaults, and check the sizes."""
         count, width = self.count, np.shape(self.arm)[-1]
         shapes: dict[str, tuple[Any, tuple[int, ...], Any]] = {
             "parameters": (self.parameters, (len(self.law.parameters), len(self.names)), None),
@@ -98,7 +98,7 @@ class Rows:
         object.__setattr__(self, "powers", self._booked())
 
     def _booked(self) -> tuple[Energy, ...]:
-        """Return the powers with what they are, which the law says."""
+        """Return the powers with their kinds, from the law."""
         law = self.law
         kinds = dict.fromkeys(law.supplies, SUPPLIED) | dict.fromkeys(law.losses, LOST)
         given = [energy(each) for each in self.powers or [f"{self.group}_{name}" for name in kinds]]
@@ -143,10 +143,10 @@ class RowSignals:
 
     Attributes:
         rows: The table.
-        row: What they see, a `Row`, or a `Touch` for contacts.
+        row: Arguments of the law, a `Row`, or a `Touch` for contacts.
         force: phi.
         rate: z'.
-        signals: What the law shows, in its order.
+        signals: Signals of the law, in its order.
     """
 
     rows: Rows

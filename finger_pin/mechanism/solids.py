@@ -73,7 +73,7 @@ class Solid:
         return float(np.hypot(radius, 0.5 * length)) if self.shape == "cylinder" else radius + 0.5 * length
 
     def never_meets(self, other: Solid) -> bool:
-        """Return whether it stays away from another solid, whatever both do."""
+        """Return whether no motion can bring it to another solid."""
         for one, two in ((self, other), (other, self)):
             if two.shape == "half_space":
                 # One that is moved may come from anywhere.

@@ -118,7 +118,7 @@ class Layout:
     def of(
         cls, tendons: Tendons, motors: Actuators, rows: Sequence[Rows] = (), around: Surroundings | None = None
     ) -> Layout:
-        """Return the layout of tendons, motors, further rows, drives among them, and what surrounds a finger."""
+        """Return the layout of tendons, motors, further rows, drives among them, and a finger's surroundings."""
         routing = tendons.routing
         drives, further = (
             further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False)

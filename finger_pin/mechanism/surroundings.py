@@ -45,7 +45,7 @@ class Surroundings:
 
     Attributes:
         objects: All objects, by name.
-        free: Those that move, free or along paths.
+        free: Objects that move, freely or along paths.
         body: The finger's rigid body, and the free objects after its joints.
         contacts: Between links and objects, links of different fingers, and objects.
     """
@@ -69,7 +69,7 @@ class Surroundings:
             objects: By name.
             description: The finger.
             mechanism: The finger alone.
-            placed: Where the bodies of a tree stand; None of one that is made of links.
+            placed: Places of a tree's bodies; None for a finger that is made of links.
 
         Raises:
             InputError: If an object has the name of a joint or a shape, or a link has no size.

@@ -93,7 +93,7 @@ class Tendons:
         Halves of passive tendons (12), drives, and driven and passive tendons (14), (16).
 
         Args:
-            drives: What pulls tendons in place of ideal sources.
+            drives: Motors that pull tendons in place of ideal sources.
             motors: Number of motors.
         """
         routing, joints = self.routing, len(self.routing.joints)

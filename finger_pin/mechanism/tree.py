@@ -1,4 +1,4 @@
-"""A tree of bodies from its description, and the rows of what acts on it."""
+"""A tree of bodies from its description, and the rows of its tendons, couplings and actuators."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""References: what is wanted over time, as signals, and the motion of the joints that they make with (20)."""
+"""References: signals over time, and the desired motion of the joints that they make with (20)."""

@@ -26,20 +26,20 @@ class ReferenceSignals:
 
 
 class Reference(Protocol):
-    """Anything that gives a desired motion."""
+    """A desired motion over time."""
 
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""
 
 
 class LoopReference(Reference, Protocol):
-    """A reference in a loop, which says what those who run it have to know."""
+    """A reference in a loop: its motion, its knots, its compiled form."""
 
     def signals(self) -> tuple[Signal, ...]:
         """Return the functions of time that it follows: steps end where they bend."""
 
     def planned(self) -> SignalReference | None:
-        """Return it as signals, which the compiled core can follow; None of what is Python."""
+        """Return its signals, which the compiled core can follow; None if it is Python."""
 
 
 @dataclass(frozen=True, eq=False)

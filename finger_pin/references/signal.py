@@ -1,4 +1,4 @@
-"""Signals over time as arrays: what references, open-loop tensions and the force at the fingertip are made of.
+"""Signals over time as arrays, for references, open-loop tensions and the force at the fingertip.
 
 Every signal is a sinusoid about an offset, and on top of it a polynomial of degree five at most between knots that all
 signals share, constant before the first knot and after the last.
@@ -171,7 +171,7 @@ class Signal:
         return np.asarray(self.knots[np.any(found, axis=1)])
 
     def _bent(self, values: Array, seen: Flags, least: Array) -> Array:
-        """Return the integral of the root of |u''| over each piece, shape (m - 1, k), of bends that are to be seen.
+        """Return the integral of the root of |u''| over each piece, shape (m - 1, k), of bends above a least size.
 
         A bend is seen that displaces u from a chord by more than a least distance: first within each piece, then at
         every knot between its neighbours, at every second between those, and so on. Where it is seen on a short chord

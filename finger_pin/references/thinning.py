@@ -1,4 +1,4 @@
-"""Fewer knots through many samples: what they say is kept, and what only their rounding says is left out.
+"""Fewer knots through many samples, whose curve is kept to within their rounding.
 
 Where samples are dense, the slope of what joins them says more of their rounding than of the signal: samples rounded to
 1e-7 at 1 MHz have slopes that are wrong by 0.1 per second, which an integrator would follow with steps of microseconds.
@@ -115,7 +115,7 @@ def _fitted(times: Array, values: Array, length: int, tried: Flags, within: Arra
         values: Shape (m, k), over the range of each signal.
         length: Intervals of a stretch.
         tried: Which of them are tried, shape (b,).
-        within: What a cubic may miss, shape (b, k) or a number for all.
+        within: Largest miss of a cubic, shape (b, k) or a number for all.
     """
     chosen, width = np.flatnonzero(tried), values.shape[1]
     at = length * chosen[:, None] + np.arange(0, length + 1, max(length // _ASKED, 1))
@@ -140,7 +140,7 @@ def _fitted(times: Array, values: Array, length: int, tried: Flags, within: Arra
 
 
 def _longest(levels: list[_Stretches]) -> tuple[Indices, Indices, Array, Array, Array]:
-    """Return first and last sample of each stretch that no longer one has, and its misses, values and slopes."""
+    """Return the stretches within no longer one: first and last samples, misses, values and slopes."""
     kept = [np.zeros_like(levels[0].fits), *(level.fits.copy() for level in levels[1:])]
     for own, longer in zip(kept[1:], levels[2:], strict=False):
         own[: 2 * len(longer.fits)] &= ~np.repeat(longer.fits, 2)

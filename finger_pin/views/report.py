@@ -104,7 +104,7 @@ def _end(value: float) -> str:
 
 
 def _words(result: xr.Dataset) -> list[str]:
-    """Return in sentences what is open, that the searches agree if they do, and which law is to be preferred."""
+    """Return sentences on open questions, agreement of the searches, and the law to be preferred."""
     undetermined = (
         [str(each) for each in np.atleast_1d(result.attrs["undetermined"])] if "undetermined" in result.attrs else []
     )
@@ -136,7 +136,7 @@ def _words(result: xr.Dataset) -> list[str]:
 
 
 def _agreement(result: xr.Dataset) -> str:
-    """Return in a sentence how far the searches bear each other out."""
+    """Return a sentence on the agreement of the searches."""
     alike, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
     if count == 1:
         return "There was one search: whether the recordings are met better elsewhere is not known."

@@ -1,4 +1,4 @@
-"""A result in words and numbers: how well it tracked, how hard it pulled, where the energy went, what it cost."""
+"""A result in words and numbers: tracking, tensions, energies, speed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def summarize(result: xr.Dataset) -> str:
     """Return a summary of a result as plain text, at most 80 columns wide where its names allow.
 
     Args:
-        result: What `simulate` returned, or what an exception of it carries, whole or partial.
+        result: Dataset of `simulate`, or the partial one that its exception carries.
     """
     head = [*_head(result), *_own(result), *_warnings(result)]
     tree = described(result.attrs).finger.tree
@@ -127,7 +127,7 @@ def _tension(result: xr.Dataset) -> list[str]:
 
 
 def _motors(result: xr.Dataset) -> list[list[str]]:
-    """Return a block about motors if there are any: what they draw, and how long their tendons hang slack."""
+    """Return a block about motors if there are any: currents, energy, and the time of slack of their tendons."""
     if "motor_current" not in result:
         return []
     current = np.asarray(result["motor_current"].transpose("time", "motor"))
@@ -149,7 +149,7 @@ def _motors(result: xr.Dataset) -> list[list[str]]:
 
 
 def slack_time(result: xr.Dataset) -> dict[str, float]:
-    """Return for how long every tendon on a spool has hung slack, s; by tendon, as the samples have it."""
+    """Return the time for which every tendon on a spool has hung slack, s; by tendon, from the samples."""
     tension = result["spool_tension"]
     time = np.asarray(result["time"])
     pulled = described(result.attrs).finger.actuators.values()

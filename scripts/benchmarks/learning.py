@@ -79,7 +79,7 @@ def _exact(tensions: Array) -> Array:
 
 
 def _reset_time(task: Mapping[str, Any]) -> float:
-    """Return the processor time of a reset that draws friction anew, with what the task draws itself, s."""
+    """Return the processor time of a reset that draws friction anew, besides the task's own draws, s."""
     from finger_pin.learning import Environment, Uniform
 
     names = ["finger"] if task["scenario"].hand is None else ["hand.fingers.left.finger", "hand.fingers.right.finger"]

@@ -1,4 +1,4 @@
-"""What our friction costs in a step of MuJoCo, of a hand with fixed tendons and of one with spatial tendons.
+"""The cost of our friction in a step of MuJoCo, on a hand with fixed tendons and on one with spatial tendons.
 
 The first is the Shadow hand of gymnasium-robotics, whose servos drive its joints, and so the tendons that run over one
 of these. The second is Tetheria's Aero hand of MuJoCo Playground, where that is installed (``pip install --no-deps
@@ -32,7 +32,7 @@ def measure(store: Store) -> dict[str, Any] | None:
 
 
 def study(rounds: int, duration: float) -> dict[str, Any]:
-    """Return the least time of a step of each variant, which take turns, and how many frictions and rows it has."""
+    """Return the least time of a step of each variant, which take turns, and its counts of frictions and rows."""
     import mujoco
 
     hands = {"Shadow hand": _shadow}

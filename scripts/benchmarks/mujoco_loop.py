@@ -52,11 +52,11 @@ def measure(store: Store) -> dict[str, Any] | None:
 
 
 class Comparison(NamedTuple):
-    """What is compared.
+    """A comparison to be made: a scenario, a limit on the error, time steps of MuJoCo.
 
     Attributes:
         scenario: Its name.
-        overrides: What is changed of it, besides what MuJoCo cannot express.
+        overrides: Changes of it, besides the entries that MuJoCo cannot express.
         duration: s.
         limit: On the error, rad.
         measures: Some of `MEASURES`: what the limit is put on.
@@ -188,7 +188,7 @@ def _fastest(scenario: fp.Scenario, exact: Array, measure: str, limit: float) ->
 
 
 def _model(scenario: fp.Scenario, massless: bool, integrator: str, posture: Array, step: float) -> Any:
-    """Return a MuJoCo model without what this comparison does not need; None for an integrator that it lacks."""
+    """Return a MuJoCo model without sensors and contacts; None for an integrator that it lacks."""
     import mujoco
 
     text = to_mjcf(

@@ -1,4 +1,4 @@
-"""A prepared scenario: what a run costs beside its integration, in processor time on one core."""
+"""A prepared scenario: the cost of a run beside its integration, in processor time on one core."""
 
 from __future__ import annotations
 

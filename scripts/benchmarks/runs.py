@@ -33,7 +33,7 @@ class Failed(Exception):
 
 @dataclass(frozen=True)
 class Point:
-    """One run: what was asked, what it cost and how far it was from the truth.
+    """One run: its tolerance, its cost and its distance from the truth.
 
     Attributes:
         method: Name of the method.
@@ -63,7 +63,7 @@ def settled(scenario: Scenario, **settings: Any) -> Scenario:
 
 
 def truth(scenario: Scenario) -> tuple[Array, dict[str, float]]:
-    """Return joint positions at the sample times, shape (m, n), rad, and how far two tight methods are apart, rad."""
+    """Return joint positions at the sample times, shape (m, n), rad, and the distance of two tight methods, rad."""
     tight = [
         fp.simulate(settled(scenario, method=method, rtol=1e-9, atol_scale=1e-10))["joint_position"].values
         for method in ("Rodas5P", "Rodas4")
@@ -153,7 +153,7 @@ def sundials(scenario: Scenario, rtol: float) -> Job:
 
 
 def point(method: str, rtol: float, job: Job, exact: Array) -> Point:
-    """Run a job once and return what it cost and how far it was from the truth; a failure has no error."""
+    """Return cost and distance from the truth of one run of a job; a failure has no error."""
     try:
         elapsed, (found, statistics) = clocked(job)
     except Failed:

@@ -28,10 +28,10 @@ def digest() -> str:
 
 
 class Store:
-    """Parts that are measured at most once, until the code changes.
+    """Parts of a benchmark, each measured once until the code changes.
 
     Attributes:
-        folder: Where the parts are.
+        folder: Folder of the parts.
         quick: Whether this is a quick run; its parts are kept apart from those of a full run.
     """
 

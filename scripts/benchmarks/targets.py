@@ -1,4 +1,4 @@
-"""What is aimed at, and whether the measurements reach it."""
+"""Targets, and the measurements that reach or miss them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Target(NamedTuple):
     """A measured figure beside its target.
 
     Attributes:
-        name: What it is.
+        name: Its name.
         value: Measured.
         relation: ``=``, or how the value bounds what was to be measured.
         sense: ``>=`` or ``<=``.

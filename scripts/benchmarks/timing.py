@@ -12,7 +12,7 @@ _Result = TypeVar("_Result")
 
 
 class Cost(NamedTuple):
-    """A time, s, and how it relates to what was asked: ``=`` interpolated, ``<=`` or ``>=`` a bound.
+    """A time, s, and its relation to the error asked for: ``=`` interpolated, ``<=`` or ``>=`` a bound.
 
     It is an upper bound where even the coarsest run is more accurate than asked, and a lower one where no run is
     accurate enough.
@@ -23,7 +23,7 @@ class Cost(NamedTuple):
 
 
 def clocked(function: Callable[[], _Result]) -> tuple[float, _Result]:
-    """Return the wall time of a call, s, and what it returns."""
+    """Return the wall time of a call, s, and its result."""
     began = time.perf_counter()
     result = function()
     return time.perf_counter() - began, result
@@ -43,7 +43,7 @@ def cost_at(points: Sequence[tuple[float, float]], error: float) -> Cost | None:
 
     Args:
         points: Pairs of error and cost; those with an error that is not a positive number are left out.
-        error: What to interpolate at.
+        error: Error at which to interpolate.
     """
     front: list[tuple[float, float]] = []
     for point in sorted(p for p in points if math.isfinite(p[0]) and p[0] > 0.0):

@@ -1,1 +1,1 @@
-"""The validation: what is compared with what, one module per family of checks."""
+"""The validation against independent sources, one module per family of checks."""

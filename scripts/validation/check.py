@@ -1,4 +1,4 @@
-"""What a check is: a number that is expected, the number that was found, and how far apart they may be."""
+"""Checks: a number expected, the number found, and the difference allowed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from finger_pin.description.routing import Array
 
 
 class Verdict(StrEnum):
-    """How a check ended."""
+    """The outcome of a check."""
 
     PASS = "pass"
     DIFFERS = "differs"
@@ -26,14 +26,14 @@ class Check:
     """One comparison.
 
     Attributes:
-        what: What is compared.
-        source: Where the expected value comes from.
+        what: Quantity compared.
+        source: Source of the expected value.
         expected: The value of the source; None if it did not come to a comparison.
         measured: Ours; None likewise.
-        tolerance: How far apart they may be; None likewise.
+        tolerance: Difference allowed; None likewise.
         unit: Of all three.
         verdict: The outcome.
-        note: What a reader should know, such as why a known difference is there.
+        note: Remark for the reader, such as the cause of a known difference.
     """
 
     what: str
@@ -60,14 +60,14 @@ def compare(
     """Judge a number; one that is not finite fails.
 
     Args:
-        what: What is compared.
-        source: Where the expected value comes from.
+        what: Quantity compared.
+        source: Source of the expected value.
         measured: Ours.
-        tolerance: How far apart the two may be.
+        tolerance: Difference allowed.
         unit: Of all of them.
         expected: The value of the source; zero where a deviation is measured.
         known: A difference up to this much is known and explained by the note: it is reported, but is no failure.
-        note: What a reader should know.
+        note: Remark for the reader.
     """
     gap = abs(float(measured) - expected)
     verdict = Verdict.PASS if gap <= tolerance else Verdict.DIFFERS if gap <= known else Verdict.FAIL
@@ -99,7 +99,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure and a sentence that says what it shows."""
+    """A figure and its caption."""
 
     figure: Figure
     caption: str
@@ -107,7 +107,7 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """What a family of checks found."""
+    """The results of a family of checks."""
 
     checks: tuple[Check, ...]
     pictures: tuple[Picture, ...] = ()

@@ -1,4 +1,4 @@
-"""The energy account of every scenario that ships: what was supplied, stored and lost adds up."""
+"""The energy account of every scenario that ships: energies supplied, stored and lost add up."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run(name: str, tolerance: float) -> xr.Dataset:
 
 
 def supplied(result: xr.Dataset) -> float:
-    """Return the greatest work of actuators and motors' electronics, and of what moves palm and objects, J."""
+    """Return the greatest work of actuators, motors' electronics, and guides of palm and objects, J."""
     names = [f"energy_exchanged_{each}" for each in ("actuators", "electrical", "palm", "objects")]
     return sum(float(abs(result[name]).max()) for name in names if name in result)
 

@@ -18,7 +18,7 @@ DEPTH = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Bodies under way, and what is known of them.
+    """Bodies under way, and their exact motion.
 
     Attributes:
         objects: By name.

@@ -48,7 +48,7 @@ def postures(finger: FingerDescription) -> Array:
 
 
 def tips_by_pinocchio(finger: FingerDescription) -> Array:
-    """Return where our rigid body has the fingertip, shape (1000, 3), m."""
+    """Return the fingertip by our rigid body, shape (1000, 3), m."""
     body = build_rigid_body(finger)
     return np.array([body.tip_position(theta) for theta in postures(finger)])
 
@@ -63,7 +63,7 @@ def read_by_yourdfpy(urdf: str) -> Any:
 
 
 def tips_by_yourdfpy(finger: FingerDescription) -> Array:
-    """Return where yourdfpy has the fingertip of the generated URDF, shape (1000, 3), m."""
+    """Return the fingertip by yourdfpy on the generated URDF, shape (1000, 3), m."""
     robot, tips = read_by_yourdfpy(to_urdf(finger)), []
     for theta in postures(finger):
         robot.update_cfg(theta)
@@ -72,7 +72,7 @@ def tips_by_yourdfpy(finger: FingerDescription) -> Array:
 
 
 def tips_by_formula(finger: FingerDescription, formula: Callable[[Sequence[float], Array], Array]) -> Array:
-    """Return where a formula has the fingertip, shape (1000, 3), m."""
+    """Return the fingertip by a formula, shape (1000, 3), m."""
     lengths = [joint.link.length for joint in finger.joints.values() if joint.link is not None]
     return np.array([formula(lengths, theta) for theta in postures(finger)])
 

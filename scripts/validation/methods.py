@@ -27,7 +27,7 @@ _RATE = 10_000.0
 
 @dataclass(frozen=True)
 class Approach:
-    """How far a method is from the truth at each tolerance, largest over joints and time, rad."""
+    """The distance of a method from the truth at each tolerance, largest over joints and time, rad."""
 
     scenario: str
     method: str
@@ -35,7 +35,7 @@ class Approach:
 
 
 def available(method: str) -> bool:
-    """Return whether what a method needs is installed."""
+    """Return whether the packages of a method are installed."""
     return method != "CVODE" or importlib.util.find_spec("sksundae") is not None
 
 

@@ -49,7 +49,7 @@ class Convergence:
     """MuJoCo's motions against ours.
 
     Attributes:
-        scenario: What was simulated.
+        scenario: Name of the scenario.
         ours: Our result.
         steps: MuJoCo's time steps, s.
         differences: Largest difference of any joint from ours, by step size and sample time, rad.
@@ -133,7 +133,7 @@ def follow(scenario: Scenario, model: Any, step: float) -> Array:
 
 
 def converge(name: str, overrides: Mapping[str, Any] | None = None) -> Convergence:
-    """Simulate what MuJoCo can express of a scenario, here and there."""
+    """Simulate the part of a scenario that MuJoCo can express, here and there."""
     settings = {"duration": DURATION, "rtol": 1e-9, "atol_scale": 1e-10, "sample_rate": 1000.0}
     settings = {f"simulation.{key}": value for key, value in settings.items()}
     scenario = load_scenario(name, {**EXPRESSIBLE, **(overrides or {}), **settings})

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def bar(total: int) -> Iterator[Callable[[int, str], None]]:
-    """Give a function that takes how many are done and what is being done."""
+    """Give a function that takes the number of families done and the name of the one under way."""
     if not sys.stderr.isatty():
         yield lambda done, doing: None
         return

@@ -37,7 +37,7 @@ class Family:
         name: As on the command line.
         title: For people.
         about: A sentence on what is compared.
-        section: What was found.
+        section: Its results.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Family:
     section: Section
 
     def count(self, verdict: Verdict) -> int:
-        """Return how many checks ended so."""
+        """Return the number of checks with an outcome."""
         return sum(check.verdict is verdict for check in self.section.checks)
 
 
@@ -66,16 +66,16 @@ class Report:
 
     @classmethod
     def now(cls, families: tuple[Family, ...]) -> Report:
-        """Return the report of what was found just now, here."""
+        """Return the report of results of this hour on this machine."""
         return cls(families, datetime.now(UTC).isoformat(" ", "minutes").replace("+00:00", " UTC"), versions())
 
     def count(self, verdict: Verdict) -> int:
-        """Return how many checks ended so."""
+        """Return the number of checks with an outcome."""
         return sum(family.count(verdict) for family in self.families)
 
 
 def versions() -> dict[str, str | None]:
-    """Return the versions of what took part."""
+    """Return the versions of the programs compared."""
     found: dict[str, str | None] = {"Python": platform.python_version(), "system": platform.platform(terse=True)}
     for name in _PACKAGES:
         try:

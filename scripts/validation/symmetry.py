@@ -59,9 +59,9 @@ def in_units(length: float, mass: float, time: float) -> Motion:
     """Move a finger of two joints described in other units, every option of law (9) on.
 
     Args:
-        length: How many units a metre is.
-        mass: How many units a kilogram is.
-        time: How many units a second is.
+        length: Units in a metre.
+        mass: Units in a kilogram.
+        time: Units in a second.
     """
     force = mass * length / time**2
     tendon, torque = force / length, force * length

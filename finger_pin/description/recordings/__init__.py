@@ -1,1 +1,1 @@
-"""Recordings: columns of measured numbers in a file, their units, and what a bench says of them."""
+"""Recordings: columns of measured numbers in a file, their units, and their part in a bench."""

@@ -1,4 +1,4 @@
-"""Benches as data: what was recorded, which columns feed the model or are compared with it, and what is to be found."""
+"""Benches as data: recordings, the columns that feed the model or are compared with it, the numbers to be found."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class RecordingSettings(Description):
 
 
 class IdentifySettings(Description):
-    """The table ``[identify]`` of a scenario: what is to be found, from which recordings, against which other laws."""
+    """The table ``[identify]`` of a scenario: the numbers to be found, the recordings, and rival laws."""
 
     parameters: dict[str, Annotated[tuple[float, float], vector(2)]] = Field(
         min_length=1, description="By dotted key of the scenario, the least and the greatest value."

@@ -43,7 +43,7 @@ def _named(header: list[str]) -> bool:
 
 
 def _read_rows(what: str, text: str) -> dict[str, Series]:
-    """Return the columns read row by row, or raise the error of what is wrong."""
+    """Return the columns read row by row, or raise the error of a wrong one."""
     try:
         rows = [
             (number, row) for number, row in enumerate(csv.reader(text.splitlines()), 1) if any(map(str.strip, row))

@@ -18,7 +18,7 @@ PACKED = "base64:"
 
 
 class Series(Sequence[float]):
-    """Numbers that never change, as an array: what a tuple of floats is, in a quarter of its memory."""
+    """Numbers that never change, as an array: a tuple of floats, in a quarter of its memory."""
 
     def __init__(self, values: ArrayLike) -> None:
         """Keep numbers of shape (m,); of an array a copy."""
@@ -65,7 +65,7 @@ class Series(Sequence[float]):
         return self
 
     def __repr__(self) -> str:
-        """Return the first of its numbers, and how many there are."""
+        """Return the first of its numbers, and their count."""
         shown = ", ".join(map(repr, self[:3]))
         return f"[{shown}{', ...' if len(self) > 3 else ''}] ({len(self)} numbers)"
 

@@ -1,4 +1,4 @@
-"""Units of recordings, and what they are in SI."""
+"""Units of recordings, and their factors to SI."""
 
 from __future__ import annotations
 

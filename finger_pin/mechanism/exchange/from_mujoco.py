@@ -1,4 +1,4 @@
-"""A MuJoCo model as a description: bodies, joints, tendons, couplings and actuators; what else it has is listed.
+"""A MuJoCo model as a description: bodies, joints, tendons, couplings and actuators; other elements are listed.
 
 MuJoCo resolves defaults, classes and includes; what is read here is its compiled model (`mujoco.MjModel`).
 """

@@ -1,4 +1,4 @@
-"""MJCF of a finger, for MuJoCo: what of the model MuJoCo can express, as text. MuJoCo itself is not needed here.
+"""MJCF of a finger: the part of the model that MuJoCo can express, as text. MuJoCo itself is not needed here.
 
 Exported are the rigid body, the routing, the passive tendons with their lumped mass, the springs of joints, viscous
 friction, gravity and the shapes; on request law (9) too, which MuJoCo then needs `finger_pin.mujoco` for. MuJoCo has no

@@ -32,7 +32,7 @@ def disabled(mujoco: Any, model: Any) -> set[str]:
 
 
 def obeyed(mujoco: Any, model: Any) -> Any:
-    """Return a copy of a model without what its flags disable, and with the friction that they put everywhere."""
+    """Return a copy of a model without the elements that its flags disable, and with the friction that they set."""
     found = copy.copy(model)
     flags = disabled(mujoco, model)
     for array in (each for flag in flags & set(_ZEROED) for each in _ZEROED[flag]):
@@ -53,7 +53,7 @@ def without_counterpart(mujoco: Any, model: Any) -> list[str]:
 
 
 def undriven(mujoco: Any, model: Any, actuator: int) -> str | None:
-    """Return why an actuator does not act, or not as it seems; None where it does."""
+    """Return the reason why an actuator does not act, or not as it seems; None where it does."""
     if "actuation" in disabled(mujoco, model):
         return "actuation is disabled in the model"
     if model.opt.disableactuator & (1 << int(model.actuator_group[actuator])):

@@ -42,7 +42,7 @@ class PluginFriction:
         ratio: Its speed over the row's.
         law: coulomb, static, stiffness, viscous, stribeck_velocity, floor, stribeck_exponent, micro_damping, drag,
             curvature_offset.
-        more: What bends or loads it: whether it is a joint, its name, and a number.
+        more: Elements that bend or load it: whether it is a joint, its name, and a number.
         share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
             same way; negative where another one pulls the other way, so that it is slack while that is driven.
         held: Whether a tendon has a limit or an equality, which pull it too.

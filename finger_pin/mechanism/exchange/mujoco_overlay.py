@@ -101,7 +101,7 @@ def _lay_point(mujoco: Any, spec: Any, tendon: Any, name: str, point: Any, entry
 
 
 def _add_numbers(tendon: Any, laid: LaidTendon) -> None:
-    """Set what acts along a tendon: spring, damper, range, friction."""
+    """Set spring, damper, range and friction of a tendon."""
     tendon.stiffness = np.append(laid.stiffness, np.zeros(len(np.atleast_1d(tendon.stiffness)) - 1))
     tendon.damping = np.append(laid.damping, np.zeros(len(np.atleast_1d(tendon.damping)) - 1))
     tendon.frictionloss = laid.friction

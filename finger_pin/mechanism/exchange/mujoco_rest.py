@@ -95,7 +95,7 @@ class ElementReader:
         mujoco: The module.
         model: The compiled model.
         names: Of its elements.
-        rest: Where what is left out is listed.
+        rest: List of the elements left out.
     """
 
     mujoco: Any

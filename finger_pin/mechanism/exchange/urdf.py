@@ -75,7 +75,7 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
 
 
 def exported(described: DescriptionLike | Scenario) -> FingerDescription:
-    """Return the finger, or a hand's fingers together, of what is to be written as a file of another program.
+    """Return the description of a finger, or of a hand's fingers together, for a file of another program.
 
     Raises:
         InputError: If it is none of them, or has a tree of bodies.

@@ -35,7 +35,7 @@ def _tangent(u: float, v: float, w: float, a: float, b: float, c: float, out: An
 
 
 def _tangent_slope(n: Any, u: float, v: float, w: float, a: float, b: float, c: float, out: Any, at: int) -> None:
-    """Write how a turned tangent moves when the normal n moves by (u, v, w), into a column of ``out``."""
+    """Write the motion of a turned tangent under a motion (u, v, w) of the normal n into a column of ``out``."""
     whole = max(1.0 + _POLE_X * n[0] + _POLE_Y * n[1] + _POLE_Z * n[2], _LEAST)
     share = (a * n[0] + b * n[1] + c * n[2]) / whole
     change = (a * u + b * v + c * w - share * (_POLE_X * u + _POLE_Y * v + _POLE_Z * w)) / whole

@@ -1,4 +1,4 @@
-"""Cuts through the tendons at the joints: where each one crosses from a link to the next, and which way it pulls.
+"""Cuts through the tendons at the joints: points of crossing from link to link, and directions of pull.
 
 A cut frees everything distal of a joint. Each tendon that crosses it then pulls with its tension at the cut, along its
 path and towards the actuator. A tendon meets its groove in the plane of the groove, across the joint axis: what turns
@@ -39,7 +39,7 @@ class Cut:
         joint: Index of the joint, 1 for the first.
         distal: Whether it is the half of a passive tendon beyond its lumped mass.
         link: Index of the link in whose frame point and direction are; 0 is the base.
-        point: Where the tendon meets its groove, or leaves it, shape (3,), m.
+        point: Point at which the tendon meets its groove, or leaves it, shape (3,), m.
         direction: Unit vector of the path from the actuator to the insertion, shape (3,).
     """
 
@@ -58,7 +58,7 @@ def cuts(model: pin.Model, tendon: str, pieces: Sequence[WoundSpan | Arc], groov
         model: Pinocchio model of the finger.
         tendon: Name of the tendon.
         pieces: From `winding.wind`.
-        groove: What the grooves are part of.
+        groove: Link that the grooves are part of.
     """
     spans = [piece for piece in pieces if isinstance(piece, WoundSpan)]
     arcs = {piece.joint: piece for piece in pieces if isinstance(piece, Arc)}

@@ -1,4 +1,4 @@
-"""One finger of what is shown: its tendons wound, its solids, and where it begins in the whole."""
+"""One finger of a picture: its wound tendons, its solids, and the index of its first joint."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ class WoundFinger:
         pieces: Of its tendons, by name.
         pulleys: Winding surfaces whose radius is not zero.
         visuals: Its solids.
-        lanes: How far along the joint axes each tendon runs.
+        lanes: Offset of each tendon along the joint axes.
         widths: Of its links, m.
-        size: How far its tip can be from its base, about, m.
+        size: Largest distance of its tip from its base, about, m.
     """
 
     pieces: dict[str, tuple[WoundSpan | Arc, ...]]

@@ -18,7 +18,7 @@ _WIDTH = 1.8
 
 
 def turned_model(body: RigidBody) -> tuple[pin.Model, list[Array]]:
-    """Return the joints of a body with their axes along z, and how each frame was turned, the base first.
+    """Return the joints of a body with their axes along z, and the rotation of each frame, the base first.
 
     Raises:
         InputError: If a joint does not turn.

@@ -55,13 +55,13 @@ class TendonGeometry:
     """The tendons of a finger, or of all fingers of a hand: wound once, placed for any joint position.
 
     Attributes:
-        description: What it was built from.
+        description: Description that it was built from.
         model: Pinocchio model; the axis of every joint is the z axis of its frame.
-        lanes: How far along the joint axes each tendon runs.
+        lanes: Offset of each tendon along the joint axes.
         pulleys: Winding surfaces whose radius is not zero.
         visuals: The solids.
         tips: The fingertips: index of the link, and place in its frame, shape (3,), m.
-        size: How far the fingertips can be from the base, about, m.
+        size: Largest distance of the fingertips from the base, about, m.
         widths: Of the links, m.
         first_seen: First link that the camera must have in view.
     """
@@ -142,7 +142,7 @@ class TendonGeometry:
 
         Args:
             joint_position: theta, shape (..., n), rad.
-            slack: How loose each tendon is drawn, 0 (taut) to 1, shape (..., t); all taut when left out. A loose
+            slack: Looseness of each tendon as drawn, 0 (taut) to 1, shape (..., t); all taut when left out. A loose
                 tendon sags along gravity and lifts off its pulleys; by how much is a picture, not a prediction.
             poses: Of the links at this position, where they are at hand.
         """

@@ -32,13 +32,13 @@ class TreeGeometry:
     """The geometry of a tree that is drawn; see `TendonGeometry`.
 
     Attributes:
-        description: What it was built from.
+        description: Description that it was built from.
         model: Pinocchio model.
         lanes: Distance between tendons, for their width, and a joint to look along.
         pulleys: None.
         visuals: The solids.
         tips: The fingertip: index of the joint, and place in its frame, shape (3,), m.
-        size: How far the bodies are from the base, about, m.
+        size: Largest distance of the bodies from the base, about, m.
         first_seen: First link that the camera must have in view: the base may be far away.
         widths: Of the links, about, m.
     """

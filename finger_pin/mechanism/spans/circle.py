@@ -1,4 +1,4 @@
-"""A path around or inside a circle, in the plane of the circle: which way it goes, its length, and how they change.
+"""A path around or inside a circle, in its plane: direction, length, turn, and their derivatives.
 
 In the plane, with the circle about the origin, the ends are at distances r_0 and r_1, and the path goes from one to the
 other through an angle phi. Length and turn are functions of these three. Which way the path goes is as in MuJoCo 4.
@@ -17,7 +17,7 @@ _MOST_STEPS = 50
 
 
 def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: Any, has_side: Any, inside: Any) -> Any:
-    """Return the way that the path goes.
+    """Return the direction of the path around the circle.
 
     A path wraps if, on its way, the ends are further apart than where their tangents meet the circle. With a side
     point its way is through the direction of that point; without one it is the shorter. Inside, it has to be drawn to

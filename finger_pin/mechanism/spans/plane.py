@@ -1,4 +1,4 @@
-"""From a circle in its plane to points in space: what length and turn do when the points move."""
+"""From a circle in its plane to points in space: derivatives of length and turn by the points."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def curvatures(found: Any, sine: Any, cosine: Any, r0: Any, r1: Any, frame: Any,
     """Fill in the 36 second derivatives of the length by both points, from out[6] on.
 
     Args:
-        found: What `path` returns.
+        found: Length, turn and derivatives, from `path`.
         sine: Of phi; 0 for a plane that does not turn with the points.
         cosine: Of phi.
         r0: Distance of the first end, m.
         r1: Distance of the second end, m.
-        frame: What `directions` returns.
+        frame: Unit vectors at both ends, from `directions`.
         out: Filled in.
     """
     u, t, v, s = frame

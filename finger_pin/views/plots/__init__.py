@@ -1,4 +1,4 @@
-"""Figures: the workspace and the friction law of the paper, what a result holds, what analyses and experiments say.
+"""Figures: the workspace and the friction law of the paper, results, analyses and experiments.
 
 Every function returns a matplotlib ``Figure`` that belongs to no window: save it with ``figure.savefig(path)``.
 Figures of a result are drawn from its Dataset alone. ``__init__.pyi`` is the list.

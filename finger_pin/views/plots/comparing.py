@@ -29,7 +29,7 @@ def compare(
     Args:
         first: Dataset of `simulate`.
         second: Another; it may be longer or sampled otherwise.
-        labels: What the two are called.
+        labels: Names of the two in the legend.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
 

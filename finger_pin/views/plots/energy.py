@@ -1,4 +1,4 @@
-"""The energy account: where energy is stored, what is supplied and lost, and what is left unexplained."""
+"""The energy account: energies stored, supplied and lost, and the residual."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An identification: what was measured beside what is computed, what is left over, and how sure every number is."""
+"""An identification: measured beside computed signals, residuals, and the profile of every number."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def plot_identification(result: xr.Dataset) -> Figure:
 
 @styled
 def plot_profiles(result: xr.Dataset) -> Figure:
-    """Draw the profile of every parameter: by how much the recordings are met worse where it is held elsewhere.
+    """Draw the profile of every parameter: the misfit of the recordings where it is held at other values.
 
     Args:
         result: Dataset of `identify`.

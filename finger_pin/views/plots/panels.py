@@ -86,7 +86,7 @@ def stack(part: Figure | SubFigure, labels: Sequence[str], heights: Sequence[flo
     """Return panels below each other that share their time axis.
 
     Args:
-        part: Where.
+        part: The part of the figure.
         labels: Label of every panel's vertical axis, from the top.
         heights: Relative heights of the panels; equal by default.
     """

@@ -54,7 +54,7 @@ def draw_all(
 
     Args:
         result: Dataset of `simulate`.
-        folder: Where to write; a file of the same name is replaced whole or not at all.
+        folder: Folder of the file; one of the same name is replaced whole or not at all.
         names: Which of `figures_of`; all by default.
         format: `png`, `pdf` or `svg`; default that of matplotlib's setting ``savefig.format``, PNG unless changed.
         width: Of the figure: in, `column` or `page` (`style.Width`).

@@ -1,4 +1,4 @@
-"""Self-locking: what friction makes of tension, and where in the workspace."""
+"""Self-locking: tension over joint friction, and the critical coefficient over the workspace."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def plot_self_locking_map(found: SelfLockingMap, *, width: Width = None, titles:
     What is the same at every posture is said in a line instead.
 
     Args:
-        found: What `self_locking_map` returned.
+        found: Map of `self_locking_map`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """

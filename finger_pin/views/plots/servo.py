@@ -1,4 +1,4 @@
-"""Servos: spools against joints, tension at the spool and at the finger, current, and where the power goes."""
+"""Servos: spools against joints, tension at the spool and at the finger, current, and power."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Three-dimensional axes in true proportion, also of what is flat."""
+"""Three-dimensional axes in true proportion, also of flat bodies."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
     """Return axes, seen obliquely, that hold some points.
 
     Args:
-        part: Where.
-        corners: That must be in view, shape (m, 3).
+        part: The part of the figure.
+        corners: Points that must be in view, shape (m, 3).
         unit: Of them.
     """
     axes = part.add_subplot(projection="3d")

@@ -77,7 +77,7 @@ R = TypeVar("R")
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Return a function that draws in this style; what the user has changed of matplotlib's settings stays as it is."""
+    """Return a function that draws in this style, beneath the user's own settings of matplotlib."""
 
     @wraps(draw)
     def drawn(*arguments: P.args, **options: P.kwargs) -> R:
@@ -93,7 +93,7 @@ class Picture(Figure):
 
     Attributes:
         titled: Whether its panels have titles.
-        fitted: What writes the text that depends on its size: titles in lines, legends in columns.
+        fitted: Functions that write the text that depends on its size: titles in lines, legends in columns.
     """
 
     titled = True

@@ -22,7 +22,7 @@ __all__ = ["LiveView", "Viewing", "draw", "view", "view_forces", "write_animatio
 
 
 def __getattr__(name: str) -> Any:
-    """Import what needs matplotlib on first use."""
+    """Import names that need matplotlib on first use."""
     if name == "write_video":
         return import_module("finger_pin.views.viewer.video").write_video
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -47,11 +47,11 @@ def write_animation(
     The file appears whole or not at all; an earlier one is replaced.
 
     Args:
-        result: What `simulate` returned or saved.
+        result: Dataset that `simulate` returned or saved.
         path: Of the file.
         forces: Drawn at the fingertip of its posture, if given.
         ghost: Another result, whose finger moves faintly beside this one at the same times, if given.
-        finger: What has moved, where it stands on a model of the user's own (`Finger.from_model`).
+        finger: The finger that moved, if it stands on a model of the user's own (`Finger.from_model`).
 
     Returns:
         The path of the file.
@@ -115,8 +115,8 @@ class Playback:
         time: Shape (m,), s: samples of the result.
         position: theta, shape (m, n), rad.
         tension: Of every strand, shape (m, s), N.
-        palm: Where the palm is, m poses, if it moves.
-        objects: What the finger may touch, if there is anything.
+        palm: Poses of the palm, m of them, if it moves.
+        objects: Objects around the finger, if there are any.
     """
 
     scene: Scene
@@ -143,9 +143,9 @@ class Playback:
         """Choose the frames of a result.
 
         Args:
-            result: What `simulate` returned or saved.
+            result: Dataset that `simulate` returned or saved.
             rate: Frames per second of motion; fewer where the motion is long or the result has fewer samples.
-            finger: What has moved, if it stands on a model of the user's own.
+            finger: The finger that moved, if it stands on a model of the user's own.
 
         Raises:
             InputError: If the result lacks something that is shown.

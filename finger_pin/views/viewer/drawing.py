@@ -34,7 +34,7 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
 
     Args:
         visualizer: The user's own.
-        result: What `simulate` returned or saved.
+        result: Dataset that `simulate` returned or saved.
         speed: Simulated seconds per second; infinite for the last posture at once.
         rate: Most frames per second.
 

@@ -1,4 +1,4 @@
-"""The page as one HTML text: meshcat's viewer, the player, and what it plays. It loads nothing from elsewhere."""
+"""The page as one HTML text: meshcat's viewer, the player, and its data. It loads nothing from elsewhere."""
 
 from __future__ import annotations
 

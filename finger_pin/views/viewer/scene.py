@@ -40,7 +40,7 @@ class Ghost:
 
     Attributes:
         scene: Its finger.
-        title: What it is.
+        title: Its name.
         poses: Of its links in every frame of the motion that is played.
     """
 
@@ -125,16 +125,16 @@ class Scene:
         ghost: Ghost | None = None,
         palm: LinkPoses | None = None,
     ) -> dict[str, Any]:
-        """Return the page's header: what stays the same in all frames.
+        """Return the page's header, the data of all frames alike.
 
         Args:
             title: Shown above the legend.
-            joint_positions: That the camera must have in view, shape (m, n), rad.
-            largest_tension: That the legend must reach, N.
+            joint_positions: Postures that the camera must have in view, shape (m, n), rad.
+            largest_tension: Tension that the legend must reach, N.
             live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
             ghost: Another finger, drawn faintly beside this one, if given.
-            palm: Where the palm is at those positions, if it moves.
+            palm: Poses of the palm at those positions, if it moves.
         """
         geometry, tube = self.geometry, self.tube_radius
         poses = geometry.poses(joint_positions, palm)
@@ -187,7 +187,7 @@ class Scene:
             time: Shape (m,), s.
             joint_position: theta, shape (m, n), rad.
             tension: Of every strand, shape (m, s), N.
-            palm: Where the palm is, if it moves.
+            palm: Poses of the palm, if it moves.
         """
         q, f = np.asarray(joint_position, dtype=float), np.asarray(tension, dtype=float)
         poses = self.geometry.poses(q, palm)

@@ -38,7 +38,7 @@ class SceneObjects:
         contacts: Point, m, force on the second body, N, and normal of every contact, shape (m, c, 9).
         steepness: mu of every contact, shape (c,): the most friction over the normal force that there was.
         size: Length of the finger, m.
-        middle: Where the finger is, shape (3,), m.
+        middle: Middle of the finger, shape (3,), m.
     """
 
     by_name: dict[str, Object]
@@ -56,10 +56,10 @@ class SceneObjects:
         """Read a result at the times of the frames, which are among its samples; None if it has no contacts.
 
         Args:
-            result: What `simulate` returned or saved.
+            result: Dataset that `simulate` returned or saved.
             time: Of the frames, shape (m,), s.
             size: Length of the finger, m.
-            middle: Where the finger is, shape (3,), m.
+            middle: Middle of the finger, shape (3,), m.
             palm: Poses of a palm that moves, at those times; objects and contacts are seen from it.
         """
         if "contact_force" not in result:
@@ -128,7 +128,7 @@ class SceneObjects:
             yield self._placement(name, each.pose)
 
     def frame(self, index: int) -> Iterator[Command]:
-        """Yield meshcat's commands that move objects to where they are in a frame."""
+        """Yield meshcat's commands that move objects to their places in a frame."""
         for name, pose in zip(self.moving, self.poses[index], strict=True):
             yield self._placement(name, pose)
 

@@ -39,7 +39,7 @@ class Viewing:
     """A page that is being served; a context manager that ends it.
 
     Attributes:
-        url: Where it is, on the loopback address.
+        url: Its address, on the loopback interface.
     """
 
     def __init__(self, server: PageServer, page: str | None = None) -> None:
@@ -55,7 +55,7 @@ class Viewing:
             self.close()
 
     def close(self) -> None:
-        """Stop serving; open pages keep what they have."""
+        """Stop serving; open pages keep their frames."""
         self._server.close()
 
     def __repr__(self) -> str:
@@ -92,10 +92,10 @@ def view(
     """Show a result in meshcat: the finger moves, its tendons run along their paths in the colour of their tension.
 
     Args:
-        result: What `simulate` returned or saved.
-        forces: What `force_polytope` returned, drawn translucent at the fingertip of its posture.
+        result: Dataset that `simulate` returned or saved.
+        forces: Polytope of `force_polytope`, drawn translucent at the fingertip of its posture.
         ghost: Another result, whose finger moves faintly beside this one at the same times.
-        finger: What has moved, where it stands on a model of the user's own (`Finger.from_model`).
+        finger: The finger that moved, if it stands on a model of the user's own (`Finger.from_model`).
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
 
@@ -120,7 +120,7 @@ def view_forces(
 
     Args:
         finger: The finger, its description, its name, or the path of its file.
-        forces: What `force_polytope` returned.
+        forces: Polytope of `force_polytope`.
         tension: Of every strand, shape (s,), N, such as `RequiredTension.strands`; slack by default.
         open_browser: Whether to open the page in the user's browser; by default unless a notebook shows it.
         block: Whether to serve until Ctrl-C; by default where Python is not interactive.
@@ -227,7 +227,7 @@ class LiveView(Viewing):
         self.update(t, signals.finger.state.position, tension, strands[actuated::2])
 
     def close(self) -> None:
-        """Show the last state and stop serving; open pages keep what they have."""
+        """Show the last state and stop serving; open pages keep their frames."""
         self._show()
         super().close()
 

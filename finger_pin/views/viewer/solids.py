@@ -1,4 +1,4 @@
-"""Everything that is rigid, as meshcat commands: the visuals of the URDF, and a groove for every winding."""
+"""Rigid bodies as meshcat commands: the visuals of the URDF, and a groove for every winding."""
 
 from __future__ import annotations
 

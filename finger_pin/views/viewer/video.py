@@ -56,7 +56,7 @@ def write_video(
     The file appears whole or not at all; an earlier one is replaced.
 
     Args:
-        result: What `simulate` returned or saved.
+        result: Dataset that `simulate` returned or saved.
         path: Of the film, ending in ``.mp4`` or ``.gif``.
         speed: Simulated seconds per second of film.
         rate: Frames per second of film; by default 30, of a GIF 20.
@@ -99,7 +99,7 @@ def draw_picture(result: xr.Dataset, stage: Array) -> NDArray[np.uint8]:
     """Return a picture of the last sample of a result, shape (height, width, 3).
 
     Args:
-        result: What `simulate` returned, or a part of it that has what is shown.
+        result: Dataset of `simulate`, or a part of it with the signals shown.
         stage: Points that are in view whatever the posture, shape (k, 3), m, base frame.
     """
     figure = new_figure(*_INCHES, layout=None)
@@ -136,7 +136,7 @@ class _Film:
     """A motion on a figure, a frame at a time."""
 
     def __init__(self, figure: Figure, motion: Playback, stage: Array = _NO_POINTS) -> None:
-        """Set the stage: camera, legend, and what stays; further points that are in view have shape (k, 3), m."""
+        """Set the stage: camera, legend, and bodies at rest; further points in view have shape (k, 3), m."""
         scene = motion.scene
         self.motion = motion
         self.poses = self.links = scene.geometry.poses(motion.position, motion.palm)
@@ -189,7 +189,7 @@ class _Film:
         axes.add_collection(self.arrows)
 
     def show(self, frame: int) -> None:
-        """Move everything to where it is in a frame."""
+        """Move all bodies and tendons to their places in a frame."""
         motion, scene = self.motion, self.motion.scene
         # What is farther away is drawn first.
         depth = [float(self._placed(solid, frame).mean(axis=0) @ self.camera[2]) for solid in self.solids]

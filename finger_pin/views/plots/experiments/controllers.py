@@ -1,4 +1,4 @@
-"""Controllers side by side: their errors over time, and what they cost."""
+"""Controllers side by side: their errors over time, and their tensions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def plot_controllers(
 
     Args:
         results: At most four datasets of `simulate` by name, of the same finger and motion.
-        rows: What `compare` returned, the one to compare with first.
+        rows: Rows of `compare`, the one to compare with first.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """

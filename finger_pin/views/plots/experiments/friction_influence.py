@@ -31,7 +31,7 @@ def plot_friction_influence(found: FrictionInfluence, *, width: Width = None, ti
     """Draw errors, tensions and losses over both frictions and the least tension, and the two frictions compared.
 
     Args:
-        found: What the experiment `friction_influence` returned.
+        found: Result of the experiment `friction_influence`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """

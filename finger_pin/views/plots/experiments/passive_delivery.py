@@ -21,7 +21,7 @@ def plot_passive_delivery(found: PassiveDelivery, *, width: Width = None, titles
     """Draw (a) plan and delivery of the scenario as it is, (b) causes of the difference, (c) over speed and friction.
 
     Args:
-        found: What the experiment `passive_delivery` returned.
+        found: Result of the experiment `passive_delivery`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """

@@ -1,4 +1,4 @@
-"""Conclusion (a): what share of its command a tendon delivers, over the workspace and in motion."""
+"""Conclusion (a): the share of its command that a tendon delivers, over the workspace and in motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def plot_transmission(found: Transmission, *, width: Width = None, titles: bool 
     """Draw (a) the efficiencies of all tendons over the workspace, (b) the most affected one by fingertip, (c) motion.
 
     Args:
-        found: What the experiment `transmission` returned.
+        found: Result of the experiment `transmission`.
         width: Of the figure: in, `column` or `page` (`style.Width`).
         titles: Whether panels have titles.
     """
