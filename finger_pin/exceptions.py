@@ -55,7 +55,7 @@ class InputError(FingerPinError, ValueError):
     """
 
     def __init__(self, entry: str, allowed: str, value: Any = None) -> None:
-        """Name the entry, what it may be and what it was."""
+        """Name the entry, the values allowed and the value given."""
         self.entry = entry
         self.allowed = allowed
         self.value = value
@@ -74,7 +74,7 @@ class IntegrationError(FingerPinError, RuntimeError):
     """
 
     def __init__(self, time: float, reason: str, advice: str, result: xr.Dataset | None = None) -> None:
-        """Say until when, why, and what to try."""
+        """Name the time of the failure, its reason and a remedy."""
         self.time = time
         self.reason = reason
         self.advice = advice
@@ -107,7 +107,7 @@ class StudyError(FingerPinError):
     """
 
     def __init__(self, reason: str, result: xr.Dataset) -> None:
-        """Say why the first run failed, and keep what came out."""
+        """Name the reason of the first run's failure, and keep the partial result."""
         self.result = result
         super().__init__(_one_line(f"every run failed; the first one: {reason}"))
 

@@ -41,7 +41,7 @@ def _declared(table: type) -> dict[str, Along]:
 
 
 class Subset:
-    """A part of tables: what is kept of every axis.
+    """A part of tables: the indices kept of every axis.
 
     Attributes:
         kept: By axis, the indices that are kept, in order.
@@ -66,7 +66,7 @@ class Subset:
         self.keep(axis, np.concatenate([np.zeros(0, dtype=np.int64), *ranges]), int(starts[-1][0][-1]))
 
     def of(self, table: _Table) -> _Table:
-        """Return what a table has of this part; fields without axes stay as they are."""
+        """Return the table of this part; fields without axes stay as they are."""
         found: dict[str, Any] = {}
         ends: dict[str, int] = {}
         for name, (axes, of, starts) in _fields(table):

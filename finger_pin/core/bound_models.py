@@ -1,4 +1,4 @@
-"""Models of a mechanism under inputs that are given, and what they compute of many states at once."""
+"""Models of a mechanism under given inputs, and their evaluation of many states at once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FEW = 1000
 
 
 class Room(NamedTuple):
-    """What `evaluate_many` fills for m states, beside the packed states, shape (m, size).
+    """Arrays for the signals of m states, filled by `evaluate_many`, beside packed states, shape (m, size).
 
     The rows are those of more states, these from the ``first`` on: compiled code takes them whole.
     """
@@ -49,7 +49,7 @@ class Room(NamedTuple):
     def states(
         self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
     ) -> States:
-        """Return some states with what is filled for them, for the model at an address."""
+        """Return some states with the arrays of their signals, for the model at an address."""
         own = self.part(at)
         return States(
             model=model,
@@ -69,12 +69,12 @@ class Room(NamedTuple):
 
 
 class Models:
-    """Models of the same tables under inputs that are given: memory for threads, and with or without forces at tips."""
+    """Models of the same tables under given inputs: memory for threads, with or without forces at tips."""
 
     def __init__(
         self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool, books: int
     ) -> None:
-        """Keep what they are made of.
+        """Keep tables and inputs.
 
         Args:
             tables: Of a mechanism or an island.
@@ -118,7 +118,7 @@ def book_many(
         attitudes: Of free bodies, shape (m, f, 4).
         commands: Inputs, shape (m, u).
         forces: At the tips, shape (m, t, 3), N.
-        base: How the base moves, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
+        base: Motion of the base, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
     """
     count, work = len(states), models.model().model.work
     room = Room(
@@ -138,7 +138,7 @@ def book_many(
 def fill(
     models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
 ) -> None:
-    """Fill a room with what is computed of states of the core, as for `book_many`."""
+    """Fill a room with the signals of states of the core, as for `book_many`."""
     bases = path_motions(base, len(states), int(models.tables.guided.max(initial=-1)) + 1)
     loaded, count = bool(np.any(forces)), len(states)
 
@@ -155,7 +155,7 @@ def fill(
 
 
 def path_motions(base: Array | None, count: int, guided: int) -> Array:
-    """Return the motions of the base and of what is moved along paths, shape (count, 15 + g), or no rows at rest."""
+    """Return the motions of the base and of the guided coordinates, shape (count, 15 + g), or no rows at rest."""
     if base is None:
         return np.zeros((0, 15 + guided))
     given = np.concatenate([base[..., :15], base[..., GUIDES : GUIDES + guided]], axis=-1)

@@ -32,11 +32,11 @@ _ANYWHERE = 1e3
 
 
 class Chains(NamedTuple):
-    """The bodies of `Tables`, and where the joints of the model are among them.
+    """The bodies of `Tables`, and the places of the model's joints among them.
 
     Attributes:
         parents, roots, kinds, bodies, charts, chart_frames: As in `Tables`.
-        slides: How far each body slides at most, shape (n,), m.
+        slides: Largest displacement of each sliding body, shape (n,), m.
         last: Of every joint of the model, the base first, its last body; -1 for the base.
         turns: Rotation of the joint's frame to that body's, shape (3, 3) each.
     """
@@ -52,7 +52,7 @@ class Chains(NamedTuple):
     turns: list[Array]
 
     def geometry(self) -> bytes:
-        """Return all of it that does not say how heavy bodies are."""
+        """Return the bytes of everything but the inertias."""
         places = self.bodies[:, ROTATION:MASS]
         parts = (self.parents, self.kinds, places, self.slides, self.charts, np.array(self.last), *self.turns)
         return b"".join(np.ascontiguousarray(each).tobytes() for each in parts)

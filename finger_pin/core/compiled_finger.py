@@ -29,7 +29,7 @@ class CompiledMechanism:
 
     Attributes:
         mechanism: The mechanism.
-        charts: Where its packed states have quaternions.
+        charts: Places of quaternions in its packed states.
         tables: Its arrays.
         models: Bound models of them.
     """
@@ -79,7 +79,7 @@ class CompiledMechanism:
         return self.found(room, slice(None) if np.ndim(x) > 1 else 0)
 
     def room(self, count: int, *, booked_only: bool = False, accelerated: bool = True) -> Room:
-        """Return room for what is computed of so many states: all, or energies, powers and J^T F only."""
+        """Return room for the signals of so many states: all, or energies, powers and J^T F only."""
         mechanism, work = self.mechanism, self.models.model().model.work
         width, kept = mechanism.coordinates, 0 if booked_only else count
         return Room(
@@ -94,7 +94,7 @@ class CompiledMechanism:
         )
 
     def found(self, room: Room, at: slice | int = slice(None)) -> Evaluation:
-        """Return what fills a room, or what does so at one place."""
+        """Return the evaluation in a room, or at one place of it."""
         mechanism, rates, rows = self.mechanism, room.rates, room.rows[:, room.first :][:, : len(room.packed)]
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         if not len(rates):
@@ -140,7 +140,7 @@ class CompiledMechanism:
         return room.booked[:, len(self.mechanism.books.stored) :], room.externals
 
     def fill(self, room: Room, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> None:
-        """Fill a room with what is computed of packed states, shape (size,) or (m, size)."""
+        """Fill a room with the signals of packed states, shape (size,) or (m, size)."""
         mechanism, tables = self.mechanism, self.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
@@ -189,7 +189,7 @@ class CompiledFinger:
 
     Attributes:
         finger: The finger.
-        mechanism: What evaluates its mechanism.
+        mechanism: Evaluator of its mechanism.
     """
 
     def __init__(self, finger: Finger) -> None:
@@ -232,7 +232,7 @@ class CompiledFinger:
 
     @cached_property
     def _alone(self) -> CompiledMechanism:
-        """What fingertip and energies are of: the finger without what surrounds it."""
+        """The mechanism of the finger without its surroundings, for fingertip and energies."""
         if self.finger.surroundings is None:
             return self.mechanism
         return CompiledMechanism(Mechanism(self.finger.rigid_body, [], moved=self.finger.mechanism.moved))

@@ -1,4 +1,4 @@
-"""Fingers that differ in their numbers alone, each evaluated at one state of its own."""
+"""Fingers with different numbers in the same tables, each evaluated at one state of its own."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class CompiledFingers:
         return not alike or any(table.routed for table in rows[0]), not all(map(np.array_equal, *bodies))
 
     def _bound(self, index: int, loaded: bool, moved: bool) -> NDArray[np.uint8]:
-        """Return the block by which compiled code finds a finger, its state, and what is filled for it."""
+        """Return the block by which compiled code finds a finger, its state, and the arrays of its signals."""
         model = self._fingers[index].mechanism.models.model(loaded)
         bases = self._bases if moved else self._bases[:0]
         given = (self._states, self._commands, self._forces, bases, self._attitudes)

@@ -1,4 +1,4 @@
-"""What comes from outside, as arrays: the paper's controller (19)-(22), inputs over time, or inputs that are held."""
+"""Inputs from outside as arrays: the paper's controller (19)-(22), inputs over time, or held inputs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Control(NamedTuple):
 
     Attributes:
         kind: HELD, PLANNED or SCHEDULED.
-        tension: What is held, shape (u,); zero for inputs that are planned or scheduled.
+        tension: Held inputs, shape (u,); zero for those that are planned or scheduled.
         gain: K_P, shape (N,).
         minimum: f0, shape (T,).
         inverse: Pseudo-inverse of H_c^T, shape (T, N).
@@ -31,7 +31,7 @@ class Control(NamedTuple):
         coupling: Shape (N, r).
         offset: Shape (N,).
         schedule: Inputs over time, u functions.
-        force: What varies of the forces at the t tips, 3 t functions or none, N, base frame.
+        force: Varying part of the forces at the t tips, 3 t functions or none, N, base frame.
         damping: K_D, shape (N,).
         damped: Whether it is not zero.
         guide: Paths along which coordinates are moved, or no functions.

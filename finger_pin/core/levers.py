@@ -1,4 +1,4 @@
-"""How far the coordinates of a mechanism move the two bodies of a gap against each other."""
+"""Levers: displacements of a gap's two bodies against each other per unit of a coordinate."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from finger_pin.mechanism.pieces import Piece
 
 
 class Carrying(NamedTuple):
-    """What the bodies of chains do to those that they carry.
+    """The motions of carried bodies by those that carry them.
 
     Attributes:
         parents: Of each body, -1 for the base.
@@ -52,10 +52,10 @@ def levers(
 
     Args:
         piece: The gap.
-        coordinates: Those that move its bodies, shape (k,).
+        coordinates: Coordinates that move its bodies, shape (k,).
         moves: Which of the bodies of both points and of the frame each moves, shape (k, 3).
         last: Of every joint its last body.
-        carrying: What the bodies do.
+        carrying: Motions by the bodies.
     """
     parents, slides, distances, axes = carrying
     found, against = dict[int, float](), dict[int, int]()

@@ -21,15 +21,15 @@ from finger_pin.core.work import Work, take_numbers
 
 
 class Model(NamedTuple):
-    """Everything that an evaluation and its linearisation work on.
+    """The tables, inputs and memory of an evaluation and its linearisation.
 
     Attributes:
         tables: The mechanism.
         control: Its inputs.
         work: Memory of an evaluation.
         linear: Memory of a linearisation.
-        state: Where it is evaluated, shape (size,).
-        rate: What comes out, shape (size,).
+        state: State of the evaluation, shape (size,).
+        rate: Its rate, shape (size,).
         evaluate: Address of the function that fills ``rate``, at a time.
         exert: Address of what it calls for the rows.
         linearise: Address of the function that fills all partial derivatives after it, at a time.
@@ -68,7 +68,7 @@ MODEL = Kind(Model)
 
 
 class BoundModel:
-    """A model, and where it lies.
+    """A model and its address.
 
     Attributes:
         model: Its arrays, which live as long as this.

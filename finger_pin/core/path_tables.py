@@ -33,18 +33,18 @@ class Paths(NamedTuple):
         columns: Number of wrenches of each, shape (E,).
         parameters: Shape (E, most parameters).
         reach: Shape (E,), m.
-        start: Where the coordinates that move a piece begin, shape (E + 1,).
+        start: First index of the coordinates that move a piece, shape (E + 1,).
         at: Coordinates, shape (entries,).
         moves: One where a coordinate moves the first, the second, and the frame's body, shape (entries, 3).
-        levers: How far a unit of each of them moves a point of a gap's bodies against the other body at most, shape
+        levers: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
             (entries,), m; zero where it carries both, or only turns what looks alike.
         against: A coordinate that moves the other body along the same direction, -1 for none, shape (entries,).
-        cores: How far the core of a gap's first body goes from the middle of its two points, shape (E,), m.
-        extents: How far the core of a gap's second body goes from its frame's origin, shape (E,), m.
+        cores: Extent of the core of a gap's first body from the middle of its two points, shape (E,), m.
+        extents: Extent of the core of a gap's second body from its frame's origin, shape (E,), m.
         row: First row that uses each, shape (E,).
         carries: One where a body carries another, shape (n, n).
         rows: Rows with paths, shape (R,).
-        leg_start: Where their legs begin, shape (R + 1,).
+        leg_start: First index of their legs, shape (R + 1,).
         piece: Of each leg, shape (L,).
         column: Of each leg, shape (L,).
         follows: Of each leg, shape (L,).
@@ -80,20 +80,20 @@ class PathWork(NamedTuple):
     """Memory for pieces.
 
     Attributes:
-        out: What the shapes say, shape (E, OUT).
+        out: Values and slopes of the shapes, shape (E, OUT).
         active: Zero for gaps that are open, shape (E,).
         awake: Contacts that are not asleep, in order, shape (E,).
-        awake_count: How many, shape (1,).
+        awake_count: Their number, shape (1,).
         closed: Gaps that are not open, in order, shape (E,).
-        closed_count: How many, shape (1,).
+        closed_count: Their number, shape (1,).
         asleep: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
             step, as the next.
         clear: No more than the gap of every piece where the step began, shape (E,), m.
         ahead: Likewise, where it ends.
-        path: How far the bodies of a gap may move against each other in a step, shape (E,), m.
-        far: How far the core of the first body is from the origin of the second's frame at most, where the step began,
+        path: Bound of the path of a gap's bodies against each other in a step, shape (E,), m.
+        far: Largest distance of the first body's core from the origin of the second's frame, where the step began,
             shape (E,), m.
-        travel: How far each coordinate goes to and fro in a step, shape (N,).
+        travel: Path of each coordinate, to and fro, in a step, shape (N,).
         control: Bernstein coefficients of its motion, shape (N, 5).
         looks: Moments of a step, and what was seen there of a gap, shape (LOOKS, 6).
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
@@ -197,7 +197,7 @@ def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
 
 
 def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the coordinates that move three bodies, and which of the three each moves."""
+    """Return the coordinates that move three bodies, and a mask of the three for each."""
     moves = np.zeros((len(parents), 3), dtype=np.int64)
     for which, body in enumerate(carriers):
         at = int(body)

@@ -42,14 +42,14 @@ class Tables(NamedTuple):
         tip_force: Shape (t, 3), N, base frame; changed in place.
         loaded: Whether forces at the tips count.
         carriers: Body that has the link before each joint, -1 for the base, shape (n,).
-        directions: That link's unit vector in its frame, shape (n, 3).
+        directions: Unit vector of that link in its frame, shape (n, 3).
         groups: First and last + 1 row of each, whether it has inputs from earlier rows, or loads, and the column of
             its rows' kink, -1 for none, shape (G, 5).
         laws: Addresses of value, slopes and account, shape (G, 3).
-        books: Where stored energy and powers of each group are booked, -1 for none, shape (G, 1 + most powers).
+        books: Accounts of stored energy and powers of each group, -1 for none, shape (G, 1 + most powers).
         parameters: Shape (most parameters, K).
         offset: Shape (K,).
-        arm_start: Where the row's arm begins among what follows, shape (K + 1,).
+        arm_start: First index of the row's arm in the following, shape (K + 1,).
         arm_at: Coordinates that a row acts on or measures, shape (arms,).
         arm_row: The row, shape (arms,).
         arm: Torque per force there, shape (arms,).
@@ -60,13 +60,13 @@ class Tables(NamedTuple):
         touching: Number of rows of contacts, which stand before all others.
         channel: Index of its input from outside, -1 without one, shape (K,).
         fed_row: Rows that have an input, from outside or from earlier rows, ascending.
-        input_start: Where the terms of its input from earlier rows begin in ``terms``, shape (K + 1,).
-        load_start: Where those of its load begin, shape (K + 1,).
+        input_start: First index of the terms of its input from earlier rows in ``terms``, shape (K + 1,).
+        load_start: First index of the terms of its load, shape (K + 1,).
         terms: Earlier rows, shape (terms,).
         weights: Their weights, shape (terms,).
         pins: The body whose pin the row is, -1 for none, shape (K,).
         carried: One where a force at a tip passes the pin of a body, shape (t, n).
-        bend_start: Where the row's bends begin, shape (K + 1,).
+        bend_start: First index of the row's bends, shape (K + 1,).
         bend_at: Coordinates that bend its path, shape (bends,).
         bend_row: The row, shape (bends,).
         bend: Curvature per |q| there, shape (bends,).
@@ -162,7 +162,7 @@ def _read(mechanism: Mechanism) -> Tables:
 
 
 def _of_body(body: RigidBody, chains: Chains) -> dict[str, Any]:
-    """Return the tree of rigid bodies, its tips, and how joints are loaded as pins."""
+    """Return the tree of rigid bodies, its tips, and the loads of joints as pins."""
     model, last, turns = body.model, chains.last, chains.turns
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
     tips = [model.frames[tip] for tip in body.tips]
@@ -213,7 +213,7 @@ def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
 
 
 def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
-    """Return how rows are fed and loaded by earlier ones, from outside, and as pins."""
+    """Return the wiring of rows: inputs and loads by earlier ones, from outside, and as pins."""
     rows, ends = mechanism.rows, np.cumsum([0, *(table.count for table in mechanism.rows)])
     first_row = {table.group: int(begin) for table, begin in zip(rows, ends[:-1], strict=True)}
     first_body = [*(int(joint.idx_v) for joint in mechanism.body.model.joints[1:]), -1]
@@ -290,6 +290,6 @@ def _books(mechanism: Mechanism) -> NDArray[np.int64]:
 
 
 def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return where each row begins among the entries that are wanted, and the entries' rows and columns."""
+    """Return the first entry of each row among those wanted, and the entries' rows and columns."""
     rows, columns = np.nonzero(wanted)
     return np.append(0, np.cumsum(wanted.sum(axis=1))), np.ascontiguousarray(rows), np.ascontiguousarray(columns)

@@ -1,4 +1,4 @@
-"""Threads, for what holds no lock of Python."""
+"""Threads, for tasks that hold no lock of Python."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def usable_cores() -> int:
 
 
 def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
-    """Do a task that holds no lock of Python for all items side by side; return what it returns in their order.
+    """Return the results of a task that holds no lock of Python, done for all items side by side, in their order.
 
     Only what the main thread does is spread: who runs many at once has no core to spare.
     """

@@ -21,8 +21,8 @@ class Work(NamedTuple):
     Attributes:
         base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
         base_rate: Their rates, shape (2, 6).
-        base_power: What the base supplies, shape (1,), W.
-        rows: What the rows see and do, shape (columns, K); columns named in `law_code`.
+        base_power: Power of the base, shape (1,), W.
+        rows: Arguments and results of the rows' laws, shape (columns, K); columns named in `law_code`.
         slopes: Derivatives of the laws, shape (SLOPES, K).
         powers: Stored energy and powers of the rows, shape (1 + powers, K).
         arm: As in the tables, shape (arms,), with what paths through space add.
@@ -114,7 +114,7 @@ def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) 
 
 
 def take_numbers(work: Work, tables: Tables) -> None:
-    """Copy from tables what an evaluation finds in its memory: what no path and no moving body changes."""
+    """Copy the entries of an evaluation that no path and no moving body changes from tables into its memory."""
     work.base_acceleration[3:] = -tables.gravity
     work.arm[:], work.gradient[:] = tables.arm, tables.measure
     work.paths.frame[:], work.paths.origin[:] = tables.paths.rotation, tables.paths.origin

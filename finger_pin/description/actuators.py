@@ -256,7 +256,7 @@ def check_sources(actuators: dict[str, Actuator], tensions: Iterable[str]) -> No
 
 
 def check_currents(actuators: dict[str, Actuator], tension: dict[str, float]) -> None:
-    """Raise the error of a motor that cannot exert what keeps its tendons taut at rest, N by tendon."""
+    """Refuse a motor that cannot exert the tensions, N by tendon, that keep its tendons taut at rest."""
     for name, actuator in actuators.items():
         motor, count = actuator.motor, len(actuator.tendons)
         radii = expand(actuator.spool_radius, count) * np.array([1.0, -1.0])[:count]

@@ -135,7 +135,7 @@ class SimulationSettings(Description):
 
 
 class Scenario(Description):
-    """Everything that determines a simulation.
+    """The whole input of a simulation.
 
     With a ``hand`` in place of a finger, ``finger`` is all its fingers together, and every other table is for all of
     them alike: joints and tendons have dotted names, and lists of numbers are those of each finger.

@@ -261,7 +261,7 @@ class Mechanism:
         forces: Array,
         touching: Sequence[tuple[Paths, Array]],
     ) -> Array:
-        """Return N: the magnitude of what earlier rows add up to, or of -e S + F for the pins of joints (17)."""
+        """Return N, the magnitude of a sum of earlier rows' forces, or of -e S + F for the pins of joints (17)."""
         load = np.zeros((*q.shape[:-1], table.count))
         for group, weights in table.loads.items():
             load = load + found[group].force @ weights.T

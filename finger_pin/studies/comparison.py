@@ -1,4 +1,4 @@
-"""Controllers side by side: how well each tracks, how hard it pulls, and what friction takes, on the same motion."""
+"""Controllers side by side on the same motion: tracking, tensions, and losses by friction."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def compare(name: str, result: xr.Dataset, coupling: Array) -> Comparison:
 
     Args:
         name: Which controller.
-        result: What `simulate` returned, longer than a second.
+        result: Dataset of `simulate`, longer than a second.
         coupling: H_c of its finger, shape (t, n), m.
     """
     part = result.sel(time=slice(SETTLED, None))

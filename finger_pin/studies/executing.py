@@ -39,7 +39,7 @@ class Lost:
 
     Attributes:
         reason: Why, in one line.
-        error: What was raised.
+        error: Exception raised.
     """
 
     reason: str
@@ -69,14 +69,14 @@ class Crew:
         self._threads = executor is None or isinstance(executor, ThreadPoolExecutor)
 
     def __enter__(self) -> Self:
-        """Return itself; what warns of single scenarios is silent meanwhile, in all threads."""
+        """Return itself; warnings of single scenarios are silent meanwhile, in all threads."""
         self._silence = warnings.catch_warnings(action="ignore", category=ScenarioWarning)
         self._silence.__enter__()
         self._executor = self._given or ThreadPoolExecutor(self._count, "finger_pin")
         return self
 
     def compile(self, scenario: Scenario) -> None:
-        """Compile what other processes then find in the cache, rather than each of them on its own."""
+        """Compile code that other processes then find in the cache, rather than each of them on its own."""
         if self._threads:
             return
         settings = scenario.simulation
@@ -100,7 +100,7 @@ class Crew:
 
         Args:
             function: Takes an item, and what it may ask whether to stop.
-            items: What it takes.
+            items: Its arguments.
             stop: Asked now and then; when it returns true, what has not been begun is left.
         """
         answers: queue.SimpleQueue[tuple[int, Future[Any]]] = queue.SimpleQueue()
@@ -151,7 +151,7 @@ def _call(work: bytes) -> Any:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Ignore what warns of single scenarios, unless in a thread: filters are those of the whole process."""
+    """Ignore warnings of single scenarios, unless in a thread: filters are those of the whole process."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""Digests of what a run depends on besides its scenario: source, other packages, metrics, a finger of one's own."""
+"""Digests of a run's dependencies besides its scenario: source, other packages, metrics, a finger of one's own."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _OF_CLASSES = {"__dict__", "__weakref__", "__dataclass_fields__", "__dataclass_p
 
 
 class UnknownDependency(Exception):
-    """Something depends on what cannot be compared with what it was at another time; the message says what."""
+    """A dependency that cannot be compared with its earlier self; the message names it."""
 
 
 @cache
@@ -78,7 +78,7 @@ def finger_digest(finger: Finger) -> str:
 
 
 def _parts(thing: Any, names: frozenset[str], seen: dict[Any, Any]) -> Iterator[str]:
-    """Yield the marks of a thing; of a user's own module, only those of what is used by one of some names."""
+    """Yield the marks of a thing; of a user's own module, only those of the parts used by one of some names."""
     if thing is None or isinstance(thing, bool | int | float | complex | str | bytes | EllipsisType):
         yield repr(thing)
         return

@@ -1,4 +1,4 @@
-"""The folder of a study: what was asked, a record of every finished run, and what was made of them.
+"""The folder of a study: its question, a record of every finished run, and its results.
 
 A record is a line of ``runs.jsonl``, written by one append and synced before its run counts as finished. A process
 that is killed in the middle of one leaves a torn last line. The next process that opens the file cuts it off, and the
@@ -43,7 +43,7 @@ class Store:
     """
 
     def __init__(self, path: str | Path | None = None) -> None:
-        """Read what is there.
+        """Read the records of the folder.
 
         Args:
             path: A file, made if need be, that no other process writes; by default nothing outlives this object.
@@ -122,7 +122,7 @@ class StudyFolder:
 
         Args:
             path: The folder; it may exist.
-            asked: What determines the study, for a TOML file.
+            asked: Settings that determine the study, for a TOML file.
             products: Patterns of the files that are made of the runs, such as ``figures/sweep.png``.
             restart: Whether to begin anew what is there already.
         """

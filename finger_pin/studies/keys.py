@@ -1,4 +1,4 @@
-"""Keys of a scenario: what they hold and mean, and scenarios with other numbers or names there.
+"""Keys of a scenario: their values and meanings, and scenarios with other numbers or names there.
 
 A key is dotted as in `load_scenario`, such as ``finger.joints.distal.link.length``. One number of a list has its index
 in brackets: ``environment.fingertip_force[2]``. A star stands for every name: ``finger.actuators.*.motor``.
@@ -30,9 +30,9 @@ class Starting:
     """The scenario that a study varies.
 
     Attributes:
-        given: What `load_scenario` takes.
+        given: Argument of `load_scenario`.
         overrides: Entries that hold at all points.
-        scenario: What the two make.
+        scenario: Scenario of the two.
         finger: Replaces the finger that it describes; a point's values at keys of a finger change it.
     """
 
@@ -85,8 +85,8 @@ class Starting:
         """Raise unless a key can hold values of this kind; some may still be wrong, or not go with other keys.
 
         Args:
-            key: What is varied.
-            values: What it is given.
+            key: Key to vary.
+            values: Its values.
             alone: Whether no other key is varied, which might make the values fit.
 
         Raises:
@@ -165,7 +165,7 @@ def split(key: str) -> tuple[str, int | None]:
 
 
 def describe(key: str) -> dict[str, str]:
-    """Return ``units`` and ``long_name`` of what a key holds, from its description."""
+    """Return ``units`` and ``long_name`` of the value at a key, from its description."""
     name, index = split(key)
     first, *rest = parts = name.split(".")
     # In a hand the joints of a finger stand in a table of its own.

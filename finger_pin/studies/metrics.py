@@ -71,9 +71,9 @@ class Metric:
     """A number that says how good a run is.
 
     Attributes:
-        name: How it is asked for.
+        name: Name by which it is asked for.
         unit: SI unit.
-        long_name: What it is.
+        long_name: Its name in words.
         measure: Takes a run and returns the number. Other processes call it.
     """
 
@@ -193,7 +193,7 @@ def _proximal(result: xr.Dataset) -> Array:
 
 
 def _ends(result: xr.Dataset) -> list[Array]:
-    """Return the tensions at both ends of all tendons; what is planned for passive ones is none."""
+    """Return the tensions at both ends of all tendons; planned ones of passive tendons are no commands."""
     delivered = rows(result, "tendon_tension", "tendon")
     if "spool_tension" in result:
         return [delivered, rows(result, "spool_tension", "tendon")]

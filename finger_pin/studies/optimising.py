@@ -93,17 +93,17 @@ def optimise(
     ``output`` every finished run is on disk at once, and the same search again continues where it ended.
 
     Args:
-        scenario: What is varied: a scenario, its name, or the path of a file.
+        scenario: The scenario to be varied, its name, or the path of a file.
         over: Variables, or how `parse_variable` reads them; by default the winding `radii` of the finger.
         minimise: Metrics to be made small.
         maximise: Metrics to be made large.
         constraints: Bounds on metrics, such as ``self_locking_margin>=1.5``.
-        effort: How long to search.
+        effort: Effort of the search.
         overrides: Entries of the scenario that hold for all designs.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
         output: Folder for ``study.toml``, ``runs.jsonl``, ``optimise.nc``, ``front.csv`` and ``front``, which has every
             design of the front as a scenario; by default nothing is kept.
-        executor: Where runs are done: any of `concurrent.futures`, by default one thread for each core.
+        executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         progress: Called with the numbers of finished, failed and all runs;
             in a notebook there is a bar by default.

@@ -184,7 +184,7 @@ class Goals:
     Attributes:
         objectives: At least one.
         constraints: Any number.
-        metrics: All that are needed, each once.
+        metrics: All metrics needed, each once.
     """
 
     objectives: tuple[Objective, ...]

@@ -1,4 +1,4 @@
-"""Metrics of how a finger responds: hysteresis, settling, heat in windings, and how sure a grip is."""
+"""Metrics of a finger's response: hysteresis, settling, heat in windings, and the margin of a grip."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _hysteresis(result: xr.Dataset, name: str, finger: Finger) -> float:
 
 
 def settling_time(run: Run) -> float:
-    """Return the time from which every joint stays within 2 % of its travel of where it ends, s."""
+    """Return the time from which every joint stays within 2 % of its travel about its last position, s."""
     position = rows(run.result, "joint_position", "joint")
     away = np.abs(position - position[-1])
     # A joint that rounding alone moves is where it ends.

@@ -1,4 +1,4 @@
-"""Runs of a study: what is to be done, doing it in whatever process, and what is kept of it.
+"""Runs of a study: tasks, their execution in any process, and the records kept of them.
 
 What is recorded is not done again, and what is done is recorded at once. A record is found by a digest of all that its
 run depends on: the scenario, the code of the metrics, and the source of this package.
@@ -36,7 +36,7 @@ class RunRecord:
 
     Attributes:
         key: Digest of everything that determines the run.
-        point: What was varied.
+        point: Values of the varied keys.
         status: `DONE` or `FAILED`.
         reason: Why it failed; empty if it did not.
         metrics: By name; none if it failed.
@@ -56,7 +56,7 @@ class RunRecord:
 
     @classmethod
     def from_json(cls, line: str) -> Self:
-        """Read what `to_json` wrote.
+        """Read a record that `to_json` wrote.
 
         Raises:
             ValueError: If it did not.
@@ -73,7 +73,7 @@ class PlannedRun:
 
     Attributes:
         key: Digest of everything that determines it.
-        point: What was varied.
+        point: Values of the varied keys.
         scenario: At this point.
         finger: Replaces the one that it describes; None for none.
         metrics: To be measured.
@@ -104,7 +104,7 @@ class Archive(Protocol):
 
 
 class ExecutorError(FingerPinError):
-    """An executor cannot go on: a pool is broken, a cluster is lost; what it had finished is recorded."""
+    """An executor cannot go on: a pool is broken, a cluster is lost; finished runs are recorded."""
 
 
 class VersionError(FingerPinError):
@@ -126,10 +126,10 @@ def evaluate(
 
     Args:
         starting: The scenario that is varied.
-        points: Where.
-        metrics: What is measured.
-        archive: Where records are found and kept.
-        crew: Who does the runs.
+        points: Points of the study.
+        metrics: Metrics of every run.
+        archive: Archive of the records.
+        crew: Crew that does the runs.
         progress: Called with the numbers of finished, failed and all runs, first with those found.
         stop: When it returns true, runs that have not been done are None.
         retry_failed: Whether runs that failed before count as not done.
@@ -196,7 +196,7 @@ def execute(task: PlannedRun, stop: Stop) -> RunRecord:
 
 
 def _identity(metric: Metric) -> list[str]:
-    """Return the marks of a metric; they come only once if what its code depends on cannot be known."""
+    """Return the marks of a metric; they never come again if the dependencies of its code cannot be known."""
     return [metric.name, metric.unit, metric.long_name, _known(code_digest, metric.measure)]
 
 

@@ -49,14 +49,14 @@ def sweep(
     fails, or a point at which there is no valid scenario, is NaN, with its reason.
 
     Args:
-        scenario: What is varied: a scenario, its name, or the path of a file.
+        scenario: The scenario to be varied, its name, or the path of a file.
         over: A design, or the values of every key, which make a grid. Keys are those of `load_scenario`; an index as in
             ``environment.fingertip_force[2]`` means one number of a list.
         metrics: Names of `METRICS`, or metrics of one's own.
         overrides: Entries of the scenario that hold at all points.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`; values at its keys change it.
         output: Folder for ``study.toml``, ``runs.jsonl`` and ``sweep.nc``; by default nothing is kept.
-        executor: Where runs are done: any of `concurrent.futures`, by default one thread for each core.
+        executor: Executor of the runs, any of `concurrent.futures`; by default one thread for each core.
         restart: Whether to drop what the folder holds of a study, instead of going on with it.
         retry_failed: Whether to repeat runs that failed before.
         progress: Called with the numbers of finished, failed and all runs, first with those found;

@@ -1,4 +1,4 @@
-"""Blocks: what the linear systems of a step couple, found anew for every step.
+"""Blocks: the parts of a step's linear systems that are coupled, found anew for every step.
 
 Without contacts a mechanism falls into atoms, such as the fingers of a hand and what lies around. Contacts that are
 closed join atoms to blocks. One that is open is held open during the step: it exerts nothing, whatever moves, and
@@ -27,7 +27,7 @@ class Blocks(NamedTuple):
         atom: Of every coordinate, shape (N,).
         row_atom: Of every row, shape (K,); -1 for contacts.
         label: Block of every atom, shape (A,).
-        number: How many blocks there are, shape (1,).
+        number: Number of blocks, shape (1,).
         coordinate_start, coordinates: Shapes (A + 1,) and (N,).
         row_start, rows: Of all rows but those of contacts, shapes (A + 1,) and (K,).
         touch_start, touches: First rows of closed contacts, shapes (A + 1,) and (contacts,).
@@ -98,7 +98,7 @@ def build_blocks(tables: Tables, control: Control) -> Blocks:
 
 @compiled
 def extent(blocks: Any, b: int) -> Any:
-    """Return how many coordinates a block has, and columns: r of positions, velocities and states, and time."""
+    """Return the numbers of a block's coordinates and columns: r of positions, velocities and states, and time."""
     width = blocks.coordinate_start[b + 1] - blocks.coordinate_start[b]
     return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
 

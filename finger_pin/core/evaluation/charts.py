@@ -134,7 +134,7 @@ def turned(attitude: Array, angles: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Charts:
-    """Where packed states have quaternions and the core has angles.
+    """The places at which packed states have quaternions and the core has angles.
 
     Attributes:
         plain: Indices in a packed state of what is the same in both, shape (m,).
@@ -200,7 +200,7 @@ class Charts:
         return packed
 
     def packed_places(self, core: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return where numbers of the core's state stand in a packed one; angles at their quaternion."""
+        """Return the indices of the core's numbers in a packed state; those of angles are of their quaternion."""
         place = np.zeros(self.size, dtype=np.int64)
         place[self.cores] = self.plain
         for at, i in zip(self.quaternions, self.angles, strict=True):

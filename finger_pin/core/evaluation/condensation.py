@@ -32,7 +32,7 @@ def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int
 
 @compiled
 def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
-    """Fill A^T d phi of a block by what is no row of its own: inertial forces, those at tips, and contacts."""
+    """Fill A^T d phi of a block by forces other than its rows': inertial forces, those at tips, and contacts."""
     tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
     places, last = linear.blocks.coordinates[linear.blocks.coordinate_start[b] :], wide - 1
     for j in range(width):

@@ -1,4 +1,4 @@
-"""Contacts, of three rows and two states each: what they exert, and their part in the systems of `condensation`."""
+"""Contacts, of three rows and two states each: their forces, and their part in the systems of `condensation`."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
 
 @compiled
 def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
-    """Fill what the rows but those of contacts see of positions, velocities, states and inputs from outside.
+    """Fill the arguments of all rows' laws but contacts': positions, velocities, states and inputs from outside.
 
     One entry after the other, whatever row it belongs to: short loops inside a long one would cost twice as much.
     """
@@ -134,7 +134,7 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
 
 @compiled
 def exert(model: Any, address: int, time: float) -> None:
-    """Fill what the rows see and do, where bodies are placed by `move` and inputs known, and their states' rates."""
+    """Fill the rows' arguments, forces and rates of states, where bodies are placed by `move` and inputs known."""
     tables, control, x, work = model.tables, model.control, model.state, model.work
     width = work.torque.size
     if tables.loaded:

@@ -1,4 +1,4 @@
-"""What comes from outside, compiled: values of a `Control`, and their slopes."""
+"""Inputs from outside, compiled: values of a `Control`, and their slopes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _base_motion = inlined(palm_laws.base_motion)
 
 @compiled
 def _coupled(control: Any, values: Any, out: Any) -> None:
-    """Fill what a derivative of the base signals makes of the desired positions, by the coupling (20)."""
+    """Fill a derivative of the desired positions from that of the base signals, by the coupling (20)."""
     for j in range(out.size):
         out[j] = 0.0
         for k in range(control.coupling.shape[1]):
@@ -30,7 +30,7 @@ def _coupled(control: Any, values: Any, out: Any) -> None:
 
 @compiled
 def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) -> None:
-    """Fill the inputs: f_hat of (19), (21), (22), or what is scheduled; what is held, beside them or alone."""
+    """Fill the inputs: f_hat of (19), (21), (22), or scheduled ones, and held ones."""
     for i in range(out.size):
         out[i] = control.tension[i]
     if control.kind == HELD:

@@ -31,7 +31,7 @@ _PARAMETERS = _COUNT = 0
 
 
 class Addresses(NamedTuple):
-    """Where the compiled functions of a law are."""
+    """The addresses of the compiled functions of a law."""
 
     value: int
     slopes: int

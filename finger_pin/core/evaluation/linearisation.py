@@ -46,7 +46,7 @@ class Linear(NamedTuple):
         solution: The solution u, shape (2 N + Z, wide).
         loose: Of the states of open contacts, u / r, shape (Z,).
         right: The right-hand side of a block, shape (wide,).
-        blocks: What is coupled.
+        blocks: The coupled blocks.
     """
 
     mass: Matrix
@@ -109,7 +109,7 @@ def build_linear(tables: Tables, control: Control) -> Linear:
 
 
 def take_numbers(linear: Linear, tables: Tables) -> None:
-    """Copy from tables what a linearisation finds in its memory: what no posture changes."""
+    """Copy the entries of a linearisation that no posture changes from tables into its memory."""
     lumped = np.arange(len(tables.parents), len(linear.mass))
     linear.mass[lumped, lumped] = tables.lumps
     linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend

@@ -111,7 +111,7 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
 
 @compiled
 def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
-    """Add to a pin's load what contacts do that turn with the posture at constant forces."""
+    """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
     paths, own = tables.paths, work.paths
     size = max(work.rows[LOAD, k], 1e-100)
     for index in range(own.closed_count[0]):

@@ -61,7 +61,7 @@ def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
 
 @compiled
 def look(paths: Any, e: int, work: Any) -> bool:
-    """Fill what a piece says where bodies are placed; return whether it was asked, or is out of reach."""
+    """Fill value and wrenches of a piece where bodies are placed; return false if it is out of reach."""
     own = work.paths
     _frame(paths, e, work)
     out, y = own.out[e], own.seen[e]
@@ -79,7 +79,7 @@ def look(paths: Any, e: int, work: Any) -> bool:
 
 @compiled
 def _measure(paths: Any, e: int, work: Any) -> None:
-    """Fill what a piece says, and its wrenches."""
+    """Fill the value of a piece, and its wrenches."""
     own = work.paths
     look(paths, e, work)
     out, columns = own.out[e], paths.columns[e]
@@ -115,7 +115,7 @@ def net_wrench(moves: Any, wrench: Any, out: Any) -> None:
 
 @compiled
 def angle_between(first: Any, second: Any) -> Any:
-    """Return cosine and sine of the angle between where a path comes in and where it goes on."""
+    """Return cosine and sine of the angle between a path's directions before and after a point."""
     cosine = -(first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
     x = first[1] * second[2] - first[2] * second[1]
     y = first[2] * second[0] - first[0] * second[2]
@@ -188,7 +188,7 @@ def push(tables: Any, work: Any) -> None:
 
 @compiled
 def passes(paths: Any, e: int, body: int) -> float:
-    """Return how often the force of a contact, and its reaction, pass the pin of a body."""
+    """Return the count of passages of a contact's force, less its reaction, through the pin of a body."""
     first, second = paths.carriers[e, 0], paths.carriers[e, 2]
     beyond = 0.0
     if first >= 0 and (first == body or paths.carries[body, first]):

@@ -129,7 +129,7 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
 
 @compiled
 def base_power(tables: Any, velocity: Any, work: Any) -> Any:
-    """Return the power that a moving base supplies, W, after an evaluation: its velocity times what it exerts."""
+    """Return the power that a moving base supplies, W, after an evaluation: its velocity times its wrench."""
     inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
     power = 0.0
     for i in range(tables.parents.size):
@@ -167,7 +167,7 @@ def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
 
 @compiled
 def mass_matrix(tables: Any, work: Any) -> None:
-    """Fill work.square[MASS_MATRIX] = M after `move`; what no tree joins is zero from the start."""
+    """Fill work.square[MASS_MATRIX] = M after `move`; entries between trees are zero from the start."""
     size = tables.parents.size
     for i in range(size):
         momentum = work.spatial[MOMENTUM, i]

@@ -97,6 +97,6 @@ def signal_derivative(signal: Any, j: int, time: float, order: int) -> Any:
 
 @compiled
 def signal_derivatives(signal: Any, time: float, order: int, out: Any) -> None:
-    """Fill a time derivative of the functions, as many as there is room for; without functions what is there stays."""
+    """Fill a time derivative of the functions, as many as there is room for; without functions nothing changes."""
     for j in range(min(out.size, signal.harmonics.shape[0])):
         out[j] = signal_derivative(signal, j, time, order)

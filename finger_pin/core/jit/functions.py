@@ -42,7 +42,7 @@ def compiled(function: _Function) -> _Function:
 
 
 def compiled_loosely(function: _Function) -> _Function:
-    """Return the function compiled as `compiled` does, with sums in whatever order vector instructions like."""
+    """Return the function compiled as `compiled` does, with sums in any order, for vector instructions."""
     vars(function)["loose"] = True
     return numba.njit(**_INLINED | {"fastmath": {"contract", "reassoc"}})(function)  # type: ignore[no-any-return]
 
@@ -57,7 +57,7 @@ class Unit:
 
     @cached_property
     def address(self) -> int:
-        """Where compiled code finds it."""
+        """Its address for compiled code."""
         return address_of("int64(int64, float64)", self._function)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""All that rests on numba's inside; `pyproject.toml` caps numba to the versions that this was tried with.
+"""The parts that rest on numba's inside; `pyproject.toml` caps numba to the versions that this was tried with.
 
 What it saves of the processor time of compiling the core, measured in turns on one machine, and what would replace it:
 
@@ -40,7 +40,7 @@ class _Fields(AttributeTemplate):  # type: ignore[misc]
 
 @lower_getattr_generic(Kind)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, table: Kind, value: Any, name: str) -> Any:
-    """Load a field; that it never changes lets the optimiser load it once, whatever is stored meanwhile."""
+    """Load a field, marked as constant, so that the optimiser loads it once, whatever is stored meanwhile."""
     kind, place = table.fields[name], table.places[name]
 
     def at(offset: int) -> Any:

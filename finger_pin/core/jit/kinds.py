@@ -1,4 +1,4 @@
-"""Kinds of tables: what stands in one, and where."""
+"""Kinds of tables: the fields of one, and their places."""
 
 from __future__ import annotations
 

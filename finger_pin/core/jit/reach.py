@@ -1,4 +1,4 @@
-"""What a compiled function reaches: all functions that it calls, and the values that it takes for constants.
+"""The reach of a compiled function: all functions that it calls, and the values that it takes for constants.
 
 Code on disk holds as long as this is the same. Comments, docstrings and line numbers are not part of it.
 """
@@ -26,7 +26,7 @@ class Unknown(Exception):
 
 
 def reached(function: FunctionType) -> str:
-    """Return what tells a function with all that it reaches from any other.
+    """Return a digest of a function with all that it reaches.
 
     Raises:
         Unknown: If it takes for a constant what is none, or stands in no module that another process could import.
@@ -53,7 +53,7 @@ def reached(function: FunctionType) -> str:
 
 @cache
 def _own_digest() -> str:
-    """Return a digest of this folder: what is compiled for a call or a field stands in no function."""
+    """Return a digest of this folder, for the code of calls and fields, which stands in no function."""
     sources = sorted(Path(__file__).parent.glob("*.py"))
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
 
@@ -74,7 +74,7 @@ def _values(function: FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def _globals(code: CodeType, known: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Give the globals that code reads, of modules what it takes from them."""
+    """Give the globals that code reads, of modules the attributes."""
     module = None
     for step in dis.get_instructions(code):
         if step.opname == "EXTENDED_ARG":

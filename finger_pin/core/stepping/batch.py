@@ -23,7 +23,7 @@ _PIECES = 4
 
 
 class Batch(NamedTuple):
-    """What is advanced by one call.
+    """Steppers that are advanced by one call.
 
     Attributes:
         units: Addresses of what advances each, shape (m,).
@@ -56,7 +56,7 @@ class Together:
     """Steppers that are advanced side by side, again and again; bound once."""
 
     def __init__(self, steppers: Sequence[Stepper]) -> None:
-        """Bind steppers, whose islands, loops and knots stay what they are."""
+        """Bind steppers, whose islands, loops and knots stay the same."""
         parts = [part for stepper in steppers for part in stepper.parts]
         self._owners = np.repeat(np.arange(len(steppers)), [len(stepper.parts) for stepper in steppers])
         self._first = np.searchsorted(self._owners, np.arange(len(steppers)))

@@ -1,4 +1,4 @@
-"""Where a motion bends: rows that turn round or reach a kink, and another tension that leads in (22); compiled."""
+"""Bends of a motion: rows that turn round or reach a kink, and another tension that leads in (22); compiled."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def rate_at(address: int, time: float, state: Any) -> None:
 
 @compiled
 def look(col: Any, model: Any, step: int, time: float, out: Any) -> None:
-    """Fill what changes its sign where the motion bends, at a time of a step or of a later one."""
+    """Fill the functions that change sign where the motion bends, at a time of a step or of a later one."""
     state_at(col.motion, step, time, col.state)
     rate_at(col.model, time, col.state)
     first, control = col.rows.size, model.control

@@ -23,7 +23,7 @@ _STRAIGHT = 1e-14
 
 @compiled
 def depart(tables: Any, own: Any) -> None:
-    """Note how far apart the bodies of all contacts that are awake are where a step begins."""
+    """Note the gaps of all contacts that are awake where a step begins."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -32,7 +32,7 @@ def depart(tables: Any, own: Any) -> None:
 
 @compiled
 def distance(paths: Any, e: int, own: Any) -> Any:
-    """Return how far the core of a gap's first body is from the origin of its frame at most, m."""
+    """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
     total = 0.0
     for c in range(3):
         middle = 0.5 * (own.seen[e, c] + own.seen[e, 3 + c])
@@ -42,7 +42,7 @@ def distance(paths: Any, e: int, own: Any) -> Any:
 
 @compiled
 def trace(tableau: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
-    """Fill the Bernstein coefficients of the interpolant of a step, and how far each of n coordinates goes."""
+    """Fill the Bernstein coefficients of the interpolant of a step, and the path of each of n coordinates."""
     last, rows = tableau.nodes.size - 1, tableau.dense.shape[0]
     control = own.control
     for j in range(size):
@@ -76,7 +76,7 @@ def glide(x: Any, end: Any, size: int, own: Any) -> None:
 
 @compiled
 def path_of(tables: Any, e: int, own: Any) -> Any:
-    """Return how far the bodies of a contact may move against each other in the step that was traced, m."""
+    """Return a bound of the path of a contact's bodies against each other in the step that was traced, m."""
     paths, control = tables.paths, own.control
     endless = np.isinf(paths.extents[e])
     total, turned = 0.0, 0.0
@@ -97,7 +97,7 @@ def path_of(tables: Any, e: int, own: Any) -> Any:
 
 @compiled
 def widened(path: float, turned: float, far: float) -> Any:
-    """Return a path with that of what turns about a distant point, which is as far away as that and the path, m."""
+    """Return a path with that of a turn about a distant point, which is as far away as that and the path, m."""
     if turned == 0.0:
         return path
     return (path + turned * far) / (1.0 - turned) if turned < 1.0 else np.inf
@@ -143,7 +143,7 @@ def wake(tables: Any, own: Any) -> None:
 
 @compiled
 def arrive(tables: Any, own: Any) -> None:
-    """Note how far apart the bodies of contacts that are awake are at the end of a way that was traced."""
+    """Note the gaps of contacts that are awake at the end of a way that was traced."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -152,7 +152,7 @@ def arrive(tables: Any, own: Any) -> None:
 
 @compiled
 def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
-    """Return whether the bristles of an open contact are straight; what is left of their bend then is nothing."""
+    """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + 3):
         if not abs(states[tables.state[m]]) < _STRAIGHT:
             return False
@@ -163,7 +163,7 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
 
 @compiled
 def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
-    """Let contacts fall asleep or wake up where a step has ended, with what is known of their gaps there.
+    """Let contacts fall asleep or wake up where a step has ended, by bounds of their gaps there.
 
     Returns:
         Whether any did.

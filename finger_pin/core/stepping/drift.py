@@ -1,4 +1,4 @@
-"""The error of a run, carried along with it: local errors, and what the linearised flow makes of them."""
+"""The error of a run, carried along with it: local errors, moved on by the linearised flow."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def carry(
         h: Length of the step, s.
         gamma: Of the method.
         drift: The error so far, changed in place, shape (size,).
-        difference: That of the step, shape (size,).
+        difference: Difference of the two methods in the step, shape (size,).
         behind: Time from where the error has been carried to, to the start of the step, s.
         turned: Whether the step ends at a kink.
         r: Scratch, shape (size + 1,).
@@ -62,7 +62,7 @@ def carry(
 
 @compiled
 def defect(integration: Any, model: Any, time: float, h: float) -> None:
-    """Replace the difference of the two methods in the last stage by what the rates along a step miss, integrated.
+    """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 
     At a kink both methods err alike. What a step's interpolant should have grown by is integrated after Lobatto
     with four nodes, and what stiff parts exaggerate is taken back by one solution of the linear system.

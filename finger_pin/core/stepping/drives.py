@@ -15,7 +15,7 @@ class Drives(NamedTuple):
     """The loops of m motors, U = V clip(k_p e + k_d e' + k_i int e, -1, 1); arrays that are memory change in place.
 
     Attributes:
-        motors: Those that count here, of which the rotors are in one island.
+        motors: Motors whose rotors are in one island.
         places: Coordinates of the rotors, shape (m,).
         channels: Inputs that are their voltages, shape (m,).
         period: s.

@@ -25,7 +25,7 @@ _KNOWN, _ROUNDING, _OUT, _TIMES, _HALVINGS, _LEAST = 1e-9, 1e-11, 1e-6, 4.0, 12,
 
 
 def meetings(mechanism: Mechanism) -> Meeting | None:
-    """Return what finds the touches of a mechanism's bodies that a step passes over; None without contacts."""
+    """Return the finder of touches that a step passes over; None without contacts."""
     return _Meetings(mechanism) if np.any(build_tables(mechanism).touch) else None
 
 
@@ -62,7 +62,7 @@ class _Meetings:
         return None
 
     def _ways(self, start: float, end: float, interpolate: Interpolant) -> Array:
-        """Return how far the bodies of each piece may move against each other, shape (E,), m."""
+        """Return bounds of the paths of each piece's bodies against each other, shape (E,), m."""
         paths, charts = self._paths, self._charts
         packed = self._to_control @ interpolate(start + (end - start) * self._nodes)
         control = np.zeros((_DEGREE + 1, self._bodies))
@@ -89,7 +89,7 @@ class _Meetings:
         return found
 
     def _seen(self, e: int, x: Array) -> tuple[float, float]:
-        """Return a gap at a packed state, and how far the first body's core is from the second's frame, m."""
+        """Return a gap at a packed state, and the distance of the first body's core from the second's frame, m."""
         mechanism, piece = self._mechanism, dict(self._pieces)[e]
         q = np.array(x[: mechanism.body.model.nq])
         for at in self._charts.quaternions:
@@ -105,7 +105,7 @@ class _Meetings:
         return float(out[0]), middle + float(self._paths.cores[e])
 
     def _scan(self, e: int, start: float, end: float, interpolate: Interpolant) -> tuple[float, float]:
-        """Return how far a gap is open at the end, at least, and when bodies met that part again; else infinity."""
+        """Return a bound of the gap at the end, and the time at which bodies met that part again; else infinity."""
 
         def gap(time: float) -> float:
             return self._seen(e, interpolate(np.array([time]))[0])[0]

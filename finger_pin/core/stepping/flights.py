@@ -51,7 +51,7 @@ def _between(start: float, end: float, b: Any) -> Any:
 
 @compiled
 def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
-    """Return bounds of the path between two moments, and of how far it is off its chord, m."""
+    """Return bounds of the path between two moments, and of its distance from its chord, m."""
     paths, far = tables.paths, max(one[_FAR], two[_FAR])
     endless = np.isinf(paths.extents[e])
     path = turned = moves = bends = turns = swing = curl = 0.0
@@ -110,7 +110,7 @@ def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
 
 @compiled
 def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None:
-    """Note what is seen of a gap at a share of the step."""
+    """Note a gap and its slopes at a share of the step."""
     own, state = model.work.paths, model.state
     s, c = share, 1.0 - share
     w0, w1, w2, w3, w4 = c**4, 4.0 * c**3 * s, 6.0 * c * c * s * s, 4.0 * c * s**3, s**4
@@ -126,7 +126,7 @@ def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None
 
 @compiled
 def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
-    """Return when bodies have just met that are apart at one moment and not at another."""
+    """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
     early, late, middle = one[_SHARE], two[_SHARE], looks[LOOKS - 1]
     for _ in range(_HALVINGS):

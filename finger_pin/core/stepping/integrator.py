@@ -98,10 +98,10 @@ def integrate_compiled(
     together: bool = False,
     stop: Stop | None = None,
 ) -> Trajectory:
-    """Integrate from where a stepper stands with the compiled core, every island with steps of its own.
+    """Integrate from a stepper's present state with the compiled core, every island with steps of its own.
 
     Args:
-        stepper: Where to start, with which method and tolerances.
+        stepper: State to start from, method and tolerances.
         duration: Time of the end, s.
         names: Names of the numbers of the state, for messages.
         held: A controller that holds its tensions in between.

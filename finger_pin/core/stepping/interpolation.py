@@ -12,7 +12,7 @@ from finger_pin.core.model import MODEL
 
 
 class Between(NamedTuple):
-    """The m steps of an island, and what is filled for k times.
+    """The m steps of an island, and arrays for its states at k times.
 
     Attributes:
         begin: When the first step begins, s.
@@ -21,7 +21,7 @@ class Between(NamedTuple):
         ends: Ends of the steps, shape (m,), s.
         states: States there, before the angles of free bodies begin anew, shape (m, size).
         attitudes: Quaternions after that, shape (m, f, 4).
-        dense: What the steps' interpolants are made of, shape (m, rows, size).
+        dense: Coefficients of the steps' interpolants, shape (m, rows, size).
         charts: First of the three coordinates that turn each free body, shape (f,).
         width: Number of coordinates.
         before: Scratch, the state at the begin of a step, shape (size,).

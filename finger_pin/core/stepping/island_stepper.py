@@ -39,7 +39,7 @@ class Record:
         times: Ends of the steps, shape (m,), s.
         states: States there, before the angles of free bodies begin anew, shape (m, size).
         attitudes: Quaternions after that, shape (m, f, 4).
-        dense: What the steps' interpolants are made of, shape (m, rows, size).
+        dense: Coefficients of the steps' interpolants, shape (m, rows, size).
     """
 
     times: Array
@@ -61,7 +61,7 @@ class Part:
     """One island under way.
 
     Attributes:
-        island: What it has of the whole.
+        island: Its indices in the whole.
         laws: Of its groups of rows.
         tables: Its tables.
         control: Its inputs.
@@ -155,7 +155,7 @@ class Part:
         return unit(block, end), int(self._taken[0])
 
     def ready(self, record: Record | None = None) -> tuple[int, Unit]:
-        """Return the address of what compiled code is to advance, and the unit that does; into a record if given."""
+        """Return the address of the `Stretch` to be advanced, and the unit that does it; into a record if given."""
         self._taken[0] = 0
         self._place(self._nothing if record is None else record)
         return self._at, self._advance
@@ -230,11 +230,11 @@ class Part:
 
     @property
     def moment(self) -> tuple[Array, ...]:
-        """All that steps have changed and later ones depend on; arrays of its own, which may be filled."""
+        """The state and memory that later steps depend on; arrays of its own, which may be filled."""
         return self.x, self.attitude, self.memory, self.control.tension, self.tables.tip_force, self.tables.bodies
 
     def repeating(self, ends: Array) -> Part:
-        """Return the same part that takes steps with these ends, s, whatever their errors are."""
+        """Return the same part on imposed steps with these ends, s, whatever their errors are."""
         bound = self._bound
         twin = Part(
             self.island,
@@ -271,7 +271,7 @@ class Part:
 
 
 def object_coordinates(tables: Tables) -> NDArray[np.bool_]:
-    """Return which coordinates of the bodies are those of free objects: three that slide, and three that turn."""
+    """Return a mask of the bodies' coordinates that are of free objects: three that slide, and three that turn."""
     found = np.zeros(len(tables.parents), dtype=bool)
     for first in tables.charts:
         found[first : first + 3] = True
@@ -281,7 +281,7 @@ def object_coordinates(tables: Tables) -> NDArray[np.bool_]:
 
 
 def failure(part: Part, status: int, names: list[str]) -> str:
-    """Say what the status of an island means; empty if nothing failed."""
+    """Return the status of an island in words; empty if nothing failed."""
     culprit = names[max(int(part.memory[core.CULPRIT]), 0)]
     if status == core.UNDERFLOW:
         return f"the step size fell below the resolution of time; the error is largest in {culprit}"

@@ -22,7 +22,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Island:
-    """Indices of what an island has of the whole, in the order of the whole."""
+    """An island's indices in the whole, in the order of the whole."""
 
     coordinates: Indices
     rows: Indices
@@ -33,7 +33,7 @@ class Island:
 
 
 def find_islands(tables: Tables, control: Control, touching: bool = True) -> list[Island]:
-    """Return the islands of a mechanism under its inputs: of what may touch, or of what is joined without contacts."""
+    """Return the islands of a mechanism under its inputs, coupled by possible contacts or apart from them."""
     count, bodies = len(tables.state), len(tables.parents)
     width = bodies + len(tables.lumps)
     planned = len(control.minimum) if control.kind == PLANNED else 0
@@ -84,13 +84,13 @@ def find_islands(tables: Tables, control: Control, touching: bool = True) -> lis
 
 
 def wiring(tables: Tables, control: Control) -> bytes:
-    """Return what islands and all memory follow from, besides sizes: whatever is wired alike differs in numbers."""
+    """Return the wiring that islands and memory follow from, besides sizes: fingers wired alike differ in numbers."""
     wires = (control.loop, control.channel, _reads(control))
     return b"".join([indices(tables), *(each.tobytes() for each in wires)])
 
 
 def _reads(control: Control) -> NDArray[np.bool_]:
-    """Return which coordinates every planned tension depends on, shape (T, N)."""
+    """Return a mask of the coordinates that every planned tension depends on, shape (T, N)."""
     return np.asarray((control.inverse != 0.0) & ((control.gain != 0.0) | (control.damping != 0.0)))
 
 

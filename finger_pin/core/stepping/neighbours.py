@@ -1,4 +1,4 @@
-"""Motions near one that is known: what it would be with other numbers, to first order."""
+"""Motions near a known one: the derivatives of a motion by the numbers of its mechanism."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def differentiate(
 def _collocation(
     motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array, allowed: float
 ) -> Collocation:
-    """Return what `collocate` reads and fills, at the start of a motion; arguments as for `differentiate`."""
+    """Return the `Collocation` at the start of a motion; arguments as for `differentiate`."""
     own, others = parts[0], parts[1:]
     size, count, nodes = len(motion.start), len(others), len(NODES)
     rows, columns, held = _bends(own.tables)
@@ -205,7 +205,7 @@ def _start(motion: IslandMotion, others: Sequence[Part], changes: Array, width: 
 
 
 def _bends(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rows at which laws bend, what changes its sign there, and whether rows can be held on a side."""
+    """Return the rows at which laws bend, the columns that change sign there, and a mask of rows held on a side."""
     count = len(tables.state)
     kink = np.full(count, -1)
     for group in tables.groups:

@@ -51,7 +51,7 @@ def copy(source: Any, target: Any) -> None:
 
 @compiled
 def sweep(col: Any, h: float) -> Any:
-    """Improve S and its rates at all nodes in turn; return how far S at the last one was off."""
+    """Improve S and its rates at all nodes in turn; return the correction of S at the last one."""
     count, size = col.derivative.shape
     nodes, known, source, off = col.nodes.size, col.known, col.source, 0.0
     for a in range(nodes):
@@ -87,7 +87,7 @@ def sweep(col: Any, h: float) -> Any:
 
 @compiled
 def distance(col: Any, one: Any, other: Any) -> Any:
-    """Return how far S is from another one, for the worst number: rms over the states, each of its largest so far."""
+    """Return the distance of S from another one, for the worst number: rms over states, each of its largest so far."""
     count, size = one.shape
     most = 0.0
     for k in range(count):
@@ -113,7 +113,7 @@ def relax(col: Any, h: float) -> None:
 
 @compiled
 def curvature(col: Any) -> Any:
-    """Return how far S at the begin is from the polynomial through the nodes alone."""
+    """Return the distance of S at the begin from the polynomial through the nodes alone."""
     for k in range(col.found.shape[0]):
         for c in range(col.found.shape[1]):
             value = 0.0

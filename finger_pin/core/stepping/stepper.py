@@ -1,4 +1,4 @@
-"""A state that the compiled integrator carries forward, island by island; what a continued integration needs."""
+"""A state that the compiled integrator carries forward, island by island, with its steps' memory."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Stepper:
 
     @cached_property
     def _numbered(self) -> list[Tables]:
-        """Where the numbers of every island's tables stand in those of the whole."""
+        """The places of the numbers of every island's tables in those of the whole."""
         return self._selected(numbered(build_tables(self.mechanism)))
 
     def _begun(self) -> Iterator[tuple[Tables, Control, Array, Array, Array]]:
@@ -200,7 +200,7 @@ class Stepper:
             part.restart(start[self._places(part.island)], attitude[free], time)
 
     def drive(self, drives: Drives) -> None:
-        """Let loops of motors run from now on, in every island those of its rotors; what they do they share."""
+        """Let loops of motors run from now on, in every island those of its rotors; memory is shared."""
         for part in self.parts:
             motors = np.flatnonzero(np.isin(drives.places, part.island.coordinates))
             if len(motors):
@@ -256,19 +256,19 @@ class Stepper:
         return partial(Stepper, judged=self.judged), self._made_of, self.moments
 
     def __setstate__(self, state: Moments) -> None:
-        """Go on from where another one stood that was made alike."""
+        """Go on from the state of another one that was made alike."""
         self.resume(state)
 
     @property
     def moments(self) -> Moments:
-        """Where it stands: all that steps change and later ones depend on; a copy."""
+        """Its present moments: state and memory that later steps depend on; a copy."""
         return [
             (part.tables.loaded, part.drives, part.knots, tuple(each.copy() for each in part.moment))
             for part in self.parts
         ]
 
     def resume(self, moments: Moments) -> None:
-        """Go on from where it, or one that was made alike, once stood."""
+        """Go on from earlier moments, of it or of one that was made alike."""
         for index, (loaded, drives, knots, moment) in enumerate(moments):
             if loaded != self.parts[index].tables.loaded:
                 self.parts[index] = self.parts[index].with_loads(loaded)
@@ -279,7 +279,7 @@ class Stepper:
                 own[...] = other
 
     def failure(self, status: int, names: tuple[str, ...]) -> str:
-        """Say what a status means, with a name for every number of the state; empty if nothing failed."""
+        """Return a status in words, with a name for every number of the state; empty if nothing failed."""
         part = min(self.parts, key=lambda each: each.time)
         return failure(part, status, [names[at] for at in self.places(part.island)])
 

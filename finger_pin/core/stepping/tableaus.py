@@ -44,7 +44,7 @@ class Tableau(NamedTuple):
 
 
 def _completed(method: Callable[[], Tableau]) -> Callable[[], Tableau]:
-    """Return a method with what follows from its coefficients."""
+    """Return a method with the arrays that follow from its coefficients."""
 
     @cache
     @wraps(method)

@@ -23,7 +23,7 @@ Meeting = Callable[[float, float, Callable[[Array], Array]], float | None]
 
 @dataclass(frozen=True)
 class Statistics:
-    """What an integration cost: accepted steps, right-hand sides, Jacobians, factorisations, wall time in s."""
+    """The cost of an integration: accepted steps, right-hand sides, Jacobians, factorisations, wall time in s."""
 
     steps: int
     evaluations: int
@@ -33,7 +33,7 @@ class Statistics:
 
 
 class Apart(Protocol):
-    """The motion of what moves apart from the rest, with steps of its own."""
+    """The motion of an island, with steps of its own."""
 
     @property
     def times(self) -> Array:
@@ -45,13 +45,13 @@ class Apart(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A solution that can be evaluated anywhere up to where it got.
+    """A solution that can be evaluated at any time up to its end.
 
     Attributes:
         breakpoints: Ends of the accepted steps with the start first, shape (k + 1,), s.
         interpolate: Maps times, shape (m,), to packed states, shape (m, size).
         statistics: The cost.
-        failure: What the integrator reported if it failed, otherwise empty.
+        failure: Report of the integrator if it failed, otherwise empty.
         interrupted: Whether it was asked to stop.
         estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
         islands: Motions of what moves apart, where the core computes all inputs itself; none otherwise.

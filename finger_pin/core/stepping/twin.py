@@ -1,4 +1,4 @@
-"""The error of a run where it outgrows what a linearised flow shows: the difference to a motion that starts off by it.
+"""The error of a run where it outgrows a linearised flow: the difference to a motion that starts off by it.
 
 Bristles that slip and stick again multiply a small error a hundredfold within a slip, and hold a larger one: it slips
 with them and stops where they stop. The flow linearised along the motion knows of the first only. So where the error
@@ -30,7 +30,7 @@ _GROWN, _SHARE = 2, 0.5
 
 
 class Moment(NamedTuple):
-    """Where an island stood: its time, s, state, quaternions, memory, and the error carried along."""
+    """A moment of an island: its time, s, state, quaternions, memory, and the error carried along."""
 
     time: float
     x: Array
@@ -50,7 +50,7 @@ class Twin:
         return self._grown >= _GROWN
 
     def __init__(self, part: Part) -> None:
-        """Begin where an island stands."""
+        """Begin at an island's present state."""
         self._part = part
         turning = np.concatenate([part.joints, part.objects])
         self._large = min(_LARGE * max(part.rtol, float(np.max(part.atol[turning], initial=0.0))), _LARGEST)
@@ -100,7 +100,7 @@ class Twin:
 
 
 def difference(part: Part, moment: Moment, other: Part) -> Array:
-    """Return by how much another state of an island differs from that at a moment, in the chart of that, shape (size,).
+    """Return the difference of another state of an island to that at a moment, in the chart of that, shape (size,).
 
     Angles of free bodies are those about the body's axes from one attitude to the other; angular velocities, known in
     either body's frame, become rates of these angles.

@@ -1,4 +1,4 @@
-"""The paper's conclusions as experiments: many runs, what was measured in them, and what it says.
+"""The paper's conclusions as experiments: many runs, measurements in them, and verdicts.
 
 Every experiment takes a scenario, so that the same questions can be put to any finger.
 """

@@ -1,4 +1,4 @@
-"""Conclusion (c): is the passive tendon's tension what the controller plans by force closure?
+"""Conclusion (c): does the passive tendon carry the tension that the controller plans by force closure?
 
 (21), (22) plan f_hat for all tendons; the last entries are what the passive ones should carry if the others are as
 commanded and nothing else acts. At rest H_c^T f = G while the plan has H_c^T f_hat = tau^d, and f = f_hat but for the
@@ -56,10 +56,10 @@ class Delivery:
 
 @dataclass(frozen=True, eq=False)
 class PassiveDelivery:
-    """Everything that was measured about conclusion (c).
+    """The measurements of conclusion (c).
 
     Attributes:
-        scenario: What was varied.
+        scenario: The varied scenario.
         causes: Name of each cause, and the deviation with it alone; slowly but for ``speed``.
         given: The scenario as it is.
         speeds: Factors of the speed, increasing, shape (v,).
@@ -90,10 +90,10 @@ def passive_delivery(
     factors: tuple[float, ...] = _FACTORS,
     progress: Progress | None = None,
 ) -> PassiveDelivery:
-    """Vary speed and friction of a scenario, and switch on one by one what makes delivery differ from the plan.
+    """Vary speed and friction of a scenario, and switch on one by one the causes of a difference to the plan.
 
     Args:
-        scenario: What to vary.
+        scenario: The scenario to vary.
         speeds: Factors of its frequencies, increasing; the first is slow, and 1 must be among them.
         factors: Of both frictions, increasing, beginning with 0 and holding 1.
         progress: Called with the number of further runs that have been finished.

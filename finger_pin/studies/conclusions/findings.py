@@ -35,7 +35,7 @@ _HIGH = 3.0
 
 
 class Verdict(Enum):
-    """Whether what was measured bears a claim out."""
+    """The verdict of measurements on a claim."""
 
     HOLDS = "holds"
     PARTLY = "holds in part"
@@ -54,9 +54,9 @@ class Finding:
 
     Attributes:
         part: Which conclusion, such as ``b``.
-        claim: What is claimed, as a statement that a measurement can contradict.
-        measured: What was measured, with units.
-        verdict: What follows from it.
+        claim: The claim, as a statement that a measurement can contradict.
+        measured: Measured values, with units.
+        verdict: The verdict on it.
     """
 
     part: str
@@ -69,7 +69,7 @@ def findings_table(findings: Sequence[Finding], width: int | None = None) -> str
     """Return findings as a table for a terminal.
 
     Args:
-        findings: What to show, in this order.
+        findings: Findings to show, in this order.
         width: In columns; that of the terminal by default, at least 80 and at most 140.
     """
     table = Table("", "claim", "measured", "verdict", box=box.SIMPLE_HEAD, pad_edge=False, show_lines=True)
@@ -233,7 +233,7 @@ def delivery_findings(found: PassiveDelivery) -> list[Finding]:
 
 
 def _senses(found: FrictionInfluence) -> list[tuple[str, str, bool]]:
-    """Return every sense of "more crucial": what it means, what was measured, and whether it is so."""
+    """Return every sense of "more crucial": its meaning, the measurement, and whether it holds."""
     as_is = _row(found.joint, 1.0)
     here = int(np.argmin(np.abs(found.minimum.runs.error - found.joint.runs.error[as_is])))
     joint, tendon = found.elasticity_joint[here], found.elasticity_tendon[here]

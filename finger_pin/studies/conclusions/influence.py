@@ -55,7 +55,7 @@ class Sweep:
 
     Attributes:
         values: The parameter, shape (m,).
-        runs: What came out.
+        runs: The runs' results.
     """
 
     values: Array
@@ -86,10 +86,10 @@ class Gripping:
 
 @dataclass(frozen=True, eq=False)
 class FrictionInfluence:
-    """Everything that was measured about conclusion (b).
+    """The measurements of conclusion (b).
 
     Attributes:
-        scenario: What was varied.
+        scenario: The varied scenario.
         joint: Over factors of joint friction, tendon friction as it is.
         tendon: Over factors of tendon friction, joint friction as it is.
         joint_alone: Over factors of joint friction, without tendon friction.
@@ -99,7 +99,7 @@ class FrictionInfluence:
         minimum_without_tendon: The same without tendon friction.
         elasticity_joint: d ln(error) / d ln(joint friction) at the values of f0, shape (m,).
         elasticity_tendon: d ln(error) / d ln(tendon friction), likewise.
-        gripping: Where the finger grips itself.
+        gripping: Coefficients at which the finger grips itself.
     """
 
     scenario: Scenario
@@ -125,7 +125,7 @@ def friction_influence(
     """Vary joint friction, tendon friction and least tension of a scenario.
 
     Args:
-        scenario: What to vary; its motion is run for 5 s.
+        scenario: The scenario to vary; its motion is run for 5 s.
         factors: Of both frictions, increasing, beginning with 0 and holding 1.
         tensions: f0, N.
         progress: Called with the number of further runs that have been finished.
@@ -232,7 +232,7 @@ def error_at_work(sweep: Sweep, work: Array, lost: float) -> float:
 
     Args:
         sweep: Over factors of one friction.
-        work: What it lost in every run, J, increasing up to the largest.
+        work: Its loss in every run, J, increasing up to the largest.
         lost: The work asked for, J, within what occurs.
     """
     return float(np.interp(lost, work, sweep.runs.error))

@@ -25,7 +25,7 @@ TRANSMISSION_RUNS = 1
 
 @dataclass(frozen=True, eq=False)
 class Transmission:
-    """Everything that was measured about conclusion (a).
+    """The measurements of conclusion (a).
 
     Attributes:
         scenario: Whose finger, and whose motion.

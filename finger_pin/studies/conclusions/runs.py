@@ -1,4 +1,4 @@
-"""Runs of the experiments: scenarios with more or less friction, tension or speed, and what is measured in them."""
+"""Runs of the experiments: scenarios with more or less friction, tension or speed, and their measurements."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def simulated(
     """Return the runs of `simulate_many`, all of them finished.
 
     Args:
-        scenarios: What to simulate, of one duration.
-        variables: What to keep; all by default.
+        scenarios: Scenarios to simulate, of one duration.
+        variables: Variables to keep; all by default.
         progress: Called with the number of runs that have been finished since its last call.
 
     Raises:
@@ -97,7 +97,7 @@ def simulated(
 def measured(
     scenarios: Sequence[Scenario], actuated: int, settling: float, progress: Progress | None = None
 ) -> Measures:
-    """Simulate scenarios of one duration, and measure what comes after ``settling``, s."""
+    """Simulate scenarios of one duration, and measure from the time ``settling``, s, on."""
     runs = simulated(scenarios, _VARIABLES, progress).sel(time=slice(settling, None))
 
     def mean(name: str, dimension: str) -> Array:
