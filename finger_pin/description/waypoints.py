@@ -65,11 +65,11 @@ def check_path(path: dict[str, Waypoint]) -> None:
         before = each.kind
     if path and before != "point":
         raise problem("path", "must end with a point")
-    for point, wrap in inside(path):
+    for point, wrap in points_inside_wraps(path):
         raise problem(f"path.{wrap}", f"the point {point} lies inside of it, where the path cannot wrap")
 
 
-def inside(path: dict[str, Waypoint]) -> Iterator[tuple[str, str]]:
+def points_inside_wraps(path: dict[str, Waypoint]) -> Iterator[tuple[str, str]]:
     """Yield the points of a path that lie inside of a neighbouring wrap on the same body, with the wrap."""
     for pair in pairwise(path):
         for point, wrap in (pair, pair[::-1]):

@@ -12,9 +12,9 @@ from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.books import Energy
-from finger_pin.mechanism.features import ContactPart, contacts_of
+from finger_pin.mechanism.contact_features import ContactPart, contacts_of
 from finger_pin.mechanism.gaps import PRISM
-from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
+from finger_pin.mechanism.pieces import Leg, Piece, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.solids import Solid
@@ -79,7 +79,7 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     Raises:
         InputError: Naming the pair and how deep it is.
     """
-    gaps = reach(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: CONTACT.arms]
+    gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: CONTACT.arms]
     if gaps.size and gaps.min() < -DEEPEST_START:
         allowed = f"starts {-1e3 * gaps.min():.3g} mm deep in each other, at most {1e3 * DEEPEST_START:g} mm"
         pair = contacts.names[int(np.argmin(gaps))]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.books import Books
 from finger_pin.mechanism.evaluation import Evaluation
-from finger_pin.mechanism.pieces import Paths, Reach, moved, reach
+from finger_pin.mechanism.pieces import PathKinematics, Paths, moved, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
 
@@ -223,14 +223,16 @@ class Mechanism:
         one = tips == 1 or force is None
         return np.broadcast_to(given[..., None, :] if one else given, (*lead, tips, 3))
 
-    def _routed(self, table: Rows, q: Array) -> Reach:
+    def _routed(self, table: Rows, q: Array) -> PathKinematics:
         """Return lengths, turns and arms of paths through space for a table, shape (..., k) and (..., k, N)."""
         if not table.routed:
-            return Reach(*np.zeros((4, 1)))
+            return PathKinematics(*np.zeros((4, 1)))
         if q.ndim == 1:
-            return reach(self.body, q, table.paths, self.coordinates)
-        each = [reach(self.body, one, table.paths, self.coordinates) for one in q]
-        return Reach(*(np.array([getattr(one, name) for one in each]) for name in Reach.__annotations__))
+            return path_kinematics(self.body, q, table.paths, self.coordinates)
+        each = [path_kinematics(self.body, one, table.paths, self.coordinates) for one in q]
+        return PathKinematics(
+            *(np.array([getattr(one, name) for one in each]) for name in PathKinematics.__annotations__)
+        )
 
     def _inertial(self, q: Array, v: Array, base: Array) -> Array:
         """Return the inertial torques of a base that moves, less those of one at rest under gravity, shape (..., n)."""

@@ -121,7 +121,7 @@ def moved(paths: Paths, shift: int) -> tuple[tuple[Leg, ...], ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class PathKinematics:
     """Lengths, arms and turns of paths for the rows of a table at one posture; k rows, N coordinates.
 
     Attributes:
@@ -137,12 +137,12 @@ class Reach:
     force: Array
 
 
-def reach(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> Reach:
+def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -> PathKinematics:
     """Return lengths, arms and turns of paths for their rows at q, shape (nq,)."""
     width = int(body.model.nv)
     placements, twists = body.placements(q)
 
-    found = Reach(
+    found = PathKinematics(
         np.zeros(len(paths)), np.zeros((len(paths), coordinates)), np.zeros(len(paths)), np.zeros((len(paths), 3))
     )
     for k, legs in enumerate(paths):

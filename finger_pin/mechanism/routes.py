@@ -11,7 +11,7 @@ import pinocchio as pin
 from finger_pin.description.routing import Array
 from finger_pin.description.tree import Tree
 from finger_pin.description.waypoints import Waypoint
-from finger_pin.mechanism.pieces import Leg, Piece, Place, reach
+from finger_pin.mechanism.pieces import Leg, Piece, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 
@@ -100,7 +100,7 @@ class Routes:
             each = [self._reached(one) for one in q]
             length, arms, turn = (np.array(part) for part in zip(*each, strict=True))
             return length, arms, turn
-        found = reach(self.body, q, [route.legs for route in self.routes.values()], len(q))
+        found = path_kinematics(self.body, q, [route.legs for route in self.routes.values()], len(q))
         return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
 
 

@@ -20,7 +20,7 @@ from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
 from finger_pin.laws.harmonic import harmonic, harmonic_rate
 from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
-from finger_pin.references.thinning import thinned
+from finger_pin.references.sample_fitting import thinned
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -51,7 +51,7 @@ class Signal:
 
         Args:
             settings: Of each signal.
-            tolerance: Of their range, what dense samples may be missed by (`thinning`).
+            tolerance: Of their range, what dense samples may be missed by (`sample_fitting`).
         """
         harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
         return cls(harmonics.reshape(-1, 4), *_joined(_polynomials(settings, tolerance)))
@@ -60,7 +60,7 @@ class Signal:
     def from_samples(
         cls, name: str, samples: tuple[ArrayLike, ArrayLike], columns: Sequence[str], tolerance: float = 0.0
     ) -> Signal:
-        """Return signals through samples, joined by monotone cubics, or by fewer where samples are dense (`thinning`).
+        """Return signals through samples: monotone cubics, or fewer where samples are dense (`sample_fitting`).
 
         Args:
             name: Of the argument, for messages.

@@ -9,7 +9,7 @@ from finger_pin.description.objects import Object
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.contacts import check_start, contact_rows
 from finger_pin.mechanism.exchange.urdf import build_rigid_body
-from finger_pin.mechanism.pieces import reach
+from finger_pin.mechanism.pieces import path_kinematics
 from finger_pin.mechanism.solids import add_free_objects, finger_solids, object_solids
 
 TABLE = Object(shape="half_space", position=(0.0, 0.0, -0.1))
@@ -28,7 +28,7 @@ def scene(**objects):
 
 def distances(contacts, body, q):
     """Return the signed distance of every contact."""
-    return reach(body, q, contacts.paths, body.model.nv).length[::3]
+    return path_kinematics(body, q, contacts.paths, body.model.nv).length[::3]
 
 
 def configuration(body, joints, **poses):

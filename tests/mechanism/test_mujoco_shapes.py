@@ -9,7 +9,7 @@ import finger_pin as fp
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.objects import Object
-from finger_pin.mechanism.pieces import reach
+from finger_pin.mechanism.pieces import path_kinematics
 
 #: Everything overlaps everything: bits, an exclusion, a welded body, a pair that the bits forbid, what is not carried.
 CROWD = """<mujoco><worldbody>
@@ -95,7 +95,7 @@ def test_the_shapes_of_a_tree_are_where_mujoco_has_them():
     hand = fp.Hand(description, objects=probes)
     around = hand.surroundings
     q = np.concatenate([data.qpos, around.start()[0]])
-    gaps = reach(around.body, q, around.contacts.paths, hand.mechanism.coordinates).length[::3]
+    gaps = path_kinematics(around.body, q, around.contacts.paths, hand.mechanism.coordinates).length[::3]
     found = dict(zip(around.contacts.names, gaps, strict=True))
     sizes = {name: shape.sizes for body in description.tree.bodies.values() for name, shape in body.shapes.items()}
     for name in names:

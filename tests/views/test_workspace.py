@@ -9,7 +9,7 @@ from finger_pin.description.loading import load_finger
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.views import plots
-from finger_pin.views.plots.reach import fingertip_surface, flexion_section
+from finger_pin.views.plots.workspace_surfaces import fingertip_surface, flexion_section
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
 

@@ -1,4 +1,4 @@
-"""Paths through space, compiled: `pieces.reach`, one posture at a time."""
+"""Paths through space, compiled: `pieces.path_kinematics`, one posture at a time."""
 
 from __future__ import annotations
 

@@ -24,8 +24,8 @@ from typing import Any, TypeVar
 import numba
 import platformdirs
 
-from finger_pin.core.jit.inside import INTERNAL
-from finger_pin.core.jit.reach import Unknown, reached
+from finger_pin.core.jit.dependencies import Unknown, reached
+from finger_pin.core.jit.numba_internals import INTERNAL
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _LOGGER = logging.getLogger("finger_pin")

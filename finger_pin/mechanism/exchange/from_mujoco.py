@@ -21,9 +21,9 @@ from finger_pin.mechanism.exchange.mujoco_equalities import read_equalities
 from finger_pin.mechanism.exchange.mujoco_flags import obeyed
 from finger_pin.mechanism.exchange.mujoco_names import Names, Table, entry_name, quaternion
 from finger_pin.mechanism.exchange.mujoco_overlay import lay_tendons
-from finger_pin.mechanism.exchange.mujoco_rest import ElementReader, Rest
 from finger_pin.mechanism.exchange.mujoco_shapes import Shapes
 from finger_pin.mechanism.exchange.mujoco_tendons import STOP, TendonReader
+from finger_pin.mechanism.exchange.mujoco_unsupported import ElementReader, Rest
 from finger_pin.mechanism.routes import rotation
 
 # Stiffness with which the range of a joint stops it where it slides, N/m.

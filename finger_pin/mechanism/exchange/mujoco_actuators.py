@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.mechanism.exchange.mujoco_flags import undriven
 from finger_pin.mechanism.exchange.mujoco_names import Table, distinct
-from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
+from finger_pin.mechanism.exchange.mujoco_unsupported import ElementReader
 
 # As `Crossing` has it, m.
 _LARGEST_RADIUS = 0.5

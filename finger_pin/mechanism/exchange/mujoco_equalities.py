@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct
-from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
+from finger_pin.mechanism.exchange.mujoco_unsupported import ElementReader
 
 # Time constant with which what is coupled follows, critically damped, s.
 _COUPLED = 0.005

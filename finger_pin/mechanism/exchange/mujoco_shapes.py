@@ -6,7 +6,7 @@ import itertools
 
 from finger_pin.mechanism.exchange.mujoco_flags import disabled
 from finger_pin.mechanism.exchange.mujoco_names import Table, quaternion
-from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
+from finger_pin.mechanism.exchange.mujoco_unsupported import ElementReader
 
 
 class Shapes:

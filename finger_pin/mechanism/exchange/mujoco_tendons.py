@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.description.waypoints import Waypoint, inside
+from finger_pin.description.waypoints import Waypoint, points_inside_wraps
 from finger_pin.mechanism.exchange.mujoco_names import Table, distinct, quaternion
-from finger_pin.mechanism.exchange.mujoco_rest import ElementReader
+from finger_pin.mechanism.exchange.mujoco_unsupported import ElementReader
 
 #: Stiffness with which a range stops a joint, N m/rad, as the stroke limiters do; also the range of a tendon.
 STOP = 50.0
@@ -41,7 +41,7 @@ class TendonReader(ElementReader):
         """Return a path without the wraps that a point of their own body lies inside of: they never wrap."""
         read = {name: Waypoint.model_validate(each) for name, each in path.items()}
         idle = set()
-        for point, wrap in inside(read):
+        for point, wrap in points_inside_wraps(read):
             self.rest.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight")
             idle.add(wrap)
         return {name: each for name, each in path.items() if name not in idle}

@@ -2,7 +2,7 @@
 
 from finger_pin.mechanism.geometry.cuts import Cut, Groove
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
-from finger_pin.mechanism.geometry.lanes import joint_axes
+from finger_pin.mechanism.geometry.lateral_offsets import joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonGeometry, TendonPath, tendon_paths
 from finger_pin.mechanism.geometry.tree import TreeGeometry
 from finger_pin.mechanism.geometry.winding import BASE_LEAD

@@ -14,7 +14,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
 from finger_pin.mechanism.geometry.foreign import chain, placed_solids, turned_model, width_of
-from finger_pin.mechanism.geometry.lanes import Lanes, tendon_lanes
+from finger_pin.mechanism.geometry.lateral_offsets import Lanes, tendon_lanes
 from finger_pin.mechanism.geometry.winding import BASE_LEAD, Arc, WoundSpan, wind
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.shapes import MATERIALS

@@ -14,7 +14,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.tree import TreeSolid
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
-from finger_pin.mechanism.geometry.lanes import Lanes, joint_axes
+from finger_pin.mechanism.geometry.lateral_offsets import Lanes, joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath
 from finger_pin.mechanism.pieces import Leg, Piece
 from finger_pin.mechanism.routes import rotation

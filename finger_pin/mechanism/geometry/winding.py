@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.geometry.lanes import Lanes
+from finger_pin.mechanism.geometry.lateral_offsets import Lanes
 
 #: Least wrap over the range of a joint, rad: of a path that passes, and of one that ends there.
 PASSING_WRAP, ENDING_WRAP = 0.05, 0.35

@@ -12,11 +12,11 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from finger_pin.analysis import Friction, force_polytope, largest_force, tension_for_force
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
+from finger_pin.views.plots.axes_3d import AXES, space
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.panels import sheet, title
-from finger_pin.views.plots.reach import flexion_section
-from finger_pin.views.plots.space import AXES, space
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, Width, colour, styled, thin
+from finger_pin.views.plots.workspace_surfaces import flexion_section
 
 _LABELS = {
     Friction.HELPING: "can hold, friction helps",

@@ -14,10 +14,10 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.views.plots.axes_3d import AXES, space
 from finger_pin.views.plots.panels import sheet, title
-from finger_pin.views.plots.reach import fingertip_surface, flexion_section
-from finger_pin.views.plots.space import AXES, space
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, colour, styled, thin
+from finger_pin.views.plots.workspace_surfaces import fingertip_surface, flexion_section
 
 _MILLI = 1e3
 _ISOLINES = 7

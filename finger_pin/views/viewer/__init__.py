@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from finger_pin.views.viewer.animation import write_animation
 from finger_pin.views.viewer.drawing import draw
-from finger_pin.views.viewer.serving import LiveView, Viewing, view, view_forces
+from finger_pin.views.viewer.viewing import LiveView, Viewing, view, view_forces
 
 if TYPE_CHECKING:
     from finger_pin.views.viewer.video import write_video

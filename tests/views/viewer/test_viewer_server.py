@@ -108,7 +108,7 @@ def test_a_live_view_is_throttled_and_shows_the_last_state():
 
 def test_a_simulation_that_is_watched_is_never_ahead_of_real_time(monkeypatch, capsys, finger):
     clock = Clock()
-    monkeypatch.setattr("finger_pin.views.viewer.serving.time", clock)
+    monkeypatch.setattr("finger_pin.views.viewer.viewing.time", clock)
     signals = finger.evaluate(finger.rest_state(joint_position(0.0)), np.ones(4))
     seen = []
     with LiveView(finger.description, open_browser=False) as live:

@@ -12,8 +12,8 @@ from finger_pin.analysis.transmission import flexion_postures, transmission_effi
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.views.plots.panels import grid, title
-from finger_pin.views.plots.reach import flexion_section
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, cycle_colours, styled, thin
+from finger_pin.views.plots.workspace_surfaces import flexion_section
 
 if TYPE_CHECKING:
     from finger_pin.studies.conclusions.posture import Transmission
