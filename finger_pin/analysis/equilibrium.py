@@ -68,7 +68,8 @@ def equilibrium(
     """
     finger = as_finger(finger)
     layout = finger.layout
-    if finger.description.hand is not None or finger.pulled or layout.objects or layout.contacts or layout.further:
+    driven = any(table.pulls for table in finger.mechanism.rows)
+    if finger.description.hand is not None or driven or layout.objects or layout.contacts or layout.further:
         raise InputError("finger", "must be one finger with ideal sources of tension, without objects")
     command = np.array(finite_vector("inputs", inputs, finger.routing.actuated))
     if np.any(command < 0.0):

@@ -183,6 +183,12 @@ class PassiveTendon(Description):
     mass: Annotated[Numbers, reals(0.0, 1.0, above=True, hint=" kg (is it in grams?)")] = quantity(
         8.8e-6, unit="kg", source="estimate", doc="m_5, lumped mass."
     )
+    hysteresis: Annotated[Numbers, reals(0.0, 0.9)] = quantity(
+        0.0,
+        unit="1",
+        source="the paper has none",
+        doc="h, part of its tension that a half holds against its stretch.",
+    )
 
 
 class StrokeLimiterSettings(Description):

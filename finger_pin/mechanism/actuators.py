@@ -20,13 +20,11 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.elastic_tendon import ELASTIC_TENDON
 from finger_pin.laws.gearbox import GEARBOX
-from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
 from finger_pin.laws.motor import MOTOR
 from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Rows
 
-# Least level of what a tendon holds, N, as that of tendon friction.
-_FLOOR = 1e-4
 _STRETCH = Energy("elastic_tendons", "tendons on spools")
 _DAMPING = Energy("elastic_damping", "tendons stretching")
 
@@ -169,22 +167,7 @@ class Actuators:
             powers=(_DAMPING,),
             pulls=tuple(self.routing.tendons[index] for index in self.tendons),
         )
-        held = self.held
-        if not held.size:
-            return [elastic]
-        numbers = (self.hysteresis[held], STIFFER * self.stiffness[held], np.full(len(held), _FLOOR))
-        hysteresis = Rows(
-            group="tendon_hysteresis",
-            law=HYSTERESIS,
-            names=tuple(elastic.names[k] for k in held),
-            parameters=np.array(numbers),
-            arm=arm[held],
-            loads={"elastic_tendons": np.eye(len(arm))[held]},
-            stored=_STRETCH,
-            powers=(_DAMPING,),
-            pulls=tuple(elastic.pulls[k] for k in held),
-        )
-        return [elastic, hysteresis]
+        return [elastic, *hysteresis_rows("tendon_hysteresis", elastic, self.hysteresis, OF_TENDONS, _DAMPING)]
 
     def rotor_rows(self, width: int) -> list[Rows]:
         """Return the tables of motors and gearboxes."""

@@ -26,7 +26,7 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
-from finger_pin.mechanism.rows import Rows, RowSignals, pulled
+from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.state import Layout
 from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings, same_but_for_path
@@ -50,7 +50,7 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons of a tree as functions of the posture; None without a tree.
         further: Tables of rows that were added, those of a tree first.
-        pulled: Weights with which drives pull the actuated tendons, by table, shape (a, k).
+        pulled: Weights with which drives and passive tendons' hysteresis pull the strands, by table, shape (s, k).
         made_of: The rigid body, the rows and the objects that it was given.
         visuals: The solids of a model of the user's own (`from_model`); None of one that is made of links.
         surroundings: Objects and contacts; None without any.
@@ -102,7 +102,7 @@ class Finger:
         of_tree = tree_rows(description, self.paths, width) if self.paths else ()
         self.further = (*self.springs.hysteresis_rows(joints, width), *of_tree, *rows)
         drives = [*self.actuators.tendon_rows(width), *(table for table in rows if table.pulls)]
-        self.pulled = pulled(drives, self.routing.tendons[: self.routing.actuated])
+        self.pulled = self.tendons.pulled(drives)
         mechanism = Mechanism(
             self.rigid_body,
             self._tables(drives, width),

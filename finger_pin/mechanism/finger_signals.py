@@ -136,13 +136,13 @@ class FingerSignals:
             force: F, N.
             torque: H_c2^T f, shape (..., n), N m.
             bodies: Number of velocities of the rigid body, before those of passive tendons.
-            pulled: Weights with which drives pull the tendons, by table, as of `rows.pulled`.
+            pulled: Weights with which further tables pull the strands, by table, as of `Tendons.pulled`.
         """
         joints, passive_tendons = torque.shape[-1], state.passive_position.shape[-1]
         halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
-        delivered, motors = driven.force, None
+        strands, motors = np.concatenate([driven.force, halves.force], axis=-1), None
         for table, weights in pulled.items():
-            delivered = delivered + combined(found.rows[table].force, weights.T)
+            strands = strands + combined(found.rows[table].force, weights.T)
         if "motors" in found.rows:
             motor, gears = (found.rows[name] for name in ("motors", "gearboxes"))
             motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
@@ -162,8 +162,8 @@ class FingerSignals:
                 normal=both(lambda tendons: tendons["normal_force"]),
                 level=both(lambda tendons: tendons["level"]),
                 stiction_rate=both(lambda tendons: tendons.rate),
-                entering=np.concatenate([driven.row.command, halves.force[..., ::2]], axis=-1),
-                strands=np.concatenate([delivered, halves.force], axis=-1),
+                entering=np.concatenate([driven.row.command, strands[..., driven.rows.count :: 2]], axis=-1),
+                strands=strands,
                 passive_acceleration=found.acceleration[..., bodies : bodies + passive_tendons],
             ),
             joints=JointForces(

@@ -65,14 +65,14 @@ class JointFriction:
 
         Args:
             names: Of the joints.
-            drives: As of `pulled`; what they and driven tendons exert adds up.
+            drives: Weights with which further tables pull the strands, as of `Tendons.pulled`; all of it adds up.
             actuated: Number of driven tendons.
             width: Number of coordinates.
         """
         size = len(names)
         # Strands beyond the actuated ones are halves of passive tendons.
         loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
-        loads |= {group: self.loads[:, :actuated] @ weights for group, weights in drives.items()}
+        loads |= {group: self.loads @ weights for group, weights in drives.items()}
         return Rows(
             group="joint_friction",
             law=PIN_FRICTION,

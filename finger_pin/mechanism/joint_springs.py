@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from finger_pin.description.parameters import FingerDescription, Spring
 from finger_pin.description.routing import Array
-from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
 from finger_pin.laws.spring import JOINT_SPRING, spring_torque
 from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.hysteresis import OF_JOINTS, hysteresis_rows
 from finger_pin.mechanism.rows import Rows
 
-# Least level of what a spring holds, N m, as that of joint friction.
-_FLOOR = 1e-7
 _ENERGY = Energy("joint_springs", "joints' springs")
 
 
@@ -70,21 +68,5 @@ class JointSprings:
 
     def hysteresis_rows(self, names: tuple[str, ...], width: int) -> list[Rows]:
         """Return the table of the springs' hysteresis, of those that have some; no table without any."""
-        sprung = self._sprung
-        held = np.flatnonzero(self.hysteresis[sprung] * self.stiffness[sprung])
-        if not held.size:
-            return []
-        joints = sprung[held]
-        shares, stiffness = self.hysteresis[joints], STIFFER * self.stiffness[joints]
-        return [
-            Rows(
-                group="spring_hysteresis",
-                law=HYSTERESIS,
-                names=tuple(names[joint] for joint in joints),
-                parameters=np.array([shares, stiffness, np.full(len(joints), _FLOOR)]),
-                arm=np.eye(len(names), width)[joints],
-                loads={"joint_springs": np.eye(len(sprung))[held]},
-                stored=_ENERGY,
-                powers=(_ENERGY,),
-            )
-        ]
+        springs = self.rows(names, width)
+        return hysteresis_rows("spring_hysteresis", springs, self.hysteresis[self._sprung], OF_JOINTS, _ENERGY)

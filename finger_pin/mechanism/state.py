@@ -1,13 +1,13 @@
 """The packed state vector: the only place that knows its order and sizes.
 
-    | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s of spools | tendons | joints | gears |
+    | theta |  o  | p | theta_m | theta' |  o' | p' | theta_m' |  z  | F^s they hold | tendons | joints | gears |
     |   n   | 7 f | p |    m    |   n    | 6 f | p  |    m     | 2 c |       h       |    t    |   n    |   m   |
 
 n joints, f free objects (o is position and quaternion; o' velocity and angular velocity), t tendons, p of them passive,
-m motors, h tendons on spools with hysteresis, c contacts with bristles bent by z: 19 numbers for the paper's finger,
-which has neither motors nor contacts. States of drives of one's own follow F^s of spools, those of other rows of
-one's own follow all. Where objects stand in the world around a palm that moves, the six joints of the
-world that it sees follow o and o'.
+m motors, h tendons on spools and halves of passive ones with hysteresis, these first, c contacts with bristles bent by
+z: 19 numbers for the paper's finger, which has neither motors nor contacts. States of drives of one's own follow what
+tendons hold, those of other rows of one's own follow all. Where objects stand in the world around a palm that moves,
+the six joints of the world that it sees follow o and o'.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class State:
             (..., 0) where nothing stands there.
         world_velocity: Its rate, rad/s and m/s.
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
-        elastic_stiction: F^s that tendons on spools hold, shape (..., h), N.
-        drives: States of drives of one's own, shape (..., d); they follow F^s of spools.
+        elastic_stiction: F^s that tendons hold against their stretch, halves of passive ones first, shape (..., h), N.
+        drives: States of drives of one's own, shape (..., d); they follow what tendons hold.
     """
 
     position: Array
@@ -98,7 +98,7 @@ class Layout:
         objects: Names of the free objects.
         world: Names of the joints of the world that a palm sees.
         contacts: Names of the contacts.
-        held: Names of the tendons on spools with hysteresis.
+        held: Names of the halves of passive tendons, and then of the tendons on spools, with hysteresis.
         drives: Name and scale of every state of drives of one's own.
     """
 
@@ -133,7 +133,7 @@ class Layout:
             objects=() if around is None else tuple(around.free),
             world=() if around is None else around.world,
             contacts=() if around is None else around.contacts.names,
-            held=tuple(routing.tendons[motors.tendons[k]] for k in motors.held),
+            held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
             drives=drives,
         )
 

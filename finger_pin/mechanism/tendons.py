@@ -13,6 +13,7 @@ from finger_pin.description.validation import expand
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
 from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.joint_friction import bristles
 from finger_pin.mechanism.rows import Rows, pulled
 
@@ -26,6 +27,8 @@ LOSSES = (
 )
 _SLACK = Energy("slack", "tensions cut at zero")
 _BRISTLES = Energy("tendon_bristles", "tendon bristles")
+_HALVES = ("proximal", "distal")
+_STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,7 @@ class Tendons:
         lag: sigma_1 / sigma_0, shape (t,), s.
         drag: Shape (t,), N.
         half_stiffness: K_h = 2 K_t, shape (p,), N/m.
+        hysteresis: h, shape (p,).
         mass: m_5, shape (p,), kg.
     """
 
@@ -58,6 +62,7 @@ class Tendons:
     lag: Array
     drag: Array
     half_stiffness: Array
+    hysteresis: Array
     mass: Array
 
     @classmethod
@@ -73,6 +78,7 @@ class Tendons:
             **bristles(law, size),
             drag=expand(law.drag, size),
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
+            hysteresis=expand(passive.hysteresis, routing.passive),
             mass=expand(passive.mass, routing.passive),
         )
 
@@ -87,6 +93,39 @@ class Tendons:
         proximal, distal = self.stretch(position, np.zeros((*position.shape[:-1], self.routing.passive)))
         return 0.5 * (proximal - distal)
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of the halves of passive tendons with hysteresis."""
+        held = zip(self.routing.passive_names, self.hysteresis, strict=True)
+        return tuple(f"{name}.{half}" for name, share in held if share for half in _HALVES)
+
+    def pulled(self, drives: Sequence[Rows]) -> dict[str, Array]:
+        """Return the weights with which drives and halves' hysteresis pull the s strands, by table, shape (s, k)."""
+        actuated, strands = self.routing.actuated, np.eye(len(self.routing.strand_coupling))
+        by_drives = pulled(drives, self.routing.tendons[:actuated])
+        found = {group: strands[:, :actuated] @ weights for group, weights in by_drives.items()}
+        if self.held:
+            found["passive_hysteresis"] = strands[:, actuated:][:, np.repeat(self.hysteresis > 0.0, 2)]
+        return found
+
+    def _halves(self, motors: int) -> list[Rows]:
+        """Return the tables of halves of passive tendons, (12), and of their hysteresis."""
+        routing, joints, passive = self.routing, len(self.routing.joints), self.routing.passive
+        # p of the halves: what draws the mass back loosens the proximal half and stretches the distal one.
+        arm = np.zeros((2 * passive, joints + passive + motors))
+        arm[:, :joints] = routing.strand_coupling[routing.actuated :]
+        arm[np.arange(2 * passive), joints + np.arange(2 * passive) // 2] = np.tile([1.0, -1.0], passive)
+        halves = Rows(
+            group="passive_halves",
+            law=TENDON_HALF,
+            names=tuple(f"{name}.{half}" for name in routing.passive_names for half in _HALVES),
+            parameters=np.repeat(self.half_stiffness, 2)[None],
+            arm=arm,
+            stored=Energy("passive_tendon", "passive tendons"),
+        )
+        shares = np.repeat(self.hysteresis, 2)
+        return [halves, *hysteresis_rows("passive_hysteresis", halves, shares, OF_TENDONS, _STRETCHING)]
+
     def rows(self, drives: Sequence[Rows] = (), motors: int = 0) -> list[Rows]:
         """Return the tables of the tendons, for coordinates (theta, p, theta_m).
 
@@ -99,10 +138,6 @@ class Tendons:
         routing, joints = self.routing, len(self.routing.joints)
         actuated, passive = routing.actuated, routing.passive
         width = joints + passive + motors
-        # p of the halves: what draws the mass back loosens the proximal half and stretches the distal one.
-        halves = np.zeros((2 * passive, width))
-        halves[:, :joints] = routing.strand_coupling[actuated:]
-        halves[np.arange(2 * passive), joints + np.arange(2 * passive) // 2] = np.tile([1.0, -1.0], passive)
         driven, bends = np.zeros((2, len(routing.tendons), width))
         driven[:, :joints] = routing.coupling
         driven[actuated:] = np.eye(passive, width, joints)
@@ -112,15 +147,12 @@ class Tendons:
         names = routing.passive_names
         wired = pulled(drives, routing.tendons[:actuated])
         taken = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
+        halves = self._halves(motors)
+        # What loads a canal is what its tendon's halves pull with, and what they hold.
+        both = np.repeat(np.eye(passive), 2, axis=1)
+        loads = {table.group: both @ table.loads.get("passive_halves", np.eye(2 * passive)).T for table in halves}
         return [
-            Rows(
-                group="passive_halves",
-                law=TENDON_HALF,
-                names=tuple(f"{name}.{half}" for name in names for half in ("proximal", "distal")),
-                parameters=np.repeat(self.half_stiffness, 2)[None],
-                arm=halves,
-                stored=Energy("passive_tendon", "passive tendons"),
-            ),
+            *halves,
             *drives,
             Rows(
                 group="driven_tendons",
@@ -141,7 +173,7 @@ class Tendons:
                 names=names,
                 parameters=friction[:, actuated:],
                 arm=driven[actuated:],
-                loads={"passive_halves": np.repeat(np.eye(passive), 2, axis=1)},
+                loads=loads,
                 bends=bends[actuated:],
                 curvature_offset=routing.curvature_offset[actuated:],
                 stored=_BRISTLES,

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import finger_pin as fp
 from finger_pin.analysis import steady_state
+from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.laws.capstan import DRIVEN_TENDON, capstan_coefficient, sliding_tension
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.hysteresis import HYSTERESIS
@@ -85,3 +86,75 @@ def test_the_current_of_a_servo_that_slides_evenly_balances_its_torques():
         level = gears.coulomb + gears.by_load * carried + (gears.stribeck + gears.stribeck_by_load * carried) * share
         level += (gears.driving if v > 0.0 else gears.driven) * load
         assert torque == pytest.approx(load + np.sign(w) * level + gears.viscous * w, rel=2e-4)
+
+
+def loop(share, stiffness, ratio, low, high):
+    """What a spring with hysteresis takes in a cycle between two stretches, J, in closed form.
+
+    Out, F = c k x + a x^-n, and back, F = -c' k x + b x^n, solve F' = s (1 -+ F / (h k x)) with n = s / (h k),
+    c = h / (1 + 1 / n), c' = h / (1 - 1 / n); a and b join them at both ends.
+    """
+    n = ratio / share
+    out, back = share / (1.0 + 1.0 / n), share / (1.0 - 1.0 / n)
+    u = low / high
+    a, b = np.linalg.solve([[1.0, -1.0], [u**-n, -(u**n)]], [-(out + back), -(out + back) * u])
+    area = (out + back) * (1.0 - u**2) / 2.0
+    area += a * (1.0 - u ** (1.0 - n)) / (1.0 - n) - b * (1.0 - u ** (1.0 + n)) / (1.0 + n)
+    return area * stiffness * high**2
+
+
+PASSIVE = """
+extends = "pull_out"
+[finger]
+name = "strung"
+passive_tendon = { stiffness = 400.0, mass = 1e-3, hysteresis = 0.3 }
+[finger.joints.drum]
+spring = { stiffness = 0.0 }
+[finger.tendons.T2]
+kind = "passive"
+crossings = { drum = { radius = -0.02 } }
+[finger.tendon_friction]
+coulomb = 0.0
+[simulation]
+sample_rate = 1000.0
+"""
+
+
+def test_a_passive_tendon_takes_the_area_of_its_loop_whatever_the_speed(tmp_path):
+    """Pulled to and fro against the tendon alone, which stays taut; its halves' stretch tells the loop."""
+    (tmp_path / "strung.toml").write_text(PASSIVE)
+    result = fp.simulate(tmp_path / "strung.toml")
+    last = result.time.values >= 4.0
+    stretch = -result.passive_position.values[last]
+    cycle = 2.0 * loop(0.3, 800.0, 10.0, stretch.min(), stretch.max())
+    lost = result.energy_exchanged_passive_hysteresis.values
+    assert lost[-1] - lost[4000] == pytest.approx(cycle, rel=1e-4)
+    assert abs(result.energy_residual).max() < 1e-5 * lost[-1]
+
+
+def test_what_halves_of_a_passive_tendon_hold_pulls_and_loads_as_they_do():
+    finger, bare = (fp.Finger(fp.load_finger("ub", {"finger.passive_tendon.hysteresis": h})) for h in (0.3, 0.0))
+    rng, command = np.random.default_rng(4), np.array([2.0, 3.0, 5.0, 4.0])
+    x = np.stack([finger.rest_state(each) for each in rng.uniform(0.2, 0.8, (20, 4)) * [0.1, 1.0, 1.0, 1.0]])
+    x += rng.normal(size=x.shape) * 0.05 * finger.layout.scales()
+    place = finger.layout.names.index("elastic_stiction[T5.proximal]")
+    z = x[:, place : place + 2]
+    found = finger.evaluate(x, command)
+    without = bare.evaluate(np.delete(x, [place, place + 1], axis=1), command)
+    halves = without.tendons.strands[:, 4:] - z
+    np.testing.assert_allclose(found.tendons.strands[:, 4:], halves, rtol=1e-12)
+    np.testing.assert_allclose(found.tendons.entering[:, 4], halves[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(found.tendons.normal[:, 4], abs(halves.sum(axis=1)), rtol=1e-12)
+    np.testing.assert_allclose(found.joints.reaction, abs(found.tendons.strands @ finger.routing.loads.T), rtol=1e-12)
+    # What is held pulls at the mass and at the joints.
+    moved = finger.rigid_body.mass_matrix(x[0, :4]) @ (found.acceleration[0] - without.acceleration[0])
+    np.testing.assert_allclose(moved, -z[0] @ finger.strand_coupling[4:], atol=1e-9)
+    pushed = found.tendons.passive_acceleration - without.tendons.passive_acceleration
+    np.testing.assert_allclose(finger.tendons.mass * pushed[:, 0], z[:, 1] - z[:, 0], atol=1e-9)
+    compiled = CompiledFinger(finger).evaluate(x, command)
+    np.testing.assert_allclose(compiled.rate, found.rate, rtol=1e-9, atol=1e-6)
+
+
+def test_a_model_for_mujoco_says_that_it_has_no_hysteresis():
+    held = fp.load_finger("ub", {"finger.passive_tendon.hysteresis": 0.1})
+    assert "(hysteresis)" in fp.to_mjcf(held) and "(hysteresis)" not in fp.to_mjcf("ub")

@@ -41,7 +41,7 @@ _NOTES = """
   drawn towards its actuator, so that a positive control pulls.{passive}
 
 {friction}
-  Left out, because MuJoCo has no counterpart:{rough}
+  Left out, because MuJoCo has no counterpart:{rough}{held}
   - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
   - the stroke limiters (Hunt-Crossley); joint ranges are given with limited="false", and limited="true" makes them
     MuJoCo's own soft constraints;
@@ -54,6 +54,8 @@ _ROUGH = """
   Friction of tendons and joints (the dynamic friction law) is the plugin "finger_pin.friction": import
   finger_pin.mujoco in Python before loading this file.
 """
+_HELD = """
+  - what springs of joints and passive tendons hold against their motion (hysteresis);"""
 _SERVOS = """
   - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
 _MASSIVE = """
@@ -105,6 +107,8 @@ def to_mjcf(
     root = ET.Element("mujoco", model=description.name)
     notes = {"title": description.title or description.name, "passive": "", "tip": TIP_FRAME, "limit": TENSION_LIMIT}
     notes |= {"friction": _ROUGH, "rough": ""} if friction else {"friction": "", "rough": _SMOOTH}
+    springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
+    notes["held"] = _HELD if any(springs) or tendons.hysteresis.any() else ""
     notes["servos"] = _SERVOS if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _MASSLESS if massless else _MASSIVE
