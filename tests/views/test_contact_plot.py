@@ -42,3 +42,19 @@ def test_what_a_result_cannot_show_is_said_in_one_line(draw, what):
 def test_a_result_in_which_nothing_touches_says_so():
     titles = [axes.get_title(loc="left") for axes in plot_contact(made([0.0])).axes]
     assert "(a) contact forces: nothing ever touched" in titles
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 10])
+def test_few_objects_move_along_three_axes_and_many_move_so_far_as_they_are_from_where_they_were(count):
+    result = made([1.0])
+    along = {"x": 3.0, "y": 0.0, "z": -4.0}  # mm
+    way = np.linspace(0.0, 1e-3, 11)[:, None, None] * np.array(list(along.values()))
+    names = [f"ball_{index}" for index in range(count)]
+    result["object_position"] = ("time", "object", "axis"), np.broadcast_to(way, (11, count, 3)) + 0.1
+    result = result.assign_coords(object=names, axis=list(along))
+    panel = next(axes for axes in plot_contact(result).axes if "free" in axes.get_title(loc="left"))
+    ends = {line.get_label(): line.get_ydata()[-1] for line in panel.lines}
+    if count < 3:
+        assert ends == pytest.approx({f"{name} {axis}": mm for name in names for axis, mm in along.items()})
+    else:
+        assert ends == pytest.approx(dict.fromkeys(names, 5.0))

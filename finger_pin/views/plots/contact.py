@@ -14,6 +14,8 @@ from finger_pin.views.plots.style import BLACK, BLUE, SKY, VERMILLION, Width, co
 
 #: Most contacts that get a panel: those that push hardest.
 _MOST = 6
+#: Most free objects whose motion is drawn along each axis.
+_MOST_ALONG = 2
 _MILLI = 1e3
 
 
@@ -23,7 +25,8 @@ def plot_contact(result: xr.Dataset, *, width: Width = None, titles: bool = True
 
     (a) One panel per contact that ever closed, N: normal force, friction, and the most that friction can be; sticking
     is where friction is less. (b) Friction against normal force: the cone, whose edge is sliding. (c) Speed of sliding,
-    mm/s. (d) How far free objects have moved from where they were, mm, if there are any.
+    mm/s. (d) How far free objects have moved from where they were, mm, if there are any: along each axis, or all in all
+    where they are more than two.
 
     Args:
         result: Dataset of `simulate`.
@@ -99,12 +102,16 @@ def _cone(axes: Axes, contact: xr.Dataset, name: str, look: str) -> None:
 
 
 def _moved(axes: Axes, result: xr.Dataset) -> None:
-    time, index = result["time"].values, 0
-    for name in names(result, "object"):
-        for axis in names(result, "axis"):
-            place = result["object_position"].sel(object=name, axis=axis).values
-            label = f"{name} {axis}"
-            trace(axes, time, _MILLI * (place - place[0]), label=label, linewidth=thin(), **series(index))
-            index += 1
-    axes.legend(loc="best", ncols=3, fontsize="x-small")
+    time, objects, along = result["time"].values, names(result, "object"), names(result, "axis")
+    place = result["object_position"].transpose("object", "axis", "time").values
+    moved = place - place[..., :1]
+    if len(objects) > _MOST_ALONG:
+        # Three lines for each of them would leave no room for their names.
+        lines = dict(zip(objects, np.linalg.norm(moved, axis=1), strict=True))
+    else:
+        labels = [f"{name} {axis}" for name in objects for axis in along]
+        lines = dict(zip(labels, moved.reshape(len(labels), -1), strict=True))
+    for index, (label, values) in enumerate(lines.items()):
+        trace(axes, time, _MILLI * values, label=label, linewidth=thin(), **series(index))
+    axes.legend(loc="best", ncols=5 if len(objects) > _MOST_ALONG else 3, fontsize="x-small")
     title(axes, "(d) free objects")

@@ -48,8 +48,8 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
     """Draw the energy account from a result.
 
     (a) Every stored energy that is not zero throughout, mJ. (b) What has been supplied, mJ, and on top of each other
-    what has been lost; with the change of the stored energy this must reach what was supplied. (c) The part of the
-    supplied energy that the account cannot explain.
+    what has been lost; with the change of the stored energy this must reach what was supplied. (c) What the
+    account cannot explain, as a part of the most that came in: what was supplied, or taken from store.
 
     Args:
         result: Dataset of `simulate`, of any finger.
@@ -66,12 +66,13 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
     title(strips[0], "(a) stored energy")
     for axes, energy in zip(strips, shown, strict=True):
         trace(axes, time, _MILLI * energy.values, color=BLUE, linewidth=thin())
-    labels = ["energy (mJ)", "|residual| / supplied"]
+    labels = ["energy (mJ)", "|residual| / came in"]
     above, below = stack(right, labels, heights=[2.2, 1.0])
-    _balance(above, time, supplied, lost, np.sum([each.values for each in stored.values()], axis=0))
+    total = np.sum([each.values for each in stored.values()], axis=0)
+    _balance(above, time, supplied, lost, total)
     handles = above.get_legend_handles_labels()[0]
     legend(right, [handles[-1], *handles[-2::-1]])
-    _residual(below, result, supplied)
+    _residual(below, result, float(np.max(np.abs(supplied) + np.maximum(total[0] - total, 0.0))))
     return figure
 
 
@@ -93,9 +94,8 @@ def _balance(axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variab
     title(axes, "(b) what was supplied, and where it went")
 
 
-def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
+def _residual(axes: Axes, result: xr.Dataset, scale: float) -> None:
     time, residual = result["time"].values, result["energy_residual"].values
-    scale = float(np.max(np.abs(supplied)))
     share = np.abs(residual) / (scale or 1.0)
     worst = float(np.max(share))
     if worst > 0.0:
@@ -104,7 +104,7 @@ def _residual(axes: Axes, result: xr.Dataset, supplied: Array) -> None:
         axes.set_ylim(1e-4 * worst, 10.0 * worst)
         share = np.maximum(share, 1e-6 * worst)
     trace(axes, time, share, color=BLUE, linewidth=thin(0.65))
-    title(axes, f"(c) unexplained: at most {_scientific(worst)} {'of the supplied energy' if scale else 'J'}")
+    title(axes, f"(c) unexplained: at most {_scientific(worst)} {'of what came in' if scale else 'J'}")
     if not scale:
         axes.set_ylabel("|residual| (J)")
 
