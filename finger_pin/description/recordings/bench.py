@@ -82,7 +82,7 @@ class IdentifySettings(Description):
     parameters: dict[str, Annotated[tuple[float, float], vector(2)]] = Field(
         min_length=1, description="By dotted key of the scenario, the least and the greatest value."
     )
-    recordings: dict[Name, RecordingSettings] = Field(min_length=1, description="By name.")
+    recordings: dict[Name, RecordingSettings] = Field(min_length=1, description="What was recorded, by name.")
     compare: dict[str, dict[str, Any]] = Field(
         {}, description="Other laws, by name: keys with a number that is held, or with bounds."
     )

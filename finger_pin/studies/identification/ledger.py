@@ -52,6 +52,7 @@ class Ledger:
                 self._done = {}
 
     _done: dict[str, Any]
+    _made: bool
 
     def __enter__(self) -> Self:
         """Make the folder.
@@ -61,6 +62,7 @@ class Ledger:
         """
         if self._path is not None:
             try:
+                self._made = not self._path.parent.exists()
                 self._path.parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 reason = f"cannot be written: {error.strerror or error}"
@@ -70,8 +72,13 @@ class Ledger:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Keep what is done, whatever has happened."""
-        if self._path is not None and self._done:
+        """Keep what is done, whatever has happened; of what was asked for wrongly, nothing."""
+        if self._path is None:
+            return
+        if isinstance(error, InputError):
+            if self._made and not any(self._path.parent.iterdir()):
+                self._path.parent.rmdir()
+        elif self._done:
             with replacing(self._path) as temporary:
                 Path(temporary).write_text(json.dumps({"asked": self._asked, "done": self._done}), encoding="utf-8")
 

@@ -19,11 +19,12 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import fitted
 from finger_pin.simulation.motions import SampledMotion
+from finger_pin.simulation.prepared import refuse_unknown
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.sensitivity import changed, nearby
 from finger_pin.simulation.setup import Setup
-from finger_pin.simulation.variables import coordinates
+from finger_pin.simulation.variables import coordinates, variables
 from finger_pin.studies.identification.problem import At, Own, own_number
 from finger_pin.studies.identification.recordings import Recording
 
@@ -173,6 +174,7 @@ class RecordedMotion:
         """Return the variables of the outputs with a delay, at the instants that they are of."""
         names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
+        refuse_unknown(f"{self._entry}.outputs", names, variables(setup.loop))
         motions = SampledMotion(setup.loop, trajectory, times, tuple(names))
         return RunArrays(recorded(motions, tuple(names)), coordinates(setup.scenario, setup.loop, times), {})
 

@@ -47,6 +47,10 @@ class SteadyReadings:
             variable, _, label = name.partition(".")
             if variable in ("tendon_command", "spool_tension"):
                 self.load[:, self._place(f"inputs.{name}", label, tendons)] = values
+                if np.any(values < 0.0):
+                    row = int(np.flatnonzero(values < 0.0)[0])
+                    allowed = f"a tendon only pulls: a tension must be at least 0 N, and is not in row {row + 1}"
+                    raise InputError(f"{self._entry}.inputs.{name}", allowed, float(values[row]))
             elif variable == "joint_position":
                 self._position[:, self._place(f"inputs.{name}", label, joints)] = values
             else:

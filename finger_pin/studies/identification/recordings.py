@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,8 @@ VARIABLES = {
     "motor_torque": "N m",
 }
 _MOST_ROWS = 5_000_000
+# What stands in a cell, besides nothing, where nothing was measured.
+_MISSING = ("na", "n/a", "null", "none", "-")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +79,10 @@ def read_recording(
         InputError: If the file cannot be read, a column is missing or not of numbers, or a unit does not fit.
     """
     entry = f"identify.recordings.{name}"
-    if data is None:
-        if settings.file is None:
-            raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
-        data = read_table(f"{entry}.file", Path(settings.file))
-    table = {key: np.asarray(values, dtype=float) for key, values in data.items()}
+    if data is None and settings.file is None:
+        raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
+    given_as = read_table(f"{entry}.file", Path(str(settings.file))) if data is None else data
+    table = {key: _numbers(values) for key, values in given_as.items()}
     if len({values.shape for values in table.values()}) != 1:
         raise InputError(entry, "all columns must have as many rows")
 
@@ -89,6 +91,10 @@ def read_recording(
             near = nearest(given.column, table)
             hint = f"; did you mean {near}?" if near else ""
             raise InputError(f"{entry}.{key}", f"no such column; there are {', '.join(table)}{hint}", given.column)
+        words = table[given.column]
+        if words.dtype == object:
+            row = next(k for k, cell in enumerate(words) if isinstance(cell, str))
+            raise InputError(f"{entry}.{key}", f"column {given.column} has no number in row {row + 1}", words[row])
         unit = 1.0 if given.unit is None else in_si(f"{entry}.{key}.unit", given.unit, si)
         values: Array = given.scale * unit * table[given.column] + given.offset
         if not missing and not np.isfinite(values).all():
@@ -100,8 +106,10 @@ def read_recording(
     time, speed = np.zeros(rows), np.zeros(rows)
     if settings.time is not None:
         time = column("time", settings.time, "s")
-        if len(time) < 2 or np.any(np.diff(time) <= 0.0):
-            raise InputError(f"{entry}.time", "times must increase, two rows at least")
+        back = np.flatnonzero(np.diff(time) <= 0.0)
+        if len(time) < 2 or len(back):
+            where = f", and do not from row {back[0] + 1} to the next" if len(back) else ""
+            raise InputError(f"{entry}.time", f"times must increase, two rows at least{where}")
         time = time - time[0]
     if isinstance(settings.speed, Column):
         speed = column("speed", settings.speed, "m/s")
@@ -119,8 +127,10 @@ def read_recording(
     )
 
 
-def read_table(entry: str, path: Path) -> dict[str, Array]:
-    """Return the columns of a CSV file with a header, by name; empty cells are not numbers.
+def read_table(entry: str, path: Path) -> dict[str, Array | Sequence[float | str]]:
+    """Return the columns of a CSV file with a header, by name; empty cells are not numbers, and words stay words.
+
+    Columns stand apart by commas, semicolons or tabs; where not by commas, decimals may have one.
 
     Raises:
         InputError: Naming the line that is wrong.
@@ -130,7 +140,7 @@ def read_table(entry: str, path: Path) -> dict[str, Array]:
     except FileNotFoundError:
         raise InputError(entry, "there is no such file", str(path)) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(entry, f"cannot be read: {getattr(error, 'strerror', None) or 'not a text'}") from None
+        raise InputError(entry, f"cannot be read: {getattr(error, 'strerror', None) or 'no text in UTF-8'}") from None
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if not 2 <= len(lines) <= _MOST_ROWS:
         raise InputError(entry, f"{path.name} must have a header and 1 to {_MOST_ROWS} rows")
@@ -142,11 +152,19 @@ def read_table(entry: str, path: Path) -> dict[str, Array]:
     for number, row in enumerate(rows[1:], 1):
         if len(row) != len(header):
             raise InputError(entry, f"{path.name}: row {number} has {len(row)} values, the header names {len(header)}")
-    return {each: np.array([_number(row[k]) for row in rows[1:]]) for k, each in enumerate(header)}
+    point = "," if separator != "," else "."
+    return {each: [_number(row[k].strip(), point) for row in rows[1:]] for k, each in enumerate(header)}
 
 
-def _number(cell: str) -> float:
+def _number(cell: str, point: str) -> float | str:
+    """Return the number in a cell, not one where it is empty; a word as it stands."""
     try:
-        return float(cell)
+        return float(cell.replace(point, ".") or "nan")
     except ValueError:
-        return math.nan
+        return math.nan if cell.lower() in _MISSING else cell
+
+
+def _numbers(values: Any) -> Any:
+    """Return a column as an array; of objects where there are words in it."""
+    words = not isinstance(values, np.ndarray) and any(isinstance(each, str) for each in values)
+    return np.array(list(values), dtype=object) if words else np.asarray(values, dtype=float)
