@@ -237,3 +237,47 @@ def test_the_state_has_pinocchios_short_names():
 
 def test_what_a_loop_of_ones_own_needs_stands_at_the_front_door():
     assert issubclass(fp.InputError, fp.FingerPinError) and fp.Law.__name__ == "Law" and fp.Rows.__name__ == "Rows"
+
+
+STIFFNESS = "environment.objects.plate.surface.stiffness"
+#: Every door that gives other numbers to a scenario with a finger that is built already.
+WITH_NUMBER = {
+    "prepare": lambda given, stiffness, finger=None: (
+        fp.prepare(given, [STIFFNESS], finger=finger).run([stiffness])["joint_position"].tolist()
+    ),
+    "sweep": lambda given, stiffness, finger=None: fp.sweep(
+        given, {STIFFNESS: [stiffness]}, metrics=["tension_peak"], finger=finger
+    ).tension_peak.values.tolist(),
+    "propose": lambda given, stiffness, finger=None: fp.propose(
+        given, {"": {}}, {STIFFNESS: (stiffness, 2.0 * stiffness)}, {"tendon_tension.T1": 0.05}, finger=finger
+    ).deviation.values.tolist(),
+    "Environment": lambda given, stiffness, finger=None: touched(given, stiffness, finger),
+}
+
+
+def touched(given, stiffness, finger):
+    from finger_pin.learning import Choice
+
+    return learned(given, finger=finger, randomise={STIFFNESS: Choice([stiffness])}).tolist()
+
+
+@pytest.mark.parametrize("door", WITH_NUMBER.values(), ids=WITH_NUMBER.keys())
+def test_numbers_of_objects_change_those_around_a_finger_of_ones_own(door):
+    """A plate that the tip presses from the start on; the finger was built with it."""
+    plate = {"environment.objects.plate.position": [0.0, 0.0, 0.0295]}
+    scenario = fp.load_scenario("press", SHORT | plate)
+    finger = fp.Finger(scenario.finger, objects=scenario.environment.objects)
+    soft, hard = (door(scenario, stiffness, finger) for stiffness in (1e4, 1e6))
+    assert soft != hard and hard == door(scenario, 1e6)
+
+
+def test_numbers_of_objects_that_a_finger_of_ones_own_has_not_are_refused():
+    with pytest.raises(fp.InputError, match=r"environment\.objects"):
+        fp.prepare("press", [STIFFNESS], finger=fp.Finger("ub")).run([1e5])
+
+
+def test_numbers_of_a_hand_are_refused_where_another_one_was_given():
+    key = "hand.fingers.left.finger.tendon_friction.coulomb"
+    other = fp.Hand(fp.load_scenario("pinch", {key: 0.3}).hand)
+    with pytest.raises(fp.InputError, match="hand"):
+        fp.prepare("pinch", [key], finger=other).run([0.2])

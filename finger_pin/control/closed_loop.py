@@ -25,6 +25,7 @@ from finger_pin.mechanism.state import State
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
 
+_NO_FORCE = ForceSignal()
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
@@ -138,7 +139,7 @@ class ClosedLoop:
             force = Signal.from_samples("fingertip_force", fingertip_force, columns, scenario.simulation.rtol)
             loop = replace(loop, fingertip_force=np.zeros_like(loop.fingertip_force), varying_force=force.later(start))
         elif any(signals):
-            settings = [each.get(axis, ForceSignal()) for each in signals for axis in AXES]
+            settings = [each.get(axis, _NO_FORCE) for each in signals for axis in AXES]
             force = Signal.from_settings(settings, scenario.simulation.rtol)
             loop = replace(loop, varying_force=force.later(start))
         initial = scenario.simulation.initial

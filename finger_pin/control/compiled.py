@@ -102,4 +102,4 @@ def core_signal(signal: Signal) -> signal_core.SignalTable:
     harmonics = np.array(signal.harmonics, dtype=float)
     if signal.is_harmonic:
         return signal_core.SignalTable(harmonics, np.zeros(0), np.zeros((6, 0, len(harmonics))))
-    return signal_core.SignalTable(harmonics, signal.knots.copy(), np.ascontiguousarray(signal.coefficients))
+    return signal_core.SignalTable(harmonics, signal.knots.copy(), signal.coefficients.copy())

@@ -13,6 +13,8 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
 from finger_pin.references.signal import Signal
 
+_STILL = PathSignal()
+
 
 @dataclass(frozen=True, eq=False)
 class Guides:
@@ -38,7 +40,7 @@ class Guides:
         paths = {} if around is None else {name: each.path for name, each in around.free.items() if each.path}
         if around is None or not paths:
             return None
-        settings = [path.get(axis, PathSignal()) for path in paths.values() for axis in (*PATH, "", "", "")]
+        settings = [path.get(axis, _STILL) for path in paths.values() for axis in (*PATH, "", "", "")]
         names = list(around.free)
         places = np.array([names.index(name) for name in paths])
         return cls(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.references.signal import Signal
+
+_NOTHING = InputSignal()
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +45,11 @@ class OpenLoopTensions(LoopController):
         given = scenario.controller.tensions or {}
         least = expand(scenario.controller.minimum_tension, len(routing.tendons))
         settings: list[SignalSettings] = [
-            given.get(name, ForceSignal(offset=float(tension)))
+            given.get(name) or _constant(float(tension))
             for name, tension in zip(routing.tendons[: routing.actuated], least, strict=False)
         ]
         driven = scenario.controller.inputs or {}
-        settings += [driven.get(name, InputSignal()) for name in _actuators(scenario)]
+        settings += [driven.get(name, _NOTHING) for name in _actuators(scenario)]
         return cls(
             Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time), routing
         )
@@ -102,6 +105,11 @@ class OpenLoopTensions(LoopController):
     def joined(cls, controllers: Sequence[OpenLoopTensions], routing: Routing) -> OpenLoopTensions:
         """Return the schedule of a hand from those of its fingers."""
         return cls(Signal.joined([each.signal for each in controllers]), routing)
+
+
+@lru_cache
+def _constant(tension: float) -> ForceSignal:
+    return ForceSignal(offset=tension)
 
 
 def _actuators(scenario: Scenario) -> tuple[str, ...]:

@@ -35,7 +35,8 @@ class Chains(NamedTuple):
     """The bodies of `Tables`, and the places of the model's joints among them.
 
     Attributes:
-        parents, roots, kinds, bodies, charts, chart_frames: As in `Tables`.
+        parents, roots, kinds, charts, chart_frames: As in `Tables`.
+        bodies: Likewise, without inertias.
         slides: Largest displacement of each sliding body, shape (n,), m.
         last: Of every joint of the model, the base first, its last body; -1 for the base.
         turns: Rotation of the joint's frame to that body's, shape (3, 3) each.
@@ -50,12 +51,6 @@ class Chains(NamedTuple):
     chart_frames: Array
     last: list[int]
     turns: list[Array]
-
-    def geometry(self) -> bytes:
-        """Return the bytes of everything but the inertias."""
-        places = self.bodies[:, ROTATION:MASS]
-        parts = (self.parents, self.kinds, places, self.slides, self.charts, np.array(self.last), *self.turns)
-        return b"".join(np.ascontiguousarray(each).tobytes() for each in parts)
 
 
 class _Body(NamedTuple):
@@ -94,11 +89,6 @@ def read_chains(model: pin.Model) -> Chains:
             bodies[i, TRANSLATION : TRANSLATION + 3] = translation
             bodies[i, ARMATURE] = model.armature[i]
             above, rotation, translation, turn = i, turned.T, np.zeros(3), turned
-        inertia = model.inertias[joint]
-        bodies[above, MASS] = inertia.mass
-        bodies[above, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
-        moments = turn.T @ inertia.inertia @ turn
-        bodies[above, INERTIA : INERTIA + 6] = moments[_UPPER]
         last.append(above)
         turns.append(turn)
     roots: NDArray[np.int64] = np.arange(size)
@@ -106,6 +96,16 @@ def read_chains(model: pin.Model) -> Chains:
         roots[body] = roots[parents[body]]
     attitudes = np.array(charts, dtype=np.int64), np.array(frames).reshape(-1, 3, 3)
     return Chains(parents, roots, kinds, bodies, slides, *attitudes, last, turns)
+
+
+def weighed(chains: Chains, model: pin.Model) -> Array:
+    """Return the placements and inertias of the bodies of a model of this form, columns of `rigid_body`."""
+    bodies = chains.bodies.copy()
+    for inertia, last, turn in zip(list(model.inertias)[1:], chains.last[1:], chains.turns[1:], strict=True):
+        bodies[last, MASS] = inertia.mass
+        bodies[last, CENTRE : CENTRE + 3] = turn.T @ inertia.lever
+        bodies[last, INERTIA : INERTIA + 6] = (turn.T @ inertia.inertia @ turn)[_UPPER]
+    return bodies
 
 
 def _coordinates(model: pin.Model, index: int) -> list[_Body]:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.axes import along
-from finger_pin.core.chains import Chains, read_chains
+from finger_pin.core.chains import Chains, read_chains, weighed
 from finger_pin.core.evaluation.law_code import SIGNALS, addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.remembering import Remembered
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rigid_body import Form, RigidBody
 
 # Columns of the table of groups.
 FIRST, END, FED, PRESSED, KINK = range(5)
@@ -121,7 +121,7 @@ class Tables(NamedTuple):
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
 _PATHS: Remembered[Paths] = Remembered()
-_CHAINS: WeakKeyDictionary[RigidBody, Chains] = WeakKeyDictionary()
+_CHAINS: WeakKeyDictionary[Form, Chains] = WeakKeyDictionary()
 
 
 def build_tables(mechanism: Mechanism) -> Tables:
@@ -143,11 +143,11 @@ def _read(mechanism: Mechanism) -> Tables:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
-    if body not in _CHAINS:
-        _CHAINS[body] = read_chains(body.model)
-    chains, count = _CHAINS[body], sum(table.count for table in rows)
+    if body.form not in _CHAINS:
+        _CHAINS[body.form] = read_chains(body.model)
+    chains, count = _CHAINS[body.form], sum(table.count for table in rows)
     legs = tuple(table.paths for table in rows)
-    paths = _PATHS.of((legs, chains.geometry()), lambda: read_paths([path for each in legs for path in each], chains))
+    paths = _PATHS.of((legs, body.form), lambda: read_paths([path for each in legs for path in each], chains))
     return Tables(
         guided=mechanism.guided,
         lumps=mechanism.inertia,
@@ -174,7 +174,7 @@ def _of_body(body: RigidBody, chains: Chains) -> dict[str, Any]:
         "parents": chains.parents,
         "roots": chains.roots,
         "kinds": chains.kinds,
-        "bodies": chains.bodies,
+        "bodies": weighed(chains, model),
         "charts": chains.charts,
         "chart_frames": chains.chart_frames,
         "gravity": np.array(model.gravity.linear),

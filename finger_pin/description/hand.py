@@ -6,14 +6,16 @@ Names of a hand's joints and tendons begin with that of their finger and a dot: 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from finger_pin.description.actuators import Actuator
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.parameters import FingerDescription, Link, PassiveTendon, StrokeLimiterSettings
+from finger_pin.description.parameters import FingerDescription, Link, PassiveTendon, StrokeLimiterSettings, Tendon
 from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
@@ -34,6 +36,9 @@ from finger_pin.exceptions import InputError
 _BUILT: Remembered[FingerDescription] = Remembered()
 _LINKS: Remembered[Link] = Remembered()
 _JOINED: Remembered[FingerDescription] = Remembered()
+# Tendons, actuators and tables of numbers of many fingers.
+_TABLES: Remembered[Any] = Remembered(1024)
+_Table = TypeVar("_Table", bound=Description)
 _MILLIMETRES = " m (is it in millimetres?)"
 _PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
 
@@ -58,6 +63,9 @@ class PathSignal(SignalSettings):
         if self.kind in ("step", "ramp"):
             raise problem("kind", "must be one of sine, points, samples: a palm has an acceleration", self.kind)
         return self
+
+
+_AT_REST = PathSignal()
 
 
 class Palm(Description):
@@ -85,7 +93,7 @@ class Palm(Description):
 
     def on_path(self, name: str) -> PathSignal:
         """Return a coordinate of the path; zero where it is left out."""
-        return (self.path or {}).get(name, PathSignal())
+        return (self.path or {}).get(name, _AT_REST)
 
 
 class PlacedFinger(Description):
@@ -184,28 +192,26 @@ class HandDescription(Description):
 
     def _put_together(self) -> FingerDescription:
         parts = self.built()
-        tendons = {f"{name}.{own}": tendon for name, part in parts.items() for own, tendon in part.tendons.items()}
+        tendons, actuators = (
+            {f"{name}.{own}": each for name, part in parts.items() for own, each in getattr(part, group).items()}
+            for group in ("tendons", "actuators")
+        )
         return FingerDescription.model_construct(
             name=self.name,
             title=self.title,
             gravity=self.gravity,
             joints={f"{name}.{own}": joint for name, part in parts.items() for own, joint in part.joints.items()},
             tendons={
-                name: tendon.model_copy(
-                    update={"crossings": {f"{name.split('.')[0]}.{j}": each for j, each in tendon.crossings.items()}}
-                )
+                name: _TABLES.of((name, tendon), partial(_of_hand, name.split(".")[0], tendon))
                 for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
             },
-            tendon_friction=TendonFrictionSettings.model_construct(**_lists(parts, "tendon_friction")),
-            joint_friction=JointFrictionSettings.model_construct(**_lists(parts, "joint_friction")),
-            passive_tendon=PassiveTendon.model_construct(**_lists(parts, "passive_tendon")),
-            stroke_limiter=StrokeLimiterSettings.model_construct(**_lists(parts, "stroke_limiter")),
+            tendon_friction=_joined(parts, "tendon_friction", TendonFrictionSettings),
+            joint_friction=_joined(parts, "joint_friction", JointFrictionSettings),
+            passive_tendon=_joined(parts, "passive_tendon", PassiveTendon),
+            stroke_limiter=_joined(parts, "stroke_limiter", StrokeLimiterSettings),
             actuators={
-                f"{name}.{own}": actuator.model_copy(
-                    update={"tendons": tuple(f"{name}.{tendon}" for tendon in actuator.tendons)}
-                )
-                for name, part in parts.items()
-                for own, actuator in part.actuators.items()
+                name: _TABLES.of((name, actuator), partial(_pulling, name.split(".")[0], actuator))
+                for name, actuator in actuators.items()
             },
         )
 
@@ -250,6 +256,13 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
     def scaled_link(link: Link) -> Link:
         return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in powers.items()})
 
+    def scaled_tendon(tendon: Tendon) -> Tendon:
+        crossings = {
+            joint: crossing.model_copy(update={"radius": crossing.radius * scale})
+            for joint, crossing in tendon.crossings.items()
+        }
+        return tendon.model_copy(update={"crossings": crossings})
+
     joints = {
         name: joint.model_copy(
             update={"link": joint.link and _LINKS.of((joint.link, scale), partial(scaled_link, joint.link))}
@@ -257,15 +270,7 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
         for name, joint in finger.joints.items()
     }
     tendons = {
-        name: tendon.model_copy(
-            update={
-                "crossings": {
-                    joint: crossing.model_copy(update={"radius": crossing.radius * scale})
-                    for joint, crossing in tendon.crossings.items()
-                }
-            }
-        )
-        for name, tendon in finger.tendons.items()
+        name: _TABLES.of((tendon, scale), partial(scaled_tendon, tendon)) for name, tendon in finger.tendons.items()
     }
     friction = finger.joint_friction
     lengths = {
@@ -275,17 +280,38 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
     return finger.model_copy(update=update)
 
 
-def _lists(parts: dict[str, FingerDescription], group: str) -> dict[str, Any]:
-    """Return the numbers of a table of all fingers, one list for each of its entries, in the order of the whole."""
-    values: dict[str, list[tuple[str, float]]] = {}
-    for part in parts.values():
-        # Actuated tendons of all come before passive ones; joints are in order.
-        kinds: list[str] = [""] * len(part.passive_names if group == "passive_tendon" else part.joints)
-        if group == "tendon_friction":
-            kinds = [tendon.kind for tendon in part.tendons.values()]
-        for entry, value in getattr(part, group):
-            numbers = expand(value, len(kinds)).tolist()
-            values.setdefault(entry, []).extend(zip(kinds, numbers, strict=True))
-    return {
-        entry: tuple(number for _, number in sorted(pairs, key=lambda pair: pair[0])) for entry, pairs in values.items()
-    }
+def _of_hand(finger: str, tendon: Tendon) -> Tendon:
+    """Return a tendon whose crossings are of the joints of a hand."""
+    return tendon.model_copy(
+        update={"crossings": {f"{finger}.{name}": each for name, each in tendon.crossings.items()}}
+    )
+
+
+def _pulling(finger: str, actuator: Actuator) -> Actuator:
+    """Return an actuator whose tendons are those of a hand."""
+    return actuator.model_copy(update={"tendons": tuple(f"{finger}.{tendon}" for tendon in actuator.tendons)})
+
+
+def _joined(parts: dict[str, FingerDescription], group: str, table: type[_Table]) -> _Table:
+    """Return a table of all fingers, whose entries are lists of numbers in the order of the whole."""
+    tables: list[_Table] = [getattr(part, group) for part in parts.values()]
+    kinds = [_kinds(part, group) for part in parts.values()]
+    found: _Table = _TABLES.of((*tables, *kinds), lambda: table.model_construct(**_lists(tables, kinds)))
+    return found
+
+
+def _kinds(part: FingerDescription, group: str) -> tuple[str, ...]:
+    """Return what the numbers of a table stand in the order of: actuated tendons of all come before passive ones."""
+    if group == "tendon_friction":
+        return tuple(tendon.kind for tendon in part.tendons.values())
+    return ("",) * len(part.passive_names if group == "passive_tendon" else part.joints)
+
+
+def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
+    order = np.argsort([kind for each in kinds for kind in each], kind="stable")
+    found = {}
+    for entry in type(tables[0]).model_fields:
+        pairs = zip(tables, kinds, strict=True)
+        numbers = np.concatenate([expand(getattr(table, entry), len(own)) for table, own in pairs])
+        found[entry] = tuple(numbers[order].tolist())
+    return found

@@ -28,7 +28,7 @@ from finger_pin.learning.randomisation import Randomisation
 from finger_pin.learning.sensors import Sensor
 from finger_pin.learning.task import Task
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, is_other_hand, own_finger
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import record
 from finger_pin.views.viewer.video import draw_picture
@@ -83,11 +83,11 @@ class World:
         """
         given = load_scenario(scenario)
         own = own_finger(finger, given)
-        scenario = _with_parts(given, own)
+        scenario = described_by(given, own)
         if scenario.simulation.method not in TABLEAUS:
             raise InputError("simulation.method", f"must be one of {', '.join(TABLEAUS)}", scenario.simulation.method)
         randomisation = Randomisation(task)
-        for key in randomisation.keys if _is_other_hand(own, scenario) else ():
+        for key in randomisation.keys if is_other_hand(own, scenario) else ():
             if key.startswith("hand."):
                 raise InputError("randomise", "does not act: the hand that was given is not the scenario's", key)
         family = Family(scenario, randomisation.keys)
@@ -119,9 +119,7 @@ class World:
         if origin is None:
             finger = self._given
             if self._nominal is not None:
-                known = self._nominal[0].description
-                described = known if _is_other_hand(self._given, self._family.scenario) else scenario.finger
-                finger = self._nominal[0].changed(described, scenario.environment.objects)
+                finger = fitted(self._nominal[0], self._family.scenario, scenario)
                 if finger.layout.names != self._nominal[0].layout.names:
                     raise InputError("randomise", "must keep what the state consists of", self.drawn)
             origin = ClosedLoop.from_scenario(scenario, finger=finger).compiled(self._bindings)
@@ -278,16 +276,3 @@ class World:
         limiter, body = self.origin.finger.stroke_limiter, self.origin.finger.rigid_body
         corners = np.array([limiter.lower, limiter.upper, 0.5 * (limiter.lower + limiter.upper)])
         return np.array([body.tip_position(corner) for corner in corners]).reshape(-1, 3)
-
-
-def _with_parts(scenario: Scenario, finger: Finger | None) -> Scenario:
-    """Return a scenario with the description and the objects of the finger that replaces its own."""
-    if finger is None:
-        return scenario
-    environment = scenario.environment.model_copy(update={"objects": finger.made_of[2]})
-    return described_by(scenario, finger).model_copy(update={"environment": environment})
-
-
-def _is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
-    """Return whether a hand is given that the scenario does not describe."""
-    return finger is not None and scenario.hand is not None and finger.description != scenario.finger

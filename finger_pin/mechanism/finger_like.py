@@ -9,6 +9,7 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.scenario import Scenario
+from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 
 #: Wherever a finger is taken: itself, its description, the name of one that ships, or the path of a file.
@@ -31,12 +32,28 @@ def own_finger(finger: FingerLike | None, scenario: Scenario) -> Finger | None:
 
 
 def described_by(scenario: Scenario, finger: Finger | None) -> Scenario:
-    """Return a scenario with the description of the finger that replaces its own; of a hand it stays as it is."""
-    if finger is None or scenario.hand is not None:
+    """Return a scenario with the objects and the description of the finger that replaces its own; a hand's stays."""
+    if finger is None:
         return scenario
-    return scenario.model_copy(update={"finger": finger.description})
+    environment = scenario.environment.model_copy(update={"objects": finger.made_of[2]})
+    found = scenario.model_copy(update={"environment": environment})
+    return found if scenario.hand is not None else found.model_copy(update={"finger": finger.description})
+
+
+def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
+    """Return whether a hand is given that the scenario does not describe."""
+    return finger is not None and scenario.hand is not None and finger.description != scenario.finger
 
 
 def fitted(finger: Finger, known: Scenario, other: Scenario) -> Finger:
-    """Return a finger as it is where two scenarios describe theirs alike, else with the numbers of the other one."""
-    return finger if known.finger == other.finger else finger.changed(other.finger, finger.made_of[2])
+    """Return a finger with the numbers of another scenario than the one that describes it; itself where they are alike.
+
+    Raises:
+        InputError: If the other numbers are those of a hand, and the finger is another one.
+    """
+    objects = other.environment.objects
+    if known.finger == other.finger:
+        return finger if known.environment.objects == objects else finger.changed(finger.description, objects)
+    if is_other_hand(finger, known):
+        raise InputError("hand", "does not act: the hand that was given is not the scenario's", known.finger.name)
+    return finger.changed(other.finger, objects)

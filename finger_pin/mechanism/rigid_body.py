@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -18,6 +19,10 @@ from finger_pin.mechanism.kinematics import Kinematics
 FREE_JOINTS = ("JointModelTranslation", "JointModelSpherical")
 
 
+class Form:
+    """The identity of all bodies that differ in inertias and gravity alone."""
+
+
 class RigidBody:
     """A Pinocchio model with a fixed base and one or more tips.
 
@@ -29,6 +34,7 @@ class RigidBody:
         joints: Names of the joints, in the order of the model.
         proximal_axes: e_j of (17) of every joint of the model, the base first, in the frame of the body that has it.
         carriers: Index of the joint that carries that body, 0 for the base.
+        form: Shared by all bodies that differ in inertias and gravity alone.
     """
 
     def __init__(
@@ -62,7 +68,7 @@ class RigidBody:
         for row, tip in enumerate(self.tips):
             self.supports[row, [each - 1 for each in model.supports[model.frames[tip].parentJoint] if each]] = 1.0
         self.joints: tuple[str, ...] = tuple(model.names[1:])
-        self._own = threading.local()
+        self.form, self._own = Form(), threading.local()
         self.proximal_axes: list[Array] = [np.asarray(base_axis, dtype=float)]
         self.carriers: list[int] = [0]
         for index in range(1, model.njoints):
@@ -87,6 +93,26 @@ class RigidBody:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Become a copy, with memory of its own."""
         vars(self).update(state, _own=threading.local())
+
+    def weighing(self, inertias: Sequence[pin.Inertia], gravity: Sequence[float]) -> RigidBody:
+        """Return a body of the same form with other inertias and gravity.
+
+        Args:
+            inertias: Of the joints of the model, the base left out.
+            gravity: Shape (3,), m/s2.
+        """
+        twin = copy.copy(self)
+        vars(twin).pop("_afloat", None)
+        twin.model = pin.Model(self.model)
+        for joint, inertia in enumerate(inertias, start=1):
+            twin.model.inertias[joint] = inertia
+        twin.model.gravity.linear[:] = gravity
+        return twin
+
+    @property
+    def inertias(self) -> list[pin.Inertia]:
+        """Inertias of the joints of the model, the base left out."""
+        return list(self.model.inertias)[1:]
 
     @property
     def mass(self) -> float:

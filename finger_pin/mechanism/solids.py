@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import pinocchio as pin
 from finger_pin.description.hand import Palm
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription, Link
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
@@ -29,6 +30,7 @@ _WORLD_JOINTS = (
     pin.JointModelPY,
     pin.JointModelPZ,
 )
+_EXTENDED: Remembered[RigidBody] = Remembered()
 _ALONG_LINK = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
@@ -184,23 +186,36 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
     What stands in the world while a ``palm`` moves is carried by the joints of `WORLD`, which come last: the world as
     the palm sees it, R^T (w - p) with R^T = Rx(-roll) Ry(-pitch) Rz(-yaw), of a palm at p and R.
     """
-    model = pin.Model(body.model)
-    for name, each in objects.items():
-        if each.moves:
-            place = pin.SE3.Identity()
-            moved = model.addJoint(0, pin.JointModelTranslation(), place, name)
-            turned = model.addJoint(moved, pin.JointModelSpherical(), place, f"{name}_attitude")
-            # Of one that is led any will do, if it is too little to count.
-            moments = np.full(3, _SLIGHT) if each.mass is None else each.inertia
-            model.inertias[turned] = pin.Inertia(each.mass or _SLIGHT, np.zeros(3), np.diag(moments))
+    moved = tuple(name for name, each in objects.items() if each.moves)
+    world: tuple[float, ...] = ()
     if palm is not None and any(each.frame == "world" for each in objects.values()):
-        carried = 0
-        for name, kind in zip(WORLD, _WORLD_JOINTS, strict=True):
-            most = np.full(1, palm.on_path(name.split()[1]).greatest)
-            limits = (np.full(1, np.inf), np.full(1, np.inf), -most, most)
-            carried = model.addJoint(carried, kind(), pin.SE3.Identity(), name, *limits)
-        model.inertias[carried] = pin.Inertia(_SLIGHT, np.zeros(3), np.diag(np.full(3, _SLIGHT)))
+        world = tuple(palm.on_path(name.split()[1]).greatest for name in WORLD)
+    form = _EXTENDED.of((body.form, *moved, world), lambda: _extended(body, moved, world))
+    # Of what is led any inertia will do, if it is too little to count.
+    slight, none = _inertia(_SLIGHT, np.full(3, _SLIGHT)), pin.Inertia.Zero()
+    inertias = body.inertias
+    for each in (objects[name] for name in moved):
+        inertias += [none, slight if each.mass is None else _inertia(each.mass, each.inertia)]
+    if world:
+        inertias += [none] * (len(world) - 1) + [slight]
+    return form.weighing(inertias, body.model.gravity.linear)
+
+
+def _extended(body: RigidBody, moved: Sequence[str], world: Sequence[float]) -> RigidBody:
+    """Return a rigid body with joints of objects that move, and of the world, which goes no farther than it does, m."""
+    model, place = pin.Model(body.model), pin.SE3.Identity()
+    for name in moved:
+        slid = model.addJoint(0, pin.JointModelTranslation(), place, name)
+        model.addJoint(slid, pin.JointModelSpherical(), place, f"{name}_attitude")
+    carried = 0
+    for name, kind, greatest in zip(WORLD, _WORLD_JOINTS, world, strict=False):
+        most = np.full(1, greatest)
+        carried = model.addJoint(carried, kind(), place, name, np.full(1, np.inf), np.full(1, np.inf), -most, most)
     extended = RigidBody(model, [model.frames[tip].name for tip in body.tips])
     count = body.model.njoints
     extended.proximal_axes[:count], extended.carriers[:count] = body.proximal_axes, body.carriers
     return extended
+
+
+def _inertia(mass: float, moments: Iterable[float]) -> pin.Inertia:
+    return pin.Inertia(mass, np.zeros(3), np.diag([*moments]))

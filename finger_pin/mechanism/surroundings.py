@@ -86,10 +86,11 @@ class Surroundings:
             (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.pose.tobytes(), each.surface)
             for name, each in objects.items()
         ]
-        links = (joint.link for joint in description.joints.values())
+        carried = (joint.link for joint in description.joints.values())
+        links = [(link.length, link.width, link.offset) for link in carried if link]
         touching = hand and hand.fingers_touch, description.touches_itself, width
         make = partial(cls._contacts, objects, description, extended, width, placed)
-        return cls(objects, free, extended, _CONTACTS.of((mechanism.body, *touching, *links, *forms), make))
+        return cls(objects, free, extended, _CONTACTS.of((mechanism.body.form, *touching, *links, *forms), make))
 
     @staticmethod
     def _contacts(

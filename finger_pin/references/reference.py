@@ -16,6 +16,8 @@ from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
 from finger_pin.references.signal import Signal
 
+_STILL = JointReference()
+
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSignals:
@@ -57,7 +59,7 @@ class SignalReference:
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> SignalReference:
         """Read a scenario's reference, for the routing of its finger."""
-        settings = [scenario.reference.joints.get(name, JointReference()) for name in routing.joints]
+        settings = [scenario.reference.joints.get(name, _STILL) for name in routing.joints]
         signal = Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time)
         return cls(signal, scenario.coupling(routing))
 

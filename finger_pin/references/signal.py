@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 Flags = NDArray[np.bool_]
 _ORDER = 6
+_KNOWN: Remembered[Signal] = Remembered()
 # A signal that varies by less, of its size, is constant but for rounding.
 _ROUNDING = 1e-9
 
@@ -53,6 +55,13 @@ class Signal:
             settings: Of each signal.
             tolerance: Of their range, what dense samples may be missed by (`sample_fitting`).
         """
+        make = partial(cls._from_settings, settings, tolerance)
+        # Samples may be many, and would be kept.
+        sampled = any(each.kind == "samples" for each in settings)
+        return make() if sampled else _KNOWN.of(tuple(settings), make)
+
+    @classmethod
+    def _from_settings(cls, settings: Sequence[SignalSettings], tolerance: float) -> Signal:
         harmonics = np.array([[each.offset, each.amplitude, each.frequency, each.phase] for each in settings])
         return cls(harmonics.reshape(-1, 4), *_joined(_polynomials(settings, tolerance)))
 
@@ -209,6 +218,8 @@ class Signal:
 
     def later(self, start: float) -> Signal:
         """Return the signals with their time counted from a start, s."""
+        if start == 0.0:
+            return self
         harmonics = self.harmonics.copy()
         harmonics[:, 3] += 2.0 * math.pi * harmonics[:, 2] * start
         return replace(self, harmonics=harmonics, knots=self.knots - start)

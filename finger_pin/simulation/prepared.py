@@ -21,7 +21,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import nearest
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import SampledMotion
@@ -222,13 +222,8 @@ class Prepared:
 
     def _loop(self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None = None) -> ClosedLoop:
         """Return the loop of one of the family."""
-        known, given = self.family.scenario, self._given
-        if scenario.finger == known.finger and scenario.environment.objects == known.environment.objects:
-            # Nothing of it changes in a run: all share it, also in threads.
-            finger = self._finger
-        else:
-            objects = scenario.environment.objects if given is None else given.made_of[2]
-            finger = self._finger.changed(scenario.finger, objects)
+        # Where nothing of it changes in a run all share it, also in threads.
+        finger = fitted(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
 

@@ -16,12 +16,14 @@ from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rigid_body import Form, RigidBody
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 
 BASE_FRAME = "base"
 TIP_FRAME = "fingertip"
 _BODIES: Remembered[RigidBody] = Remembered()
+_FORMS: Remembered[Form] = Remembered()
+_HANDS: Remembered[RigidBody] = Remembered()
 
 #: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
 #: They are for readers of the URDF that want some; the simulation applies neither.
@@ -112,7 +114,10 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
 def _build(description: FingerDescription) -> RigidBody:
     model = _read(to_urdf(description, drawn=False)).copy()
     model.gravity.linear[:] = description.gravity
-    return RigidBody(model, TIP_FRAME)
+    body = RigidBody(model, TIP_FRAME)
+    places = [(name, each.length, each.offset, each.twist) for name, each in _links(description).items()]
+    body.form = _FORMS.of((*places,), Form)
+    return body
 
 
 @lru_cache(maxsize=16)
@@ -131,7 +136,11 @@ def build_hand(hand: HandDescription) -> RigidBody:
         places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
         return RigidBody.join(parts, places)
 
-    return _BODIES.of((hand.gravity, *placed, *parts.values()), join)
+    def weigh() -> RigidBody:
+        joined = _HANDS.of((*placed, *(part.form for part in parts.values())), join)
+        return joined.weighing([each for part in parts.values() for each in part.inertias], hand.gravity)
+
+    return _BODIES.of((hand.gravity, *placed, *parts.values()), weigh)
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
