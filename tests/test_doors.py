@@ -121,12 +121,17 @@ def test_a_finger_its_description_its_name_and_the_path_of_its_file_do_the_same(
         same(door(given), expected)
 
 
-@pytest.mark.parametrize(
-    "hand", ["ub_hand", fp.load_hand("ub_hand"), fp.Hand("ub_hand")], ids=["name", "description", "hand"]
-)
+@pytest.fixture(scope="module", params=["name", "description", "hand", "file", "file with a base"])
+def hand(request, tmp_path_factory):
+    """The hand that ships, in every way in which a hand can be given."""
+    path = tmp_path_factory.mktemp("hands") / "own.toml"
+    path.write_text(fp.to_toml(fp.load_hand("ub_hand")) if request.param == "file" else 'base = "ub_hand"')
+    ways = {"name": "ub_hand", "description": fp.load_hand("ub_hand"), "hand": fp.Hand("ub_hand")}
+    return ways.get(request.param, path)
+
+
 def test_a_hand_is_taken_where_a_finger_is(hand):
-    joints = fp.Finger(fp.load_hand("ub_hand")).routing.joints
-    assert fp.Simulator(hand).finger.routing.joints == joints
+    assert fp.Simulator(hand).finger.routing.joints == tuple(fp.load_scenario("hand").finger.joints)
     assert fp.analysis.closure_over_range(hand, samples=8).holds
 
 

@@ -19,7 +19,6 @@ from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.tableaus import rodas5p
 from finger_pin.description.family import Family
-from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
@@ -48,7 +47,7 @@ _Map = Callable[[Finger, Array, Array], Array]
 
 
 def linearise(
-    finger_or_scenario: Finger | FingerDescription | HandDescription | ScenarioLike,
+    finger_or_scenario: Finger | FingerDescription | ScenarioLike,
     state: ArrayLike,
     inputs: ArrayLike,
     dt: float | None = None,
@@ -75,7 +74,7 @@ def linearise(
         InputError: If state or inputs have a wrong size, free objects are among the coordinates, ``dt`` is not
             positive, or parameters are asked of a finger without a scenario or are not single numbers.
     """
-    if isinstance(finger_or_scenario, Finger | FingerDescription | HandDescription):
+    if isinstance(finger_or_scenario, Finger | FingerDescription):
         scenario, finger = None, as_finger(finger_or_scenario)
     else:
         scenario = load_scenario(finger_or_scenario)

@@ -13,12 +13,11 @@ from finger_pin.analysis.directions import directions_of_motion, sliding_velocit
 from finger_pin.analysis.locking_loop import FrictionLoop
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.hand import one_finger
-from finger_pin.description.loading import describe
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike
+from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.mechanism.tendons import Tendons
 
 
@@ -96,7 +95,7 @@ def critical_friction(
 
 
 def _tendons(finger: FingerLike) -> Tendons:
-    description = finger.description if isinstance(finger, Finger) else describe(finger)
+    description = description_of(finger)
     one_finger(description)
     return finger.tendons if isinstance(finger, Finger) else Tendons.from_description(description)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +11,6 @@ from finger_pin.commands.console import print_text
 from finger_pin.commands.options import Settings, overrides, wrong
 
 if TYPE_CHECKING:
-    from finger_pin.description.hand import HandDescription
     from finger_pin.description.parameters import FingerDescription
     from finger_pin.description.scenario import Scenario
 
@@ -60,29 +58,20 @@ def export(
     print_text(f"wrote {target}")
 
 
-def described(source: str, settings: list[str]) -> FingerDescription | HandDescription | Scenario:
+def described(source: str, settings: list[str]) -> FingerDescription | Scenario:
     """Return the finger, hand or scenario of a name or a file."""
-    from finger_pin.description.loading import list_fingers, list_hands, load_finger, load_hand, load_scenario
+    from finger_pin.description.loading import load_finger, load_hand, load_scenario
+    from finger_pin.description.reading import kind_of
 
-    changed, tables = overrides(settings), {"joints", "tendons", "base", "fingers"}
-    if source.endswith(".toml") and Path(source).is_file():
-        with open(source, "rb") as file:
-            try:
-                tables &= tomllib.load(file).keys()
-            except (tomllib.TOMLDecodeError, UnicodeDecodeError):
-                # Reading it as a scenario says what is wrong with it.
-                tables = set()
-        finger, hand = bool(tables) and "fingers" not in tables, "fingers" in tables
-    else:
-        finger, hand = source in list_fingers(), source in list_hands()
-    if hand:
-        return load_hand(source, changed)
-    return load_finger(source, changed) if finger else load_scenario(source, changed)
+    kind, changed = kind_of(source), overrides(settings)
+    if kind == "scenario":
+        return load_scenario(source, changed)
+    return (load_hand if kind == "hand" else load_finger)(source, changed)
 
 
-def written(described: FingerDescription | HandDescription | Scenario, ending: str) -> str:
+def written(described: FingerDescription | Scenario, ending: str) -> str:
     """Return a description as the text of a file."""
-    from finger_pin.description.hand import HandDescription, one_finger
+    from finger_pin.description.hand import one_finger
     from finger_pin.description.loading import to_toml
     from finger_pin.description.scenario import Scenario
     from finger_pin.mechanism.exchange.mjcf import to_mjcf
@@ -91,9 +80,8 @@ def written(described: FingerDescription | HandDescription | Scenario, ending: s
     if ending == ".toml":
         return to_toml(described)
     if isinstance(described, Scenario):
-        described = described.hand or described.finger
+        described = described.finger
     if ending == ".xml":
         return to_mjcf(described)
-    finger = described.joined() if isinstance(described, HandDescription) else described
-    one_finger(finger)
-    return to_urdf(finger)
+    one_finger(described)
+    return to_urdf(described)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.hand import PATH, HandDescription
+from finger_pin.description.hand import PATH, HandSettings
 from finger_pin.description.routing import Array
 from finger_pin.laws.palm import base_motion
 from finger_pin.mechanism.finger import Finger
@@ -29,7 +29,7 @@ class PalmPath:
 
     @classmethod
     def of(
-        cls, hand: HandDescription | None, start: float, finger: Finger | None = None, tolerance: float = 0.0
+        cls, hand: HandSettings | None, start: float, finger: Finger | None = None, tolerance: float = 0.0
     ) -> PalmPath | None:
         """Return the path of a hand's palm from a time on, s; None if it rests. Around the finger objects stand.
 

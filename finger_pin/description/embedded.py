@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.scenario import Scenario
@@ -56,7 +56,7 @@ def _read(kind: str, own: str, objects: str) -> Embedded:
         raise InputError(entry, "must be a description in JSON") from error
     found = {name: validate(Object, each, ("result.attrs.objects", name)) for name, each in around.items()}
     if kind == "hand":
-        return Embedded(validate(HandDescription, table, (entry,)).joined(), found)
+        return Embedded(validate(HandSettings, table, (entry,)).joined(), found)
     return Embedded(validate(FingerDescription, table, (entry,)), found)
 
 

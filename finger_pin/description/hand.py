@@ -131,8 +131,11 @@ class PlacedFinger(Description):
         return rotation(*self.orientation)
 
 
-class HandDescription(Description):
-    """A hand. Its gravity, in the world's frame, replaces that of the fingers; a palm at rest has that frame."""
+class HandSettings(Description):
+    """A palm and the fingers on it, the table ``[hand]``. `joined` describes them all together, as one finger.
+
+    Its gravity, in the world's frame, replaces that of the fingers; a palm at rest has that frame.
+    """
 
     file_keys = ("base",)
 
@@ -165,7 +168,7 @@ class HandDescription(Description):
             folded[name.casefold()] = name
         return value
 
-    def parts(self) -> dict[str, HandDescription]:
+    def parts(self) -> dict[str, HandSettings]:
         """Return hands of one finger each, by name."""
         return {
             name: self.model_copy(update={"fingers": {name: placed}, "name": name})

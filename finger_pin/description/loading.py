@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.overriding import from_here, override
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.reading import (
@@ -20,6 +20,7 @@ from finger_pin.description.reading import (
     as_name,
     as_table,
     is_path,
+    kind_of,
     merge,
     read_scenario_file,
     resolve_signals,
@@ -40,7 +41,7 @@ _TEXTS: Remembered[str] = Remembered(4)
 #: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
 ScenarioLike: TypeAlias = Scenario | str | Path
 #: Likewise a finger; a hand is one, too.
-DescriptionLike: TypeAlias = FingerDescription | HandDescription | str | Path
+DescriptionLike: TypeAlias = FingerDescription | str | Path
 
 
 def list_fingers() -> dict[str, str]:
@@ -81,8 +82,10 @@ def load_finger(name: str | Path, overrides: Mapping[str, Any] | None = None) ->
     return _load("finger", FingerDescription, name, overrides)
 
 
-def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> HandDescription:
-    """Load a hand by the name of a shipped one or the path of a TOML file.
+def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> FingerDescription:
+    """Load all fingers of a hand together by the name of a shipped one or the path of a TOML file.
+
+    Joints and tendons have dotted names, such as ``index.medial``. Palm and placed fingers are its `hand`.
 
     Args:
         name: Such as ``ub_hand`` or ``my_hand.toml``.
@@ -91,18 +94,21 @@ def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> H
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    return _load("hand", HandDescription, name, overrides)
+    return _load("hand", HandSettings, name, overrides).joined()
 
 
 def describe(finger: DescriptionLike) -> FingerDescription:
-    """Return the description of a finger, or of all fingers of a hand together, that is given in any way.
+    """Return the description of a finger or a hand that is given in any way.
 
     Raises:
         InputError: Naming the entry that is wrong.
     """
     if isinstance(finger, str | Path):
-        finger = load_hand(finger) if finger in list_hands() else load_finger(finger)
-    return finger.joined() if isinstance(finger, HandDescription) else finger
+        return load_hand(finger) if kind_of(str(finger)) == "hand" else load_finger(finger)
+    if not isinstance(finger, FingerDescription):
+        allowed = "must be that of a finger or a hand, as fp.load_finger(name), or the name or path of one"
+        raise InputError("description", allowed, type(finger).__name__)
+    return finger
 
 
 def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -194,7 +200,7 @@ def to_toml(description: Description) -> str:
     Raises:
         InputError: If it is none.
     """
-    if not isinstance(description, Scenario | HandDescription | FingerDescription):
+    if not isinstance(description, Scenario | FingerDescription):
         allowed = "must be a finger, hand or scenario, as fp.load_finger(name), or finger.description"
         raise InputError("description", allowed, type(description).__name__)
     if isinstance(description, FingerDescription) and description.hand is not None:

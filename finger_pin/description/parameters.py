@@ -29,7 +29,7 @@ from finger_pin.description.validation import (
 )
 
 if TYPE_CHECKING:
-    from finger_pin.description.hand import HandDescription
+    from finger_pin.description.hand import HandSettings
 
 _MILLIMETRES = " m (is it in millimetres?)"
 
@@ -199,7 +199,7 @@ class StrokeLimiterSettings(Description):
 
 
 class FingerDescription(Description):
-    """A whole finger. Tendons are kept with the actuated ones first.
+    """A finger of links, all fingers of a hand together, or a tree of bodies. Actuated tendons come first.
 
     Lists of numbers follow the order of the joints, of all tendons, or of the passive tendons.
     """
@@ -278,9 +278,9 @@ class FingerDescription(Description):
         return f"{self.name}: joints {', '.join(self.joints)}; tendons {tendons}"
 
     @property
-    def hand(self) -> HandDescription | None:
-        """The hand whose fingers together this is; None for a finger."""
-        hand: HandDescription | None = self._hand
+    def hand(self) -> HandSettings | None:
+        """The palm and the fingers on it, if it is a hand of such."""
+        hand: HandSettings | None = self._hand
         return hand
 
     @property

@@ -74,6 +74,19 @@ def is_path(name: str) -> bool:
     return name.endswith(".toml") or "/" in name or "\\" in name
 
 
+def kind_of(name: str, folder: Path = Path()) -> str:
+    """Return the kind of a name, or of a file relative to a folder: ``finger``, ``hand``, or else ``scenario``."""
+    if not is_path(name):
+        return next((kind for kind in ("finger", "hand") if name in _shipped_texts(f"{kind}s")), "scenario")
+    try:
+        table, path = _read("finger", name, folder)
+        if "base" in table and "fingers" not in table:
+            return kind_of(str(table["base"]), path.parent)
+    except (InputError, RecursionError):
+        return "scenario"
+    return "hand" if "fingers" in table else "finger" if {"joints", "tendons"} & table.keys() else "scenario"
+
+
 def expand(name: str) -> Path:
     """Return a path with the home folder in place of ~, or as it is where there is no such home."""
     try:

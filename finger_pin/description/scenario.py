@@ -22,7 +22,7 @@ from finger_pin.description.actuators import check_currents, check_sources
 from finger_pin.description.by_finger import error_of_finger, flat, flat_numbers, given, nested, of_finger
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.remembering import Remembered
@@ -147,7 +147,7 @@ class Scenario(Description):
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     # Filled in below where there is a hand.
     finger: FingerDescription = Field(None)  # type: ignore[assignment]
-    hand: HandDescription | None = Field(None, description="Several fingers on a palm, in place of a finger.")
+    hand: HandSettings | None = Field(None, description="Several fingers on a palm, in place of a finger.")
     controller: ControllerSettings = ControllerSettings()
     reference: ReferenceSettings = ReferenceSettings()
     environment: EnvironmentSettings = EnvironmentSettings()
@@ -197,7 +197,7 @@ class Scenario(Description):
             return dict.fromkeys(self.hand.fingers, self)
         return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
 
-    def _part(self, name: str, alone: HandDescription) -> Scenario:
+    def _part(self, name: str, alone: HandSettings) -> Scenario:
         def own(table: Mapping[str, _Item]) -> dict[str, _Item]:
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.hand import HandDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
@@ -142,7 +141,7 @@ class Finger:
     @classmethod
     def from_model(
         cls,
-        description: FingerDescription | HandDescription,
+        description: FingerDescription,
         model: pin.Model,
         joints: Mapping[str, str] | Mapping[str, Mapping[str, str]],
         tip_frame: str | Mapping[str, str],
@@ -168,8 +167,8 @@ class Finger:
             InputError: If a joint is missing, given twice or out of the model's order, or has several coordinates,
                 or the configuration has the wrong size.
         """
-        joined, body, shown = on_model(description, model, joints, tip_frame, configuration, base_axis, visuals)
-        finger = cls(joined, body)
+        body, shown = on_model(description, model, joints, tip_frame, configuration, base_axis, visuals)
+        finger = cls(description, body)
         finger.visuals = shown
         return finger
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.validation import validate
 
@@ -121,4 +121,4 @@ def test_actuators_of_a_tree_are_driven_in_open_loop_alone():
 
 def test_a_tree_is_not_placed_on_a_palm():
     with pytest.raises(fp.InputError, match="a tree of bodies cannot be placed on a palm"):
-        validate(HandDescription, {"name": "hand", "fingers": {"index": {"finger": FINGER}}}, ("hand",))
+        validate(HandSettings, {"name": "hand", "fingers": {"index": {"finger": FINGER}}}, ("hand",))

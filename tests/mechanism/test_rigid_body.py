@@ -134,11 +134,11 @@ def test_kinematics_agrees_with_the_single_queries(body):
 
 def test_all_tips_of_a_hand_are_those_of_its_fingers_in_their_places():
     hand, rng = load_hand("ub_hand"), np.random.default_rng(7)
-    body, q = build_rigid_body(hand.joined()), rng.uniform(0.0, 1.0, (2, 3, 20))
+    body, q = build_rigid_body(hand), rng.uniform(0.0, 1.0, (2, 3, 20))
     tips, jacobian = body.tip_position(q), body.jacobian(q[1, 2])
     assert tips.shape == (2, 3, 5, 3) and jacobian.shape == (5, 3, 20)
-    for index, (name, finger) in enumerate(hand.built().items()):
-        placed, own = hand.fingers[name], build_rigid_body(finger)
+    for index, (name, finger) in enumerate(hand.hand.built().items()):
+        placed, own = hand.hand.fingers[name], build_rigid_body(finger)
         joints = slice(4 * index, 4 * index + 4)
         expected = placed.rotation @ own.tip_position(q[1, 2, joints]) + placed.position
         np.testing.assert_allclose(tips[1, 2, index], expected, rtol=0, atol=1e-15)

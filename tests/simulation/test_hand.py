@@ -152,7 +152,7 @@ def test_a_finger_on_a_hand_is_named_in_place_of_a_table(tmp_path):
     (tmp_path / "own.toml").write_text(text.format('name = "own"'))
     (tmp_path / "based.toml").write_text(text.format('base = "ub_hand"'))
     alone = fp.load_scenario(tmp_path / "own.toml").hand.fingers
-    planar, usual = fp.load_finger("planar"), fp.load_hand("ub_hand").fingers["thumb"]
+    planar, usual = fp.load_finger("planar"), fp.load_hand("ub_hand").hand.fingers["thumb"]
     assert list(alone) == ["thumb"] and alone["thumb"].finger == planar and alone["thumb"].position == (0.0, 0.0, 0.0)
     overridden = fp.load_scenario("hand", {"hand.fingers.thumb": "planar", "reference.joints": {}})
     for scenario in (fp.load_scenario(tmp_path / "based.toml"), overridden):
@@ -210,7 +210,7 @@ def test_fingers_that_share_a_name_and_a_finger_that_is_missing_are_refused(tmp_
 
 def test_a_hand_is_built_by_its_name_and_steps_all_its_fingers():
     hand = fp.Finger("ub_hand")
-    assert hand.routing.joints == tuple(fp.load_hand("ub_hand").joined().joints) and "20 joints" in repr(hand)
+    assert hand.routing.joints == tuple(fp.load_hand("ub_hand").joints) and "20 joints" in repr(hand)
     simulator = fp.Simulator(hand)
     before = simulator.state.position
     assert np.all(simulator.step(np.full(20, 1.0), 1e-3).position != before)

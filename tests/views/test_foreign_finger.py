@@ -7,7 +7,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.analysis import force_polytope, self_locking_map
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views import LiveView, plots, view_forces
 from finger_pin.views.viewer import write_animation
@@ -48,7 +48,7 @@ def foreign(robot, description):
 @pytest.fixture(scope="module")
 def hand(description):
     fingers = {finger: {"finger": description.model_dump()} for finger in FIRST}
-    return HandDescription.model_validate({"name": "allegro", "fingers": fingers})
+    return HandSettings.model_validate({"name": "allegro", "fingers": fingers}).joined()
 
 
 @pytest.fixture(scope="module")

@@ -64,11 +64,11 @@ def test_the_summary_names_every_finger(hand):
 
 def test_tendons_and_solids_of_a_placed_finger_are_its_own_moved_to_its_place():
     described = fp.load_hand("ub_hand")
-    whole, own = TendonGeometry(described.joined()), TendonGeometry(described.built()["thumb"])
+    whole, own = TendonGeometry(described), TendonGeometry(described.hand.built()["thumb"])
     theta = np.array([0.1, 0.3, 0.5, 0.4])
     all_joints = np.zeros(20)
     all_joints[:4] = theta
-    placed = described.fingers["thumb"]
+    placed = described.hand.fingers["thumb"]
     for path in own.paths(theta):
         found = next(each for each in whole.paths(all_joints) if each.name == f"thumb.{path.name}")
         np.testing.assert_allclose(found.points, path.points @ placed.rotation.T + placed.position, atol=1e-14)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.hand import HandDescription
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -16,30 +15,29 @@ from finger_pin.mechanism.rigid_body import RigidBody
 
 
 def on_model(
-    description: FingerDescription | HandDescription,
+    description: FingerDescription,
     model: pin.Model,
     joints: Mapping[str, str] | Mapping[str, Mapping[str, str]],
     tip_frame: str | Mapping[str, str],
     configuration: Array | None,
     base_axis: Sequence[float] | Mapping[str, Sequence[float]],
     visuals: pin.GeometryModel | None,
-) -> tuple[FingerDescription, RigidBody, pin.GeometryModel]:
-    """Return description, rigid body and solids of a finger on a model whose other joints are locked.
+) -> tuple[RigidBody, pin.GeometryModel]:
+    """Return rigid body and solids of a finger on a model whose other joints are locked.
 
     Arguments and errors are those of `Finger.from_model`.
     """
-    joined = description.joined() if isinstance(description, HandDescription) else description
-    fingers = tuple(description.fingers) if isinstance(description, HandDescription) else ("",)
+    fingers = ("",) if description.hand is None else tuple(description.hand.fingers)
     named = _by_joint(joints)
     tips, axes = (
         _by_finger(each, fingers, what) for each, what in ((tip_frame, "tip_frame"), (base_axis, "base_axis"))
     )
-    for name in joined.joints:
+    for name in description.joints:
         if name not in named:
             raise InputError(f"joints.{name}", "is missing: name the model's joint")
-    chosen = [named[name] for name in joined.joints]
+    chosen = [named[name] for name in description.joints]
     for name, wanted in named.items():
-        if name not in joined.joints or not model.existJointName(wanted):
+        if name not in description.joints or not model.existJointName(wanted):
             raise InputError(f"joints.{name}", "no such joint in the description or the model", wanted)
     indices = [int(model.getJointId(name)) for name in chosen]
     if indices != sorted(set(indices)):
@@ -50,13 +48,13 @@ def on_model(
         raise InputError("configuration", f"must be {model.nq} numbers, one per coordinate of the model", posture)
     solids = pin.GeometryModel() if visuals is None else visuals
     reduced, shown = pin.buildReducedModel(model, solids, locked, posture)
-    reduced.gravity.linear[:] = joined.gravity
+    reduced.gravity.linear[:] = description.gravity
     body = RigidBody(reduced, tips)
-    for index, name in enumerate(joined.joints, start=1):
+    for index, name in enumerate(description.joints, start=1):
         if body.carriers[index] == 0:
             own = fingers.index(name.split(".")[0]) if len(fingers) > 1 or fingers[0] else 0
             body.proximal_axes[index] = np.asarray(axes[own], dtype=float)
-    return joined, body, shown
+    return body, shown
 
 
 def _by_joint(joints: Mapping[str, str] | Mapping[str, Mapping[str, str]]) -> dict[str, str]:

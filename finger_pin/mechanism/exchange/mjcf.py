@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.loading import DescriptionLike
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.routing import Array
@@ -155,7 +155,7 @@ def _stable_step(tendons: Tendons, massless: bool) -> float:
     return min(TIMESTEP, float(f"{0.8 / fastest:.0e}"))
 
 
-def _add_hand(world: ET.Element, hand: HandDescription, shapes: bool) -> None:
+def _add_hand(world: ET.Element, hand: HandSettings, shapes: bool) -> None:
     """Add the palm and, on it, the fingers; names of a finger begin with its own and a dot."""
     palm = ET.SubElement(world, "body", name="palm")
     if shapes and all(hand.palm.size):

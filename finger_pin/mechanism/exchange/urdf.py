@@ -5,12 +5,11 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from functools import lru_cache, partial
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.remembering import Remembered
@@ -51,7 +50,8 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
     """
     description = exported(description)
     if description.hand is not None:
-        raise InputError("finger", "is a hand; write its fingers one by one: hand.built()", description.name)
+        allowed = "is a hand; write its fingers one by one: description.hand.built()"
+        raise InputError("finger", allowed, description.name)
     links = _links(description)
     shapes = _shapes(description, links) if drawn else {}
     robot = ET.Element("robot", name=description.name)
@@ -82,13 +82,7 @@ def exported(described: DescriptionLike | Scenario) -> FingerDescription:
     Raises:
         InputError: If it is none of them, or has a tree of bodies.
     """
-    if isinstance(described, Scenario):
-        described = described.finger
-    if isinstance(described, HandDescription | str | Path):
-        described = describe(described)
-    if not isinstance(described, FingerDescription):
-        allowed = "must be a finger, hand or scenario, as fp.load_finger(name), or finger.description"
-        raise InputError("description", allowed, type(described).__name__)
+    described = describe(described.finger if isinstance(described, Scenario) else described)
     if described.tree is not None:
         allowed = "is not written: bodies in place of links; what was read from MuJoCo has its own MJCF"
         raise InputError("finger.tree", allowed, described.name)
@@ -126,7 +120,7 @@ def _read(text: str) -> pin.Model:
     return pin.buildModelFromXML(text)
 
 
-def build_hand(hand: HandDescription) -> RigidBody:
+def build_hand(hand: HandSettings) -> RigidBody:
     """Return the rigid body of a hand: its fingers in their places, in the palm's frame."""
     pulled = {"gravity": hand.gravity}
     parts = {name: build_rigid_body(finger.model_copy(update=pulled)) for name, finger in hand.built().items()}

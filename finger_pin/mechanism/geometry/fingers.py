@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.hand import HandDescription
+from finger_pin.description.hand import HandSettings
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.exchange.urdf import build_rigid_body, to_urdf
@@ -186,7 +186,7 @@ def fingers_on_model(
     return model, found, tuple(_visual(each, placement) for each, placement in placed)
 
 
-def palm_of(hand: HandDescription | None) -> tuple[Visual, ...]:
+def palm_of(hand: HandSettings | None) -> tuple[Visual, ...]:
     """Return the box of a palm, if it has one."""
     if hand is None or not all(hand.palm.size):
         return ()

@@ -28,7 +28,7 @@ def test_the_page_of_a_hand_moves_all_fingers_and_has_a_column_for_each(browser,
     assert float(shown) == pytest.approx(float(hand.tendon_tension.sel(tendon="index.T3")[-1]), abs=0.051)
     labels = page.execute_script("return [...document.getElementById('labels').children].map(l => l.textContent)")
     assert sorted(labels) == sorted(FINGERS)
-    geometry = TendonGeometry(fp.load_hand("ub_hand").joined(), resolution=11)
+    geometry = TendonGeometry(fp.load_hand("ub_hand"), resolution=11)
     path = next(p for p in geometry.paths(hand.joint_position.values[-1]) if p.name == "little.T4")
     np.testing.assert_allclose(ring_centres(page, "little.T4"), path.points, atol=2e-5)
     panel = page.execute_script(
