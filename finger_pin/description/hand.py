@@ -118,13 +118,6 @@ class PlacedFinger(Description):
         1.0, unit="1", source="design", doc="All lengths times this, masses times its third power."
     )
 
-    @field_validator("finger")
-    @classmethod
-    def _of_links(cls, value: FingerDescription) -> FingerDescription:
-        if value.tree is not None:
-            raise problem("tree", "a tree is a hand by itself, and cannot be a finger of one")
-        return value
-
     @property
     def rotation(self) -> Array:
         """From the finger's base frame to the palm's, shape (3, 3)."""

@@ -10,28 +10,16 @@ from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.hand import PathSignal
 from finger_pin.description.routing import Array
-from finger_pin.description.surface import MILLIMETRES, SIZES, Surface, check_sizes, sizes_of
-from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
+from finger_pin.description.validation import Name, choice, problem, quantity, real, vector
 
 #: The coordinates of an object's path.
 PATH = ("x", "y", "z")
 
 
-class Object(Description):
+class Object(Shaped):
     """A rigid body of the environment: fixed, free if it has a mass, or moved along a path."""
 
-    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
-        ..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule."
-    )
-    radius: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
-    )
-    length: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of a cylinder; of a capsule without its round ends."
-    )
-    sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
-        None, unit="m", source="design", doc="Of a box, along x, y and z."
-    )
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its origin, base frame; of a free object at t = 0."
     )
@@ -53,7 +41,6 @@ class Object(Description):
     path: dict[Name, PathSignal] | None = Field(
         None, description="Moves it, whatever pushes it: what x, y and z of its position grow by over time, base frame."
     )
-    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
 
     @field_validator("shape", mode="before")
     @classmethod
@@ -72,7 +59,6 @@ class Object(Description):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        check_sizes(self, self.shape)
         if math.hypot(*self.orientation) < 1e-6:
             raise problem("orientation", "must be a quaternion x, y, z, w that is not zero", self.orientation)
         if self.shape == "half_space" and self.mass is not None:
@@ -90,11 +76,6 @@ class Object(Description):
     def moves(self) -> bool:
         """Whether it is free or moved."""
         return self.mass is not None or bool(self.path)
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """The numbers of `SIZES`, m."""
-        return sizes_of(self, self.shape)
 
     @property
     def quaternion(self) -> Array:

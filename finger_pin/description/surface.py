@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -55,11 +55,11 @@ class Surface(Description):
     )
 
 
-class BodyShape(Description):
-    """A shape with which a body of a tree touches."""
+class Shaped(Description):
+    """A convex solid, or a half-space, with a surface."""
 
-    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
-        ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule."
+    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
+        ..., unit="1", source="design", doc="One of half_space, sphere, box, cylinder, capsule."
     )
     radius: Annotated[float, real(0.0, 10.0, above=True, hint=MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a sphere, cylinder or capsule."
@@ -70,40 +70,42 @@ class BodyShape(Description):
     sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a box, along x, y and z."
     )
+    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
+
+    @model_validator(mode="after")
+    def _sized(self) -> Self:
+        for entry in ("radius", "length", "sides"):
+            given, needed = getattr(self, entry), entry in SIZES[self.shape]
+            if given is None and needed:
+                raise problem(entry, f'is missing: shape = "{self.shape}" needs {", ".join(SIZES[self.shape])}')
+            if given is not None and not needed:
+                shapes = ", ".join(each for each, entries in SIZES.items() if entry in entries)
+                raise problem(entry, f'is for {shapes}, not for shape = "{self.shape}"', given)
+        return self
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """The numbers of `SIZES`, m."""
+        if self.sides is not None:
+            return self.sides
+        return tuple(getattr(self, name) for name in SIZES[self.shape])
+
+
+class BodyShape(Shaped):
+    """A shape with which a body of a tree touches."""
+
+    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule"], choice(*SIZES)] = quantity(
+        ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule."
+    )
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."
     )
     orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
         (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
     )
-    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
-        check_sizes(self, self.shape)
+    def _turned(self) -> Self:
         if abs(math.hypot(*self.orientation) - 1.0) > 1e-6:
             raise problem("orientation", "must be a quaternion x, y, z, w of length 1", list(self.orientation))
         return self
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """The numbers of `SIZES`, m."""
-        return sizes_of(self, self.shape)
-
-
-def check_sizes(described: Any, shape: str) -> None:
-    """Refuse a shape that lacks a size that it needs, or has one that it has no use for."""
-    for entry in ("radius", "length", "sides"):
-        given, needed = getattr(described, entry), entry in SIZES[shape]
-        if given is None and needed:
-            raise problem(entry, f'is missing: shape = "{shape}" needs {", ".join(SIZES[shape])}')
-        if given is not None and not needed:
-            shapes = ", ".join(each for each, entries in SIZES.items() if entry in entries)
-            raise problem(entry, f'is for {shapes}, not for shape = "{shape}"', given)
-
-
-def sizes_of(described: Any, shape: str) -> tuple[float, ...]:
-    """Return the numbers of `SIZES` that describe a shape, m."""
-    if described.sides is not None:
-        return tuple(described.sides)
-    return tuple(getattr(described, name) for name in SIZES[shape])
