@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from finger_pin.control.compiled import Bindings, compiled_control, sampled_cont
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.stepping.cvode import integrate_cvode
 from finger_pin.core.stepping.encounters import meetings
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
@@ -138,18 +136,18 @@ class Setup:
         if self.method in TABLEAUS:
             return self._compiled(settings, watch, stop, chunk, steps)
         loop = self.loop
-        common: dict[str, Any] = {
-            "rtol": settings.rtol,
-            "atol": settings.atol_scale * loop.finger.layout.scales(),
-            "longest": loop.longest_step(settings.rtol),
-            "meeting": meetings(loop.finger.mechanism),
-            "watch": watch,
-            "stop": stop,
-        }
-        start, duration = loop.initial_state(), settings.duration
-        if self.method == "CVODE":
-            return integrate_cvode(loop.rhs, start, duration, **common)
-        return integrate(loop.rhs, start, duration, method=self.method, **common)
+        return integrate(
+            loop.rhs,
+            loop.initial_state(),
+            settings.duration,
+            method=self.method,
+            rtol=settings.rtol,
+            atol=settings.atol_scale * loop.finger.layout.scales(),
+            longest=loop.longest_step(settings.rtol),
+            meeting=meetings(loop.finger.mechanism),
+            watch=watch,
+            stop=stop,
+        )
 
     def _compiled(
         self, settings: SimulationSettings, watch: Watch | None, stop: Stop | None, chunk: int, steps: Steps | None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.core.stepping.cvode import integrate_cvode
+from finger_pin.core.stepping.textbook import integrate
 
 TIGHT = {"simulation.duration": 0.2, "simulation.rtol": 1e-8, "simulation.atol_scale": 1e-8}
 
@@ -18,7 +18,7 @@ def oscillate(time: float, x: np.ndarray) -> np.ndarray:
 
 
 def test_an_oscillator_follows_its_closed_form_between_the_steps_too() -> None:
-    found = integrate_cvode(oscillate, np.array([0.0, 1.0]), 6.0, rtol=1e-9, atol=np.full(2, 1e-9))
+    found = integrate(oscillate, np.array([0.0, 1.0]), 6.0, method="CVODE", rtol=1e-9, atol=np.full(2, 1e-9))
     times = np.linspace(0.0, 6.0, 501)
     np.testing.assert_allclose(found.interpolate(times), np.stack([np.sin(times), np.cos(times)], axis=1), atol=1e-6)
     assert found.breakpoints[-1] == 6.0 and not found.failure
@@ -26,10 +26,11 @@ def test_an_oscillator_follows_its_closed_form_between_the_steps_too() -> None:
 
 def test_a_stop_keeps_what_was_computed() -> None:
     seen: list[float] = []
-    found = integrate_cvode(
+    found = integrate(
         oscillate,
         np.array([0.0, 1.0]),
         6.0,
+        method="CVODE",
         rtol=1e-6,
         atol=np.full(2, 1e-6),
         watch=lambda time, x: seen.append(time),

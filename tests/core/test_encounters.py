@@ -7,7 +7,6 @@ import pytest
 from test_contact_motion import G, scene
 
 from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.stepping.cvode import integrate_cvode
 from finger_pin.core.stepping.encounters import meetings
 from finger_pin.core.stepping.textbook import integrate
 from finger_pin.description.objects import Object
@@ -21,19 +20,13 @@ def throw(method, checked):
     ball = Object(shape="sphere", radius=0.002, mass=1e-3, position=(0.0, 0.0, 0.102), surface=SPRING)
     mechanism, start = scene((0.0, 0.0, -G), plate=plate, ball=ball)
     compiled, command = CompiledMechanism(mechanism), np.zeros(mechanism.channels)
-    settings = {
-        "rtol": 1e-6,
-        "atol": np.full(mechanism.size, 1e-8),
-        "meeting": meetings(mechanism) if checked else None,
-    }
+    meeting = meetings(mechanism) if checked else None
 
     def rhs(_, x):
         return compiled.evaluate(x, command).rate
 
-    if method == "CVODE":
-        found = integrate_cvode(rhs, start, 0.2, **settings)
-    else:
-        found = integrate(rhs, start, 0.2, method=method, **settings)
+    atol = np.full(mechanism.size, 1e-8)
+    found = integrate(rhs, start, 0.2, method=method, rtol=1e-6, atol=atol, meeting=meeting)
     assert not found.failure
     states = found.interpolate(np.append(found.breakpoints, 0.2))
     return states[:, 2].min(), states[-1, 9]

@@ -1,4 +1,4 @@
-"""Integration of x' = f(t, x) by scipy's stiff solvers: the textbook path, and the reference for any other."""
+"""Integration of x' = f(t, x) by scipy's stiff solvers or CVODE: the textbook path, and a reference for any other."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
+from finger_pin.core.stepping.cvode import Cvode
 from finger_pin.description.routing import Array
 
 # So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.
@@ -79,28 +80,30 @@ def integrate(
     watch: Watch | None = None,
     stop: Stop | None = None,
 ) -> Trajectory:
-    """Integrate from time zero with one of scipy's methods.
+    """Integrate from time zero with one of scipy's methods, or CVODE.
 
     Args:
         rhs: f(t, x), pure.
         start: x(0), shape (size,).
         duration: s.
-        method: ``Radau``, ``BDF`` or ``LSODA``.
+        method: ``Radau``, ``BDF``, ``LSODA`` or ``CVODE``.
         rtol: Relative tolerance.
         atol: Absolute tolerance, shape (size,).
         longest: The longest step, s.
         meeting: Finds when bodies meet within a step that does not show it: it is taken again, to end there.
         watch: Called with the simulated time and the state after every step.
         stop: Asked after every step; true ends the integration there.
+
+    Raises:
+        InputError: If the package of CVODE is not installed.
     """
     began = time.perf_counter()
     system, run = _System(rhs), _Steps([0.0], [], [])
-    options: dict[str, Any] = {} if method == "LSODA" else {"jac": _Jacobian(system, atol / rtol)}
+    kind = Cvode if method == "CVODE" else getattr(scipy.integrate, method)
+    options = {"jac": _Jacobian(system, atol / rtol)} if method in ("Radau", "BDF") else {}
 
     def solver(x: Array, end: float) -> Any:
-        made = getattr(scipy.integrate, method)(
-            system, run.times[-1], x, end, rtol=rtol, atol=atol, max_step=longest, **options
-        )
+        made = kind(system, run.times[-1], x, end, rtol=rtol, atol=atol, max_step=longest, **options)
         run.solvers.append(made)
         return made
 
