@@ -12,8 +12,8 @@ SURFACE = {"stiffness": 1e4, "damping": 2.0, "friction": 0.6}
 ALONG_X = (0.0, 1.0, 0.0, 1.0)
 
 
-def lying(shape, z, x=0.0, y=0.0, mass=0.2, turn=0.0, **sizes):
-    turned = (0.0, 0.0, np.sin(turn / 2.0), np.cos(turn / 2.0))
+def lying(shape, z, x=0.0, y=0.0, mass=0.2, turn=0.0, along=None, **sizes):
+    turned = along or (0.0, 0.0, np.sin(turn / 2.0), np.cos(turn / 2.0))
     return Object(shape=shape, mass=mass, position=(x, y, z), orientation=turned, surface=SURFACE, **sizes)
 
 
@@ -97,40 +97,14 @@ def test_a_plate_on_a_smaller_box_lies_still_and_presses_on_it_as_statics_says()
     assert force @ np.array(points)[:, :2] / force.sum() == pytest.approx(q[:2], abs=2e-6)
 
 
+BOX, RAIL = fixed((0.05, 0.05, 0.04), 0.02), fixed((0.02, 0.2, 0.02), 0.01)
 LAID = {
-    "crossed bars": (fixed((0.02, 0.2, 0.02), 0.01), lying("box", 0.03, 0.002, 0.03, sides=(0.2, 0.02, 0.02))),
-    "a peg across a rail": (
-        fixed((0.02, 0.2, 0.02), 0.01),
-        Object(
-            shape="cylinder",
-            radius=0.01,
-            length=0.1,
-            mass=0.1,
-            position=(0.003, 0.0, 0.03),
-            orientation=ALONG_X,
-            surface=SURFACE,
-        ),
-    ),
-    "a disc on a box": (
-        fixed((0.05, 0.05, 0.04), 0.02),
-        lying("cylinder", 0.045, 0.003, 0.01, radius=0.06, length=0.01),
-    ),
-    "a capsule on a box": (
-        fixed((0.05, 0.05, 0.04), 0.02),
-        Object(
-            shape="capsule",
-            radius=0.01,
-            length=0.03,
-            mass=0.1,
-            position=(0.002, 0.0, 0.05),
-            orientation=ALONG_X,
-            surface=SURFACE,
-        ),
-    ),
+    "crossed bars": (RAIL, lying("box", 0.03, 0.002, 0.03, sides=(0.2, 0.02, 0.02))),
+    "a peg across a rail": (RAIL, lying("cylinder", 0.03, 0.003, mass=0.1, along=ALONG_X, radius=0.01, length=0.1)),
+    "a disc on a box": (BOX, lying("cylinder", 0.045, 0.003, 0.01, radius=0.06, length=0.01)),
+    "a capsule on a box": (BOX, lying("capsule", 0.05, 0.002, mass=0.1, along=ALONG_X, radius=0.01, length=0.03)),
     "a cylinder on a lying one, crosswise": (
-        Object(
-            shape="cylinder", radius=0.02, length=0.1, position=(0.0, 0.0, 0.02), orientation=ALONG_X, surface=SURFACE
-        ),
+        lying("cylinder", 0.02, mass=None, along=ALONG_X, radius=0.02, length=0.1),
         lying("box", 0.045, sides=(0.02, 0.1, 0.01)),
     ),
 }
