@@ -143,24 +143,26 @@ def integrate_compiled(
             watch(stepper.time, stepper.x)
         interrupted = stop is not None and not reason and stepper.time < duration and stop()
     steps = [recorder.steps() for recorder in recorders]
-    memories = [recorder.part.memory for recorder in recorders]
     ends = np.unique(np.concatenate([each.times for each in steps]))
     return Trajectory(
         breakpoints=ends[ends <= stepper.time],
         interpolate=joined(stepper, steps),
-        statistics=Statistics(
-            steps=sum(recorder.taken for recorder in recorders),
-            evaluations=int(sum(memory[core.EVALUATIONS] for memory in memories)),
-            jacobians=int(sum(memory[core.JACOBIANS] for memory in memories)),
-            factorisations=int(sum(memory[core.FACTORISATIONS] for memory in memories)),
-            wall_time=time.perf_counter() - began,
-        ),
+        statistics=_statistics(recorders, time.perf_counter() - began),
         failure=reason,
         interrupted=interrupted,
         estimated_error=_error(stepper, recorders) if judged else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
     )
+
+
+def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:
+    """Return the statistics of all islands together."""
+    counters = core.EVALUATIONS, core.JACOBIANS, core.FACTORISATIONS
+    evaluations, jacobians, factorisations = (
+        int(sum(recorder.part.memory[at] for recorder in recorders)) for at in counters
+    )
+    return Statistics(sum(recorder.taken for recorder in recorders), evaluations, jacobians, factorisations, wall_time)
 
 
 def _error(stepper: Stepper, recorders: Sequence[_Recorder]) -> float:
