@@ -58,3 +58,22 @@ def fig6_runs():
 def fig6():
     """The main job, all of it."""
     return fp.simulate(fp.load_scenario("fig6"))
+
+
+@pytest.fixture
+def refuses(tmp_path, monkeypatch, capsys):
+    """Return an assertion that a script refuses arguments in one line with some words, and writes nothing."""
+
+    def refuses(script, arguments, words):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "file").touch()
+        try:
+            code = script.main(list(arguments))
+        except SystemExit as end:
+            code = end.code
+        printed = capsys.readouterr()
+        assert code == 2 and printed.out == "" and printed.err.count("\n") == 1
+        assert printed.err.startswith(f"{script.__name__}.py: ") and words in printed.err
+        assert [each.name for each in tmp_path.iterdir()] == ["file"]
+
+    return refuses

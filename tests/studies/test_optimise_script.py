@@ -99,17 +99,5 @@ def test_a_search_without_a_design_that_keeps_the_bounds_has_its_own_exit_code(s
         (("--output", "file"), "cannot be written"),
     ],
 )
-def test_wrong_options_are_one_line_and_write_nothing(script, tmp_path, monkeypatch, capsys, arguments, says):
-    monkeypatch.chdir(tmp_path)
-    Path("file").touch()
-    try:
-        code = script.main(list(arguments))
-    except SystemExit as end:
-        code = end.code
-    printed = capsys.readouterr()
-    assert code == 2
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    assert printed.err.startswith("optimise.py: ")
-    assert says in printed.err
-    assert [each.name for each in tmp_path.iterdir()] == ["file"]
+def test_wrong_options_are_one_line_and_write_nothing(script, refuses, arguments, says):
+    refuses(script, arguments, says)

@@ -144,20 +144,8 @@ def test_every_run_failing_has_its_own_exit_code(script, tmp_path, monkeypatch, 
         (("--over", "controller.gain=1,2", "--output", "file"), "cannot be written"),
     ],
 )
-def test_wrong_options_are_one_line_and_write_nothing(script, tmp_path, monkeypatch, capsys, arguments, says):
-    monkeypatch.chdir(tmp_path)
-    Path("file").touch()
-    try:
-        code = script.main(list(arguments))
-    except SystemExit as end:
-        code = end.code
-    printed = capsys.readouterr()
-    assert code == 2
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    assert printed.err.startswith("sweep.py: ")
-    assert says in printed.err
-    assert [each.name for each in tmp_path.iterdir()] == ["file"]
+def test_wrong_options_are_one_line_and_write_nothing(script, refuses, arguments, says):
+    refuses(script, arguments, says)
 
 
 def test_another_study_in_the_folder_is_refused_and_left_as_it_is(script, tmp_path, monkeypatch, capsys):
