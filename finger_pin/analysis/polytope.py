@@ -117,7 +117,7 @@ def force_polytope(
     """
     finger = as_finger(finger)
     if friction is Friction.HINDERING:
-        raise InputError("friction", "must be none or helping; what hinders depends on the direction", friction.value)
+        raise InputError("friction", "must be none or helping; what hinders has a direction", friction.value)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     statics = TipStatics.of(finger, theta, friction, (), np.zeros(len(theta)))
     left, values, _ = np.linalg.svd(statics.jacobian)

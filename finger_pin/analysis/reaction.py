@@ -187,7 +187,7 @@ def _length(vectors: Array) -> Array:
 
 def _values(result: xr.Dataset, name: str) -> Array:
     if name not in result.variables:
-        raise InputError(f"result.{name}", "is missing; give what simulate returned")
+        raise InputError(f"result.{name}", "is missing; give a result of simulate")
     return np.asarray(result[name].transpose("time", ...).values, dtype=float)
 
 

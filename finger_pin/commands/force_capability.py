@@ -18,7 +18,7 @@ def force_capability(
         typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range."),
     ] = None,
     limit: Annotated[
-        str, typer.Option(metavar="N|servos", help="Greatest tension, or what the finger's motors can pull.")
+        str, typer.Option(metavar="N|servos", help="Greatest tension, or servos for that of the finger's motors.")
     ] = "20",
     force: Annotated[str, typer.Option(metavar="X,Y,Z", help="The force whose tensions are printed, N.")] = "0,0,1",
     output: Output = Path("results/force_capability"),

@@ -36,7 +36,7 @@ Workers = Annotated[int | None, typer.Option(metavar="N", help="Threads; default
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster of a scheduler, such as tcp://host:8786.")
 ]
-Restart = Annotated[bool, typer.Option("--restart", help="Drop what the folder holds of a study, and begin anew.")]
+Restart = Annotated[bool, typer.Option("--restart", help="Drop the records of a study in the folder, and begin anew.")]
 
 
 def wrong(option: str, allowed: str) -> typer.TyperException:

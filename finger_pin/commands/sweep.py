@@ -50,7 +50,7 @@ _Output = Annotated[
 def sweep(
     scenario: ScenarioName = "fig6",
     over: _Over = [],  # noqa: B006
-    metric: Annotated[list[str], typer.Option(metavar="NAME", help="What to measure; repeatable; see --list.")] = [],  # noqa: B006
+    metric: Annotated[list[str], typer.Option(metavar="NAME", help="Metric of the runs; repeatable; see --list.")] = [],  # noqa: B006
     design: _Design = "grid",
     samples: Annotated[int | None, typer.Option(metavar="N", help="Points of a latin design.")] = None,
     seed: Annotated[int | None, typer.Option(metavar="S", help="Of a latin design; default 0.")] = None,

@@ -45,10 +45,10 @@ class GearFriction(Description):
     )
     by_load: Annotated[float, real(0.0, 100.0)] = quantity(0.0, unit="1", source="fit", doc="m0, level over N.")
     stribeck: Annotated[float, real(0.0, 1e4)] = quantity(
-        0.0, unit="N m", source="fit", doc="c1, what is added at rest without load."
+        0.0, unit="N m", source="fit", doc="c1, level that is added at rest without load."
     )
     stribeck_by_load: Annotated[float, real(0.0, 100.0)] = quantity(
-        0.0, unit="1", source="fit", doc="m1, what is added at rest over N."
+        0.0, unit="1", source="fit", doc="m1, level that is added at rest over N."
     )
     stribeck_velocity: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
         1.0, unit="rad/s", source="fit", doc="w, Stribeck velocity."
@@ -96,7 +96,7 @@ class Winding(Description):
     """The thermal model of a winding: C T' = R i^2 - (T - T_a) / R_th, with C = time_constant / R_th."""
 
     thermal_resistance: Annotated[float, real(0.0, 1e4, above=True)] = quantity(
-        ..., unit="K/W", source="maker's sheet", doc="R_th, from the winding to what surrounds the motor."
+        ..., unit="K/W", source="maker's sheet", doc="R_th, from the winding to the surroundings of the motor."
     )
     time_constant: Annotated[float, real(0.0, 1e6, above=True)] = quantity(
         ..., unit="s", source="maker's sheet", doc="R_th C, in which it comes within 37 % of where it ends."
@@ -142,7 +142,7 @@ class Motor(Description):
             raise problem("friction.coulomb", "is missing: give it, or a data_sheet")
         if sheet is not None and self.constants[2] < 0.0:
             most = self.constants[0] * sheet.stall_current
-            allowed = f"must be at most {most:.4g} N m, what this current and this speed at no load allow"
+            allowed = f"must be at most {most:.4g} N m, by this current and this speed at no load"
             raise problem("data_sheet.stall_torque", allowed, sheet.stall_torque)
         return self
 

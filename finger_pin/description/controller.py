@@ -131,7 +131,7 @@ class ControllerSettings(Description):
     )
     gravity_compensation: bool = Field(False, strict=True, description="Whether G(theta) of (18) is added to tau^d.")
     fingertip_force: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
-        None, description="What the fingertip is to exert besides, J^T F added to tau^d, by axis x, y, z of the base."
+        None, description="Force that the fingertip is to exert besides, J^T F added to tau^d, by axis of the base."
     )
     spring_compensation: bool = Field(
         False, strict=True, description="Whether the torque of springs is added to tau^d; always without force closure."
@@ -142,7 +142,7 @@ class ControllerSettings(Description):
     distribution: DistributionSettings | None = Field(None, description="Quadratic programme with tension limits.")
     sampling: SamplingSettings | None = Field(None, description="Sampled execution; continuous without it.")
 
-    fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, what differs there.")
+    fingers: dict[Name, ControllerSettings] | None = Field(None, description="By finger, entries that differ there.")
 
     _flat = field_validator("tensions", mode="before")(flat)
     _nested = field_serializer("tensions", mode="wrap")(nested)

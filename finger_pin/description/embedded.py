@@ -43,7 +43,7 @@ def described(attributes: Mapping[Any, Any]) -> Embedded:
     for kind in ("finger", "hand"):
         if kind in attributes:
             return _read(kind, str(attributes[kind]), str(attributes.get("objects", "{}")))
-    raise InputError("result.attrs.finger", "is missing; give what simulate returned or saved, in this version")
+    raise InputError("result.attrs.finger", "is missing; give a result of simulate or saved, in this version")
 
 
 # What reads a result asks for it more than once.

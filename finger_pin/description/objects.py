@@ -39,14 +39,14 @@ class Object(Shaped):
         (0.0, 0.0, 0.0), unit="rad/s", source="chosen", doc="Of a free object at t = 0, its own frame."
     )
     path: dict[Name, PathSignal] | None = Field(
-        None, description="Moves it, whatever pushes it: what x, y and z of its position grow by over time, base frame."
+        None, description="Path along which it is moved: growth of x, y and z of its position over time, base frame."
     )
 
     @field_validator("shape", mode="before")
     @classmethod
     def _no_mesh(cls, value: object) -> object:
         if value == "mesh":
-            raise problem("", f"meshes are not supported; put together what is needed of {', '.join(SIZES)}", value)
+            raise problem("", f"meshes are not supported; put the body together of {', '.join(SIZES)}", value)
         return value
 
     @field_validator("path")
@@ -66,7 +66,7 @@ class Object(Shaped):
         if self.frame == "world" and (self.mass is not None or self.path):
             raise problem("frame", "is for fixed objects: leave out mass and path", self.frame)
         if self.path is not None and self.mass is not None:
-            raise problem("path", "is for objects without a mass: what is free to move goes where it is pushed")
+            raise problem("path", "is for objects without a mass: one with a mass is free, and goes where it is pushed")
         if self.mass is None and (any(self.velocity) or any(self.angular_velocity)):
             entry = "velocity" if any(self.velocity) else "angular_velocity"
             raise problem(entry, "is for objects with a mass, which are free to move", getattr(self, entry))

@@ -230,7 +230,7 @@ class FingerDescription(Description):
         description="Whether links that are not neighbours touch each other, where there are contacts.",
     )
     _hand: Any = PrivateAttr(None)
-    tree: Tree | None = Field(None, description="Bodies that are no chain of links, and what drives them.")
+    tree: Tree | None = Field(None, description="Bodies in place of links, with joints, tendons and actuators.")
 
     @field_validator("tendons")
     @classmethod

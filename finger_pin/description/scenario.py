@@ -83,13 +83,13 @@ class EnvironmentSettings(Description):
         (0.0, 0.0, 0.0), unit="N", source="(6)", doc="F, constant, base frame."
     )
     fingertip_force_signal: Annotated[dict[Name, ForceSignal] | None, AfterValidator(of_axes)] = Field(
-        None, description="What varies of F, added to the constant, by axis x, y, z of the base frame."
+        None, description="Varying part of F, added to the constant, by axis x, y, z of the base frame."
     )
-    fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, what differs there.")
+    fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, entries that differ there.")
 
     _sparse = field_serializer("fingers")(given)
 
-    objects: dict[Name, Object] | None = Field(None, description="What the finger may touch, by name.")
+    objects: dict[Name, Object] | None = Field(None, description="Objects that the finger may touch, by name.")
 
 
 class InitialSettings(Description):
@@ -122,7 +122,7 @@ class SimulationSettings(Description):
     )
 
     start_time: Annotated[float, real(-1e6, 1e6)] = quantity(
-        0.0, unit="s", source="chosen", doc="What the clock of references, tensions and forces shows at t = 0."
+        0.0, unit="s", source="chosen", doc="Time of references, tensions and forces at t = 0."
     )
     initial: InitialSettings | None = Field(None, description="Where the joints start: at rest on their references.")
 

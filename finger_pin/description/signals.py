@@ -45,7 +45,7 @@ class SignalSettings(Description):
     """
 
     kind: Annotated[Literal["sine", "step", "ramp", "points", "samples"], choice(*_NEEDED)] = quantity(
-        "sine", unit="1", source="chosen", doc="What is added to the sinusoid: nothing, or one of these."
+        "sine", unit="1", source="chosen", doc="Function that is added to the sinusoid: none, or one of these."
     )
     frequency: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="Hz", source="chosen", doc="Of the sinusoid.")
     phase: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="chosen", doc="At t = 0.")

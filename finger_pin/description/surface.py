@@ -70,7 +70,7 @@ class Shaped(Description):
     sides: Annotated[tuple[float, float, float], vector(3, 1e-9, 10.0, MILLIMETRES)] | None = quantity(
         None, unit="m", source="design", doc="Of a box, along x, y and z."
     )
-    surface: Surface | None = Field(None, description="How it touches; by default as what it touches.")
+    surface: Surface | None = Field(None, description="Its contact; by default that of the other surface.")
 
     @model_validator(mode="after")
     def _sized(self) -> Self:

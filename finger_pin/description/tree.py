@@ -78,8 +78,8 @@ class Body(Description):
     inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
         (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
     )
-    solids: dict[Name, TreeSolid] = Field({}, description="What is seen of it, by name.")
-    shapes: dict[Name, BodyShape] = Field({}, description="What touches of it, by name; no two of a tree are alike.")
+    solids: dict[Name, TreeSolid] = Field({}, description="Solids that are drawn of it, by name.")
+    shapes: dict[Name, BodyShape] = Field({}, description="Shapes with which it touches, by name, unique in a tree.")
 
     @field_validator("orientation")
     @classmethod
@@ -107,7 +107,7 @@ class TreeJoint(Description):
         0.0, unit="rad", source="design", doc="Position at which the body is where its placement says."
     )
     armature: Annotated[float, real(0.0, 1e4)] = quantity(
-        0.0, unit="kg m2", source="design", doc="Inertia of what turns with the joint alone, such as a rotor."
+        0.0, unit="kg m2", source="design", doc="Inertia that turns with the joint alone, such as a rotor's."
     )
 
     @field_validator("axis")
@@ -134,10 +134,10 @@ class TreeTendon(Description):
         None, unit="m", source="design", doc="Least and largest length, guarded as (2) guards a joint."
     )
     limit_stiffness: Annotated[float, real(0.0, 1e12)] = quantity(
-        1e5, unit="N/m", source="estimate", doc="Of what guards the range."
+        1e5, unit="N/m", source="estimate", doc="Of the stroke limiter of the range."
     )
     limit_damping: Annotated[float, real(0.0, 1e6)] = quantity(
-        0.5, unit="s/m", source="estimate", doc="Of what guards the range, as c of (2)."
+        0.5, unit="s/m", source="estimate", doc="Of the stroke limiter of the range, as c of (2)."
     )
     friction: Annotated[float, real(0.0, 1e6)] = quantity(
         0.0, unit="N", source="design", doc="Coulomb friction that does not depend on load."
@@ -197,7 +197,7 @@ class TreeActuator(Description):
 class Tip(Description):
     """The point whose motion is recorded, and where the fingertip force acts."""
 
-    body: Name | None = Field(None, description="What carries it; the base if left out.")
+    body: Name | None = Field(None, description="Body that carries it; the base if left out.")
     position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
 
 
@@ -211,8 +211,8 @@ class Tree(Description):
     actuators: dict[Name, TreeActuator] = Field({}, description="By name.")
     tip: Tip = Tip()
     touching: tuple[tuple[Name, Name], ...] = Field((), description="Pairs of its own shapes that touch each other.")
-    meshes: dict[Name, Mesh] = Field({}, description="What solids are made of, by name.")
-    left_out: tuple[str, ...] = Field((), description="What the model had that is not here.")
+    meshes: dict[Name, Mesh] = Field({}, description="Surfaces of solids, by name.")
+    left_out: tuple[str, ...] = Field((), description="Elements of the model that were not carried over.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -23,7 +23,7 @@ class Waypoint(Description):
     kind: Annotated[
         Literal["point", "cylinder", "sphere", "pulley"], choice("point", "cylinder", "sphere", "pulley")
     ] = quantity(..., unit="1", source="design", doc="point, cylinder, sphere or pulley.")
-    body: Name | None = Field(None, description="What carries it; the base if left out.")
+    body: Name | None = Field(None, description="Body that carries it; the base if left out.")
     position: Annotated[Triple, PLACE] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point, or the wrap's centre, in the body's frame."
     )
@@ -37,7 +37,7 @@ class Waypoint(Description):
         None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."
     )
     divisor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
-        1.0, unit="1", source="design", doc="Of a pulley: what follows counts as this much less."
+        1.0, unit="1", source="design", doc="Of a pulley: the path after it counts as this much less."
     )
 
     def holds(self, point: Waypoint) -> bool:

@@ -148,7 +148,7 @@ def test_links_and_tips_of_a_model_are_where_pinocchio_has_them(robot, whole):
 def test_a_hand_on_a_model_is_simulated_and_its_page_has_the_meshes(whole, hand, tmp_path):
     swing = {"offset": 0.5, "amplitude": 0.2, "frequency": 1.0}
     joints = {finger: {"proximal": swing, "medial": swing} for finger in FIRST}
-    table = {"name": "allegro", "hand": hand.model_dump(), "reference": {"joints": joints}}
+    table = {"name": "allegro", "hand": hand.hand.model_dump(), "reference": {"joints": joints}}
     scenario = fp.Scenario.model_validate(table | {"simulation": {"duration": 0.02}})
     result = fp.simulate(scenario, finger=whole)
     assert result.sizes["joint"] == 16 and float(abs(result.energy_residual).max()) < 1e-7

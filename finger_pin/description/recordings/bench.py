@@ -18,7 +18,7 @@ class Column(Description):
     scale: Annotated[float, real(-1e12, 1e12)] = quantity(1.0, unit="1", source="calibration", doc="Factor.")
     offset: Annotated[float, real(-1e12, 1e12)] = quantity(0.0, unit="SI", source="calibration", doc="Added, in SI.")
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(
-        0.0, unit="s", source="calibration", doc="By how much the column comes after what it measures; motions only."
+        0.0, unit="s", source="calibration", doc="Delay of the column behind its quantity; motions only."
     )
 
     @model_validator(mode="before")
@@ -34,8 +34,8 @@ class RecordingSettings(Description):
     kind: Annotated[Literal["motion", "steady"], choice("motion", "steady")] = quantity(
         "motion", unit="1", source="the recording", doc="Samples over time, or rows each of which is a steady state."
     )
-    inputs: dict[str, Column] = Field({}, description="What the model is given, by variable.label.")
-    outputs: dict[str, Column] = Field(min_length=1, description="What it is compared with, by variable.label.")
+    inputs: dict[str, Column] = Field({}, description="Columns that feed the model, by variable.label.")
+    outputs: dict[str, Column] = Field(min_length=1, description="Columns that it is compared with, by variable.label.")
     speed: Column | float | None = Field(
         None, description="Steady: of sliding, m/s, positive as the tendon is drawn in; a number or a column."
     )

@@ -84,7 +84,7 @@ def exported(described: DescriptionLike | Scenario) -> FingerDescription:
     """
     described = describe(described.finger if isinstance(described, Scenario) else described)
     if described.tree is not None:
-        allowed = "is not written: bodies in place of links; what was read from MuJoCo has its own MJCF"
+        allowed = "is not written: bodies in place of links; a model read from MuJoCo has its own MJCF"
         raise InputError("finger.tree", allowed, described.name)
     return described
 

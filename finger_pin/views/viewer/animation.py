@@ -196,5 +196,5 @@ def _frame_indices(time: Array, rate: float) -> Indices:
 
 def _variable(result: xr.Dataset, name: str) -> Array:
     if name not in result:
-        raise InputError(f"result.{name}", "is missing; the viewer shows what simulate returned")
+        raise InputError(f"result.{name}", "is missing; give a result of simulate")
     return np.asarray(result[name], dtype=float)
