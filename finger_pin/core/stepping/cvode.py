@@ -13,6 +13,16 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 
 
+def check_installed() -> None:
+    """Refuse the method where its package is missing.
+
+    Raises:
+        InputError: If scikit-sundae is not installed.
+    """
+    if importlib.util.find_spec("sksundae") is None:
+        raise InputError("simulation.method", "needs the package scikit-sundae, which is not installed", "CVODE")
+
+
 class Cvode(scipy.integrate.OdeSolver):  # type: ignore[misc]
     """CVODE's variable-order BDF; between its steps cubic Hermite polynomials."""
 
@@ -29,13 +39,7 @@ class Cvode(scipy.integrate.OdeSolver):  # type: ignore[misc]
         atol: Array,
         max_step: float,
     ) -> None:
-        """Begin at a state; arguments as for scipy's solvers.
-
-        Raises:
-            InputError: If scikit-sundae is not installed.
-        """
-        if importlib.util.find_spec("sksundae") is None:
-            raise InputError("simulation.method", "needs the package scikit-sundae, which is not installed", "CVODE")
+        """Begin at a state; arguments as for scipy's solvers."""
         from sksundae.cvode import CVODE
 
         super().__init__(fun, t0, y0, t_bound, vectorized=False)

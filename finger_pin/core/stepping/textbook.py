@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from finger_pin.core.stepping.cvode import Cvode
+from finger_pin.core.stepping.cvode import Cvode, check_installed
 from finger_pin.description.routing import Array
 
 # So many steps in a row must advance by so much time each on average, s, and so many are kept in memory at most.
@@ -97,6 +97,8 @@ def integrate(
     Raises:
         InputError: If the package of CVODE is not installed.
     """
+    if method == "CVODE":
+        check_installed()
     began = time.perf_counter()
     system, run = _System(rhs), _Steps([0.0], [], [])
     kind = Cvode if method == "CVODE" else getattr(scipy.integrate, method)
