@@ -224,6 +224,20 @@ def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path)
     np.testing.assert_allclose(again.upper, whole.upper, rtol=1e-3)
 
 
+def test_a_search_that_is_interrupted_goes_on_from_where_it_was(tmp_path):
+    """Stopped again and again after six evaluations it gets there; begun anew every time, it never would."""
+    data = readings(np.random.default_rng(2))
+    whole = found(data)
+
+    def stop_after(count):
+        asked = []
+        return lambda: len(asked) >= count or bool(asked.append(0))
+
+    reached = [found(data, output=tmp_path, stop=stop_after(6)).estimate.values for _ in range(3)]
+    np.testing.assert_allclose(reached[-1], whole.estimate, rtol=1e-3)
+    assert np.abs(reached[0] / whole.estimate.values - 1.0).max() > 0.01
+
+
 def test_the_command_writes_a_page_and_a_scenario_with_the_numbers_found(tmp_path, capsys):
     folder = tmp_path / "out"
     assert run("identify", ["transmission", "--output", str(folder), "--starts", "1"]) == 0

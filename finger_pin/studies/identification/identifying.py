@@ -193,7 +193,7 @@ class _Work:
 
         def one(item: tuple[int, Problem]) -> None:
             k, twin = item
-            work = partial(fit, twin, starts[k], loss=self.loss)
+            work = partial(fit, twin, self.ledger.reached(f"start {k}", starts[k]), loss=self.loss)
             found[k] = self.ledger.fit(f"start {k}", twin, work)
 
         try:

@@ -20,7 +20,7 @@ from finger_pin.files import replacing
 from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit, fit
 from finger_pin.studies.identification.intervals import Side
-from finger_pin.studies.identification.problem import Problem
+from finger_pin.studies.identification.problem import Problem, Stopped
 from finger_pin.studies.identification.recordings import Recording
 from finger_pin.version import __version__
 
@@ -87,9 +87,18 @@ class Ledger:
         if name in self._done:
             z: Array = np.array(self._done[name])
             return fit(problem, z, held=dict(enumerate(z)))
-        found = work()
+        try:
+            found = work()
+        except Stopped:
+            if len(problem.best[1]):
+                self._done[f"{name} so far"] = problem.best[1].tolist()
+            raise
         self._done[name] = found.z.tolist()
         return found
+
+    def reached(self, name: str, start: Array) -> Array:
+        """Return where a search was when it was stopped, shape (p,); its start if it was not."""
+        return np.array(self._done.get(f"{name} so far", start), dtype=float)
 
     def side(self, name: str, work: Callable[[], Side]) -> Side:
         """Return an end of an interval."""
