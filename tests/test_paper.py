@@ -1,4 +1,4 @@
-"""What the paper and its model claim of the finger, on runs of the finger."""
+"""The claims of the paper and its model, on runs of the finger."""
 
 import math
 from dataclasses import dataclass

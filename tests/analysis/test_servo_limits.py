@@ -1,4 +1,4 @@
-"""What motors and gears leave of tensions, against the balance of the gearbox solved for it."""
+"""The tensions left by motors and gears, against the balance of the gearbox solved for them."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def finger(weight, **motor):
 
 
 def balance(tension, torque, weight, dry, sign):
-    """What a motor has over for pulling (1), or what gears and motor have over for holding (-1), N m."""
+    """The torque left to a motor for pulling (1), or to gears and motor for holding (-1), N m."""
     carried = abs(weight * RADIUS * tension - torque)
     return sign * (torque - RADIUS * tension) - dry * (GEARS["coulomb"] + GEARS["stribeck"]) - 0.15 * carried
 

@@ -1,4 +1,4 @@
-"""What a tendon delivers: the capstan law by hand, over the workspace and along simulated motions."""
+"""The share that a tendon delivers: the capstan law by hand, over the workspace and along simulated motions."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the tests of the command simulate share."""
+"""Helpers of the tests of the command simulate."""
 
 import subprocess
 import sys

@@ -17,7 +17,7 @@ NAMES = [each.__name__ for each in application.COMMANDS]
 
 
 def told(function, capsys):
-    """Return the exit code of a command that does what a function does, and the lines of standard error."""
+    """Return the exit code of a command made of a function, and the lines of standard error."""
     return application.run_function(function, []), capsys.readouterr().err.splitlines()
 
 

@@ -58,7 +58,7 @@ def not_painted(figure, path, format=None):
 
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
-    """A folder to work in, where what ships is short, and the commands that were run there."""
+    """A folder to work in, with short versions of what ships, and the commands that were run there."""
     folder = tmp_path_factory.mktemp("pages")
     (folder / "urdf").symlink_to(ROOT / "urdf")
     shipped = folder / "shipped"

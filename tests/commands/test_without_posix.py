@@ -31,7 +31,7 @@ def test_all_modules_are_imported_and_a_run_its_page_and_a_sweep_are_published(t
 
 
 def refuse(*_, **__):
-    """Do what Windows does for those who may not make links."""
+    """Refuse links as Windows does."""
     raise OSError(1314, "A required privilege is not held by the client")
 
 

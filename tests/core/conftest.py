@@ -1,4 +1,4 @@
-"""Fixtures of the compiled core's tests; what they are made of is in `core_cases`."""
+"""Fixtures of the compiled core's tests, built by `core_cases`."""
 
 from dataclasses import replace
 

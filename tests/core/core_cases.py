@@ -267,7 +267,7 @@ class Case:
         return self.layout.pack(state)
 
     def solve(self, time, x, g):
-        """Return the compiled rate, and what solves (g - J) u = r; see `Bound.solve`."""
+        """Return the compiled rate, and the solver of (g - J) u = r; see `Bound.solve`."""
         return self.bound.solve(time, x, g)
 
     def part(self, method="Rodas5P", rtol=1e-6, atol=1e-6, x=None, step=None):

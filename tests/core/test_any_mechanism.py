@@ -135,7 +135,7 @@ def jacobian(mechanism, x, command, force):
 
 @pytest.fixture(scope="module")
 def linearised(drawn):
-    """States with their Jacobians by differences, and what is compiled."""
+    """States with their Jacobians by differences, and the compiled model."""
     mechanism, command, force, (states, _) = drawn
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
@@ -166,7 +166,7 @@ def test_the_condensed_solution_is_that_of_the_dense_system(linearised, g):
 
 
 def ends(mechanism, x, command, force):
-    """Where a mechanism is after 0.02 s, by scipy's Radau on the readable rates and by both compiled methods."""
+    """The state of a mechanism after 0.02 s, by scipy's Radau on the readable rates and by both compiled methods."""
     control = held_control(mechanism.channels, mechanism.coordinates)
     control.tension[:] = command
     atol = np.full(len(x), 1e-9)

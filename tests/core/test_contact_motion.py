@@ -22,7 +22,7 @@ FACING_X, FACING_BACK = (0.0, 1.0, 0.0, 1.0), (0.0, -1.0, 0.0, 1.0)
 
 
 def scene(gravity, **objects):
-    """Return the mechanism of some objects, the state at the start, and where each free one's numbers begin."""
+    """Return the mechanism of some objects, the state at the start, and the first index of each free one's numbers."""
     model = pin.Model()
     model.gravity.linear[:] = gravity
     body = add_free_objects(RigidBody(model, []), objects)

@@ -55,7 +55,7 @@ class Held:
 
 
 def pieces(case, times, x):
-    """Which smooth piece of the right-hand side each state lies on: equal rows mean the same piece."""
+    """The smooth piece of the right-hand side of each state: equal rows mean the same piece."""
     loop, finger = case.loop, case.loop.finger
     signals = loop.evaluate(times, x)
     found, state = signals.finger, signals.finger.state

@@ -25,7 +25,7 @@ def run(scenario, *, tolerance=1e-6, duration=None, method="Rodas5P", rate=1000.
 
 
 def gap(result, exact):
-    """The largest difference of all signals at common times, each in its own unit of what is little."""
+    """The largest difference of all signals at common times, each in units of a little of its own."""
     exact = exact.sel(time=result.time)
     return max(float(abs(result[name] - exact[name]).max()) / little for name, little in SIGNALS.items())
 

@@ -1,4 +1,4 @@
-"""What contacts that are open cost: nothing of the result, and no part of the linear systems."""
+"""The cost of open contacts: nothing of the result, and no part of the linear systems."""
 
 import numpy as np
 import pytest

@@ -37,7 +37,7 @@ def random_parameters(law, rng, count):
 
 
 def random_rows(rng, count):
-    """Return what rows see, all of order one: to and fro, pushed and pulled, pressed."""
+    """Return arguments of rows, all of order one: to and fro, pushed and pulled, pressed."""
     length, speed, state = rng.normal(size=(3, count))
     load, command, curvature = rng.uniform([[0.0], [-0.5], [0.0]], 3.0, (3, count))
     return Row(length, speed, state, load, command, curvature)
@@ -47,7 +47,7 @@ class ComplexNumPy:
     """NumPy for numbers whose tiny imaginary part carries a derivative."""
 
     def __getattr__(self, name):
-        """Return what is the same for complex numbers."""
+        """Return NumPy's function, which is the same for complex numbers."""
         return getattr(np, name)
 
     @staticmethod

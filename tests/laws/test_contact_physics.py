@@ -29,7 +29,7 @@ def contact(**changes):
 
 
 def pressed(value, normal, v, z, numbers):
-    """What a contact does that is pressed with a force, whatever its gap."""
+    """The answer of a contact that is pressed with a force, whatever its gap."""
     return value(Touch(-normal / numbers["stiffness"], 0.0, v[0], v[1], z[0], z[1]))
 
 

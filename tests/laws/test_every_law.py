@@ -1,4 +1,4 @@
-"""What every law promises, of all laws that there are: exact slopes, and an account of every power."""
+"""The promises of every law that there is: exact slopes, and an account of every power."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def drawn(request):
 
 
 def along(function, row, name):
-    """The derivative of what a function of a row returns by one number of the row, by a step into the complex."""
+    """The derivative of a function of a row by one number of the row, by a step into the complex."""
     stepped = function(row._replace(**{name: getattr(row, name) + STEP * 1j}))
     return [np.imag(np.broadcast_to(each, COUNT)) / STEP for each in stepped]
 

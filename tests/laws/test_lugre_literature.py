@@ -134,7 +134,7 @@ def test_friction_lags_behind_the_velocity_the_more_the_faster_it_changes():
 
 
 def dissipation(stiction, velocity, level, micro, viscous):
-    """Return friction's power less what the bristles store, W."""
+    """Return friction's power less the bristles' own, W."""
     rate = friction.stiction_rate(stiction, velocity, level, STIFFNESS)
     force = friction.friction_force(stiction, velocity, viscous, rate, micro / STIFFNESS)
     return force * velocity - stiction * rate / STIFFNESS

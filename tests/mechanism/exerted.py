@@ -1,4 +1,4 @@
-"""What tables of rows exert, without a mechanism: each law is given what its rows see."""
+"""The forces of tables of rows without a mechanism: each law is given its rows' arguments."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ from finger_pin.laws.law import Row
 
 
 def exert(tables, q, v, states, command, earlier=None):
-    """Return force, rate, what is seen and signals of every table, by group; ``earlier`` are forces that are given."""
+    """Return force, rate, arguments and signals of every table, by group; ``earlier`` are given forces."""
     forces, found = dict(earlier or {}), {}
     for table in tables:
         none = np.zeros((*q.shape[:-1], len(table.names)))
@@ -28,7 +28,7 @@ def exert(tables, q, v, states, command, earlier=None):
 
 
 def tendon_forces(layer, position, velocity, passive_position, passive_velocity, stiction, command):
-    """Return what a tendon layer does, by the names of the paper; driven tendons first, then passive ones."""
+    """Return the signals of a tendon layer, by the names of the paper; driven tendons first, then passive ones."""
     actuated = layer.routing.actuated
     q, v = (np.concatenate(pair, axis=-1) for pair in ((position, passive_position), (velocity, passive_velocity)))
     states = {"driven_tendons": stiction[..., :actuated], "passive_tendons": stiction[..., actuated:]}
@@ -54,7 +54,7 @@ def tendon_forces(layer, position, velocity, passive_position, passive_velocity,
 
 
 def pin_forces(joints, velocity, stiction, strands, actuated=4):
-    """Return what the friction of joints does under tensions of the strands, without forces at the tip."""
+    """Return the friction of joints under tensions of the strands, without forces at the tip."""
     names = tuple(f"joint{j}" for j in range(velocity.shape[-1]))
     earlier = {"driven_tendons": strands[..., :actuated], "passive_halves": strands[..., actuated:]}
     table = joints.rows(names, {}, actuated, len(names))

@@ -16,7 +16,7 @@ EPSILON = 1e-5 / 4.0
 
 @numba.njit
 def fill(y, p, found, slopes):
-    """Fill what the gap finds for many pairs, shape (m, 13), and its slopes, shape (m, 78)."""
+    """Fill the gap of many pairs, shape (m, 13), and its slopes, shape (m, 78)."""
     for k in range(y.shape[0]):
         _value(y[k], p[k], found[k])
         _slopes(y[k], p[k], slopes[k])

@@ -1,4 +1,4 @@
-"""MuJoCo models on which what is read from them is compared with MuJoCo."""
+"""MuJoCo models on which our reading is compared with MuJoCo."""
 
 import importlib.util
 from pathlib import Path

@@ -50,7 +50,7 @@ def description(hand):
 
 @pytest.fixture(scope="module")
 def posture(hand):
-    """Where the other fingers are locked: inside their ranges, not at zero."""
+    """The posture in which the other fingers are locked: inside their ranges, not at zero."""
     return 0.3 * hand.lowerPositionLimit + 0.7 * hand.upperPositionLimit
 
 
@@ -60,7 +60,7 @@ def finger(description, hand, posture):
 
 
 def upwards(hand):
-    """Where the straight index finger points: up, and 5 degrees outwards."""
+    """The direction of the straight index finger: up, and 5 degrees outwards."""
     return np.array(hand.jointPlacements[hand.getJointId("joint_0.0")].rotation[:, 2])
 
 

@@ -18,7 +18,7 @@ def random_placement(rng):
 
 
 def lowest(y, p):
-    """Return by how much a distance may be too low."""
+    """Return the largest error of a distance that is too low."""
     return EPSILON * (p[:, 2] * np.linalg.norm(y[:, 3:] - y[:, :3], axis=1) + 2.0 * p[:, 1])
 
 

@@ -1,4 +1,4 @@
-"""What a MuJoCo model has that is not carried over: listed, or refused by name."""
+"""Elements of a MuJoCo model that are not carried over: listed, or refused by name."""
 
 import mujoco
 import pytest

@@ -1,4 +1,4 @@
-"""What friction in MuJoCo refuses, in one line that names it."""
+"""Refusals of friction in MuJoCo, in one line that names the cause."""
 
 import mujoco
 import pytest

@@ -22,7 +22,7 @@ def contents(folder):
 
 
 def visible(folder):
-    """Return what a reader finds: the files that names lead to, hidden ones aside."""
+    """Return the files that a reader finds by their names, hidden ones aside."""
     return {name: data for name, data in contents(folder).items() if not name.startswith(".") and data is not None}
 
 

@@ -1,4 +1,4 @@
-"""What runs with impacts know of their own error; hundreds of them by `scripts/impacts.py`."""
+"""The error that runs with impacts estimate of themselves; hundreds of them by `scripts/impacts.py`."""
 
 import numpy as np
 import pytest

@@ -12,7 +12,7 @@ from finger_pin.simulation import notebook
 
 @pytest.fixture
 def shown(monkeypatch):
-    """What a notebook shows, with a clock that goes on by 0.3 s whenever it is looked at."""
+    """The outputs of a notebook, with a clock that goes on by 0.3 s whenever it is looked at."""
     pictures, clock = [], iter(0.3 * count for count in range(10**6))
 
     class Handle:

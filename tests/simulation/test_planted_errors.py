@@ -55,7 +55,7 @@ def test_the_account_of_the_loop_to_be_tampered_with_closes(loop):
 
 
 def tampered(loop, monkeypatch, group, wrong):
-    """Let the law of a table of rows return something else: `wrong` maps what the rows see and the law returns."""
+    """Let the law of a table of rows return something else: `wrong` maps its arguments and its result."""
     rows = []
     for table in loop.finger.mechanism.rows:
         if table.group == group:

@@ -21,7 +21,7 @@ ALIKE = re.compile(r"grasp\.hand\.|hand\.hand\.fingers\.(?!thumb)")
 
 
 def numbers(table, above=()):
-    """Give the keys of all numbers and lists of numbers of a table, and what stands there."""
+    """Give the keys and values of all numbers and lists of numbers of a table."""
     for name, value in table.items():
         key = (*above, name)
         if isinstance(value, dict):

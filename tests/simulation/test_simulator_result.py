@@ -1,4 +1,4 @@
-"""What a simulator has run, as the Dataset that simulate returns."""
+"""The past of a simulator, as the Dataset that simulate returns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run starts: joints by name in the scenario, a packed state, or the end of another run."""
+"""The start of a run: joints by name in the scenario, a packed state, or the end of another run."""
 
 import numpy as np
 import pytest

@@ -11,7 +11,7 @@ from finger_pin.studies.metrics import METRICS
 
 
 def defined(text, **values):
-    """Return what a text defines as ``f``, in a module of its own."""
+    """Return the function ``f`` of a text, in a module of its own."""
     space = {"__name__": "of_ones_own", **values}
     exec(compile(text, "of_ones_own.py", "exec"), space)
     return space["f"]

@@ -19,7 +19,7 @@ QUICK = (
 
 @pytest.fixture
 def script(monkeypatch):
-    """The script's module, for what ends before anything runs."""
+    """The script's module, for commands that end before anything runs."""
     monkeypatch.syspath_prepend(str(SCRIPT.parent))
     monkeypatch.setattr(sys, "argv", [str(SCRIPT)])
     sys.modules.pop("optimise", None)

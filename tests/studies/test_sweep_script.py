@@ -44,7 +44,7 @@ def wait_for_lines(process, path, count):
 
 @pytest.fixture
 def script(monkeypatch):
-    """The script's module, for what ends before anything runs."""
+    """The script's module, for commands that end before anything runs."""
     monkeypatch.syspath_prepend(str(SCRIPT.parent))
     monkeypatch.setattr(sys, "argv", [str(SCRIPT)])
     sys.modules.pop("sweep", None)

@@ -1,4 +1,4 @@
-"""Made-up results of fingers of several sizes, and what reads figures of them."""
+"""Made-up results of fingers of several sizes, and readers of figures of them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a summary and a figure say of servos, against the result that they are made of."""
+"""Summary and figure of servos, against the result that they are made of."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What all figures share: colours that everybody tells apart, no windows, and a look that ends with the figure."""
+"""The style of all figures: colours that everybody tells apart, no windows, a look that ends with the figure."""
 
 import itertools
 import subprocess

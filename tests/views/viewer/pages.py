@@ -1,4 +1,4 @@
-"""What the tests ask of a page in the browser, and a clock for what is paced."""
+"""Questions of the tests to a page in the browser, and a clock for paced playing."""
 
 import time
 
@@ -31,7 +31,7 @@ def seek(page, t):
 
 
 def until(condition, patience=10.0):
-    """Wait for what the browser does when it gets round to it; it renders in software here."""
+    """Wait for the browser, which renders in software here."""
     deadline = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < deadline, "the page did not react"

@@ -18,7 +18,7 @@ from finger_pin.views.viewer.video import _Film
 
 
 def played(result):
-    """Return what the page of a result plays, and a function that decodes a column of its frames."""
+    """Return the data of the page of a result, and a function that decodes a column of its frames."""
     text = animation_page(result)
     found = json.loads(re.search(r'<script type="application/json" id="animation">\n(.*?)\n</script>', text, re.S)[1])
 
@@ -67,7 +67,7 @@ def test_a_result_without_objects_has_none_on_its_page():
 
 
 class Window:
-    """What a `meshcat.Visualizer` sends."""
+    """The messages that a `meshcat.Visualizer` sends."""
 
     sent: ClassVar = {}
 

@@ -14,7 +14,7 @@ from finger_pin.views import draw
 
 @dataclass
 class Window:
-    """What a `meshcat.Visualizer` sends, and when."""
+    """The messages that a `meshcat.Visualizer` sends, with their times."""
 
     clock: Clock
     sent: list = field(default_factory=list)

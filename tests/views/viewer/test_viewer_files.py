@@ -1,4 +1,4 @@
-"""What the viewer writes, and what it refuses."""
+"""The files of the viewer, and its refusals."""
 
 import re
 import subprocess

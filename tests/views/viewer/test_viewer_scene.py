@@ -1,4 +1,4 @@
-"""What the browser shows: against Table I, equation (1), the tendon geometry and matplotlib's colours."""
+"""The picture in the browser, against Table I, equation (1), the tendon geometry and matplotlib's colours."""
 
 import io
 import json
