@@ -17,11 +17,11 @@ from finger_pin.description.validation import (
     check_size,
     choice,
     expand,
-    nearest,
     problem,
     quantity,
     real,
     reals,
+    suggestion,
 )
 
 Share = Annotated[float, real(0.0, 2.0)]
@@ -226,8 +226,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
     actuators = tuple(finger.tree.actuators) if finger.tree else ()
     for name in settings.inputs or {}:
         if name not in actuators:
-            near = nearest(name, actuators)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(name, actuators)
             allowed = f"no such actuator; there are {', '.join(actuators) or 'none'}{hint}"
             raise problem(f"controller.inputs.{name}", allowed)
     if settings.kind == "proportional":
@@ -249,8 +248,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
         if name in finger.passive_names:
             raise problem(entry, f"is a passive tendon, which has no actuator; actuated are {', '.join(names)}")
         if name not in names:
-            near = nearest(name, names)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(name, names)
             raise problem(entry, f"no such tendon; actuated are {', '.join(names)}{hint}")
         if signal.lowest < 0.0:
             raise problem(entry, f"a tendon only pulls: the tension must stay at or above 0 N, not {signal.lowest:g} N")

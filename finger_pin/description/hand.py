@@ -25,10 +25,10 @@ from finger_pin.description.validation import (
     Description,
     Name,
     expand,
-    nearest,
     problem,
     quantity,
     real,
+    suggestion,
     vector,
 )
 from finger_pin.exceptions import InputError
@@ -86,8 +86,7 @@ class Palm(Description):
     def _coordinates(cls, value: dict[str, PathSignal] | None) -> dict[str, PathSignal] | None:
         for name in value or {}:
             if name not in PATH:
-                near = nearest(name, PATH)
-                hint = f"; did you mean {near}?" if near else ""
+                hint = suggestion(name, PATH)
                 raise problem(name, f"no such coordinate; there are {', '.join(PATH)}{hint}")
         return value
 

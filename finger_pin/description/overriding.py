@@ -16,11 +16,10 @@ from finger_pin.description.reading import (
     is_path,
     resolve_finger,
     resolve_hand,
-    suggestion,
     with_motors,
 )
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import find_field, nearest
+from finger_pin.description.validation import find_field, nearest, suggestion
 from finger_pin.exceptions import InputError
 
 # Keys that put another finger or hand in place of what there is.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import resources
@@ -14,7 +14,7 @@ from typing import Any
 
 from finger_pin.description.recordings.columns import read_columns
 from finger_pin.description.recordings.series import PACKED
-from finger_pin.description.validation import nearest
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 
 Table = dict[str, Any]
@@ -284,12 +284,6 @@ def merge(base: Table, top: Table) -> Table:
         # A table that names its base starts from that one.
         merged[key] = merge(merged[key], value) if both and "base" not in value else value
     return merged
-
-
-def suggestion(name: Any, names: Iterable[str]) -> str:
-    """Return the nearest valid name as the end of a message; empty if none is near."""
-    near = nearest(name, names)
-    return f"; did you mean {near}?" if near else ""
 
 
 def as_table(value: Any) -> Table:

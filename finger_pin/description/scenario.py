@@ -37,10 +37,10 @@ from finger_pin.description.validation import (
     Name,
     choice,
     expand,
-    nearest,
     problem,
     quantity,
     real,
+    suggestion,
     vector,
 )
 from finger_pin.exceptions import InputError
@@ -236,8 +236,7 @@ class Scenario(Description):
         for table, (names, what, allowed) in tables.items():
             for name in names:
                 if name not in allowed:
-                    near = nearest(name, allowed)
-                    hint = f"; did you mean {near}?" if near else ""
+                    hint = suggestion(name, allowed)
                     listed = f"the {what}s are {', '.join(allowed)}" if allowed else "there is no hand"
                     raise problem(f"{table}.{name}", f"no such {what}; {listed}{hint}")
 

@@ -20,10 +20,10 @@ from finger_pin.description.validation import (
     Description,
     Name,
     choice,
-    nearest,
     problem,
     quantity,
     real,
+    suggestion,
     vector,
 )
 from finger_pin.description.waypoints import PLACE, Triple, Waypoint, check_path
@@ -280,6 +280,5 @@ class Tree(Description):
 def _check(entry: str, name: str | None, names: Iterable[str], what: str) -> None:
     known = list(names)
     if name is not None and name not in known:
-        near = nearest(name, known)
-        hint = f"; did you mean {near}?" if near else ""
+        hint = suggestion(name, known)
         raise problem(entry, f"no such {what}; there are {', '.join(known) or 'none'}{hint}", name)

@@ -110,8 +110,7 @@ def choice(*allowed: str) -> BeforeValidator:
 
     def validate(value: Any) -> Any:
         if value not in allowed:
-            near = nearest(value, allowed)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(value, allowed)
             raise problem("", f"must be one of {', '.join(allowed)}{hint}", value)
         return value
 
@@ -123,6 +122,12 @@ def nearest(name: Any, names: Iterable[str]) -> str | None:
     folded = {candidate.casefold(): candidate for candidate in names}
     found = difflib.get_close_matches(str(name).casefold(), folded, n=1, cutoff=0.6)
     return folded[found[0]] if found else None
+
+
+def suggestion(name: Any, names: Iterable[str]) -> str:
+    """Return the nearest valid name as the end of a message; empty if none is near."""
+    near = nearest(name, names)
+    return f"; did you mean {near}?" if near else ""
 
 
 def expand(value: Numbers, size: int) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from typing import Any
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import find_field, nearest
+from finger_pin.description.validation import find_field, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
@@ -132,8 +132,7 @@ class Starting:
         return float(held)
 
     def _nothing(self, key: str, numbers: bool) -> InputError:
-        near = nearest(key, _leaves(self.scenario.model_dump(mode="python"), "", numbers))
-        hint = f"; did you mean {near}?" if near else ""
+        hint = suggestion(key, _leaves(self.scenario.model_dump(mode="python"), "", numbers))
         return InputError(key, f"the scenario has no such {'number' if numbers else 'entry'}{hint}")
 
     def _found(self, key: str) -> Any:

@@ -19,7 +19,7 @@ from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import nearest
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism import joint_friction, tendons
 from finger_pin.mechanism.books import LOST
@@ -92,8 +92,7 @@ def choose(names: Iterable[str | Metric]) -> tuple[Metric, ...]:
     chosen: dict[str, Metric] = {}
     for each in names:
         if isinstance(each, str) and each not in METRICS:
-            near = nearest(each, METRICS)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(each, METRICS)
             raise InputError("metric", f"there is no such metric; there are {', '.join(METRICS)}{hint}", each)
         metric = METRICS[each] if isinstance(each, str) else each
         try:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from finger_pin.description.tree import TreeTendon
-from finger_pin.description.validation import nearest, quantity, real, validate
+from finger_pin.description.validation import quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
 
 
@@ -71,8 +71,7 @@ def _tables(given: Mapping[str, Mapping[str, Any]] | str | Path) -> Mapping[str,
 def _named(element: Any, elements: Any, entry: str, what: str) -> None:
     if element is None:
         names = [each.name for each in elements if each.name]
-        near = nearest(entry.rsplit(".", 1)[1], names)
-        hint = f"; did you mean {near}?" if near else ""
+        hint = suggestion(entry.rsplit(".", 1)[1], names)
         raise InputError(entry, f"no such {what}; there are {', '.join(names) or 'none'}{hint}")
 
 

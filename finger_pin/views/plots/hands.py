@@ -38,10 +38,9 @@ def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
     """
     present = fingers_of(result)
     if finger not in present:
-        from finger_pin.description.validation import nearest
+        from finger_pin.description.validation import suggestion
 
-        near = nearest(finger, present)
-        hint = f"; did you mean {near}?" if near else ""
+        hint = suggestion(finger, present)
         listed = f"the fingers are {', '.join(present)}" if present else "it is the result of one finger"
         raise InputError("finger", f"{listed}{hint}", finger)
     chosen = result.drop_vars([name for name in result if str(name).startswith(("energy_", "power_"))])
