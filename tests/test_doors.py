@@ -135,6 +135,11 @@ def test_a_hand_is_taken_where_a_finger_is(hand):
     assert fp.analysis.closure_over_range(hand, samples=8).holds
 
 
+def test_a_misspelt_hand_is_told_the_nearest_of_fingers_and_hands():
+    with pytest.raises(fp.InputError, match=r"no such finger or hand; .*did you mean ub_hand\?"):
+        fp.Hand("ub_hnd")
+
+
 def test_files_of_other_programs_are_written_of_a_name(files):
     assert fp.to_urdf("ub") == fp.to_urdf(files[1]) == fp.to_urdf(fp.load_finger("ub"))
     assert fp.to_mjcf("ub_hand") == fp.to_mjcf(fp.load_hand("ub_hand"))

@@ -30,7 +30,7 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.recordings.series import PACKED, Series, packed
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import Description, validate
+from finger_pin.description.validation import Description, suggestion, validate
 from finger_pin.exceptions import InputError
 
 # Of more numbers than this a text is written that is read at once; nobody reads them one by one.
@@ -104,7 +104,11 @@ def describe(finger: DescriptionLike) -> FingerDescription:
         InputError: Naming the entry that is wrong.
     """
     if isinstance(finger, str | Path):
-        return load_hand(finger) if kind_of(str(finger)) == "hand" else load_finger(finger)
+        kind, names = kind_of(str(finger)), [*list_fingers(), *list_hands()]
+        if kind == "scenario" and not is_path(str(finger)):
+            allowed = f"no such finger or hand; there are {', '.join(names)}, or the path of a .toml file"
+            raise InputError("finger", allowed + suggestion(finger, names), str(finger))
+        return load_hand(finger) if kind == "hand" else load_finger(finger)
     if not isinstance(finger, FingerDescription):
         allowed = "must be that of a finger or a hand, as fp.load_finger(name), or the name or path of one"
         raise InputError("description", allowed, type(finger).__name__)
