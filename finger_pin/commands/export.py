@@ -46,13 +46,19 @@ def export(
             else "has no signals; simulate it, and give the folder of its results"
         )
         raise wrong("SOURCE", f"{source}: {what}")
-    text = "" if results else written(described(source, settings), target.suffix)
-    target.parent.mkdir(parents=True, exist_ok=True)
     if results:
         from finger_pin.simulation.netcdf import load, save
 
-        save(load(source), target)
+        try:
+            result = load(source)
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            raise wrong("SOURCE", f"{source}: cannot be read: {where}{error.strerror or error}") from None
+        target.parent.mkdir(parents=True, exist_ok=True)
+        save(result, target)
     else:
+        text = written(described(source, settings), target.suffix)
+        target.parent.mkdir(parents=True, exist_ok=True)
         with replacing(target) as temporary:
             Path(temporary).write_text(text, encoding="utf-8", newline="\n")
     print_text(f"wrote {target}")

@@ -47,7 +47,7 @@ def _shipped_table(kind: str, name: str) -> Table:
     return tomllib.loads(_shipped_texts(kind)[name])
 
 
-def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
+def _read(kind: str, name: str, folder: Path, entry: str = "") -> tuple[Table, Path]:
     """Return the table of a shipped item or of a file relative to a folder, and the path that it was read from."""
     if not is_path(name):
         names = _shipped_texts(f"{kind}s")
@@ -55,7 +55,7 @@ def _read(kind: str, name: str, folder: Path) -> tuple[Table, Path]:
             allowed = (
                 f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{suggestion(name, names)}"
             )
-            raise InputError(kind, allowed, name)
+            raise InputError(entry or kind, allowed, name)
         return copy.deepcopy(_shipped_table(f"{kind}s", name)), Path(name)
     what, path = f"{kind} file {name}", folder / expand(name)
     data = _read_bytes(what, path)
@@ -167,20 +167,23 @@ def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> An
 
 def with_motors(finger: Table, folder: Path) -> Table:
     """Put the table of every motor of a finger where its name or path may stand; return the finger."""
-    for actuator in as_table(finger.get("actuators")).values():
+    for name, actuator in as_table(finger.get("actuators")).items():
         if isinstance(actuator, dict) and "motor" in actuator:
-            actuator["motor"] = _resolve_motor(actuator["motor"], folder)
+            actuator["motor"] = _resolve_motor(actuator["motor"], folder, f"finger.actuators.{name}.motor")
     return finger
 
 
-def _resolve_motor(motor: Any, folder: Path) -> Any:
+def _resolve_motor(motor: Any, folder: Path, entry: str, seen: tuple[Path, ...] = ()) -> Any:
     """Return the table of a motor given by name, by path, or as a table that may start from a base."""
     if isinstance(motor, str):
-        table, path = _read("motor", motor, folder)
-        return _resolve_motor(table, path.parent)
+        table, path = _read("motor", motor, folder, entry)
+        identity = path.resolve()
+        if identity in seen:
+            raise InputError(entry, "a motor cannot start from itself", motor)
+        return _resolve_motor(table, path.parent, entry, (*seen, identity))
     if isinstance(motor, dict) and "base" in motor:
         rest = dict(motor)
-        return merge(as_table(_resolve_motor(rest.pop("base"), folder)), rest)
+        return merge(as_table(_resolve_motor(rest.pop("base"), folder, entry, seen)), rest)
     return motor
 
 

@@ -60,3 +60,12 @@ def test_what_cannot_be_written_is_told_in_one_line_and_nothing_is(here, capsys,
     assert run("export", arguments) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert says in line and not any(here.iterdir())
+
+
+@pytest.mark.parametrize("source", ["empty", "junk.nc", "missing.nc"])
+def test_results_that_cannot_be_read_are_a_wrong_input_and_not_one_that_cannot_be_written(here, capsys, source):
+    (here / "empty").mkdir()
+    (here / "junk.nc").write_text("no netCDF")
+    assert run("export", [source, "folder/x.csv"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"SOURCE: {source}: cannot be read" in line and not (here / "folder").exists()

@@ -15,7 +15,7 @@ FITTED = {**OWN, "torque_constant": 0.4, "resistance": 3.0, "friction": {"coulom
 WRONG = {
     "no spool": ({"M": {k: v for k, v in SPOOL.items() if k != "spool_radius"}}, "M.spool_radius", "is missing"),
     "no motor": ({"M": {"tendons": ["T1"], "spool_radius": 0.005}}, "M.motor", "is missing"),
-    "unknown motor": ({"M": {**SPOOL, "motor": "XL330-M28"}}, "motor", "did you mean XL330-M288?"),
+    "unknown motor": ({"M": {**SPOOL, "motor": "XL330-M28"}}, "M.motor", "did you mean XL330-M288?"),
     "millimetres": ({"M": {**SPOOL, "spool_radius": 5.0}}, "M.spool_radius", "is it in millimetres?"),
     "no encoder": ({"M": {**SPOOL, "motor": FITTED, "drive": "position"}}, "M.motor.encoder.range", "is missing"),
     "negative inertia": ({"M": {**SPOOL, "motor": {**FITTED, "inertia": -1e-3}}}, "M.motor.inertia", "must be above 0"),
@@ -46,8 +46,16 @@ def test_a_wrong_actuator_is_an_error_of_one_line_that_names_the_entry(case):
     with pytest.raises(InputError) as caught:
         load_finger("ub", {"finger.actuators": actuators})
     message = str(caught.value)
-    assert message.startswith(entry if entry == "motor" else f"finger.actuators.{entry}") and says in message
+    assert message.startswith(f"finger.actuators.{entry}") and says in message
     assert "\n" not in message
+
+
+def test_a_motor_that_starts_from_itself_is_named(tmp_path):
+    (tmp_path / "one.toml").write_text('base = "other.toml"\n')
+    (tmp_path / "other.toml").write_text('base = "one.toml"\n')
+    (tmp_path / "run.toml").write_text('extends = "servo"\nfinger.actuators.M1.motor = "one.toml"\n')
+    with pytest.raises(InputError, match=r'finger\.actuators\.M1\.motor = "one\.toml": a motor cannot start from it'):
+        load_scenario(tmp_path / "run.toml")
 
 
 def test_a_current_limit_below_what_pretension_needs_is_named_with_what_it_needs():

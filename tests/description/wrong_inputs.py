@@ -128,7 +128,11 @@ OTHER_OVERRIDES = [
     ("finger.tendons.T3.crossings.mediale.radius=0.01", "finger.tendons.T3.crossings.mediale", "did you mean medial?"),
     ("finger.joints.thumb={}", "finger.joints.thumb", "no such joint; there are abduction"),
     ("reference.joints.proximl.offset=0.1", "reference.joints.proximl", "did you mean proximal?"),
-    ("environment.objects.ball.mass=0.1", "environment.objects.ball", "no such object; there are none"),
+    (
+        "environment.objects.ball.mass=0.1",
+        "environment.objects.ball",
+        ("no such object; there are none", "environment.objects = { ball = { ... } } puts it there"),
+    ),
     ("finger.joints={}", "finger.joints", "at least one entry"),
     ("finger.tendons={}", "finger.tendons", "at least one entry"),
     ("reference.joints.thumb={offset = 0.1}", "reference.joints.thumb", "no such joint; there are abduction"),

@@ -439,3 +439,13 @@ def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
     assert (found.deviation[0] < found.deviation[1]).all() and (found.deviation < [0.0375, 0.25]).all()
     with pytest.raises(fp.InputError, match="at least one"):
         fp.propose("canal", {}, **given)
+
+
+def test_a_column_of_tensions_with_the_wrong_sign_is_named():
+    data = readings(np.random.default_rng(1))
+    with pytest.raises(fp.InputError, match=r"identify\.recordings\.pull\.inputs\.tendon_command\.T1: .* scale = -1"):
+        found({**data, "in": -data["in"]})
+    column = {"column": "in", "scale": -1.0}
+    turned = {"pull": steady(inputs={"tendon_command.T1": column})}
+    result = found({**data, "in": -data["in"]}, recordings=turned)
+    assert (result.estimate == found(data).estimate).all()

@@ -32,7 +32,8 @@ class SteadyReadings:
         """Find the inputs.
 
         Raises:
-            InputError: If one names nothing that the scenario has, or the tension of a tendon is missing.
+            InputError: If one names nothing that the scenario has, if the tension of a tendon is missing, or if all of
+                one are negative.
         """
         self.recording, self.scenario, finger = recording, scenario, scenario.finger
         self.own: tuple[Own, ...] = ()
@@ -46,6 +47,9 @@ class SteadyReadings:
         for name, values in recording.inputs.items():
             variable, _, label = name.partition(".")
             if variable in ("tendon_command", "spool_tension"):
+                if np.max(values) < 0.0:
+                    pulls = "a tendon only pulls; scale = -1 turns the sign of a column"
+                    raise InputError(f"{self._entry}.inputs.{name}", f"has no tension above 0 N: {pulls}")
                 self.load[:, self._place(f"inputs.{name}", label, tendons)] = values
                 if np.any(values < 0.0):
                     row = int(np.flatnonzero(values < 0.0)[0])
