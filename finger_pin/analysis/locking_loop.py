@@ -20,7 +20,9 @@ and an eigenvector counts if it lies in its cell. The critical scale is the leas
 it the loop has a solution whatever the offset (f0, weight, fingertip force): a continuous, positively homogeneous map
 without a zero but the origin keeps its degree, and without friction this one is the identity in tau. At kappa_crit the
 solution runs off to infinity along the eigenvector. f0, weight and fingertip force do not shift the critical scale;
-they set how large tensions are on this side of it. The posture enters through the curvature of the tendons only.
+they set how large tensions are on this side of it. So does a drag d of the tendons, which no load makes: it takes
+sigma_i d / (1 + sigma_i mu_i) of f_i, and sigma_5 d of the difference of a passive tendon's halves. The posture enters
+through the curvature of the tendons only.
 
 With the passive tension as planned the same has a plain meaning: the tensions f >= 0 that balance friction,
 (H_c2^T D - kappa diag(w s) loads D) f = 0, fill the kernel of a matrix, at kappa = 0 with a positive vector, force
@@ -197,7 +199,7 @@ class FrictionLoop:
             minimum: f0, shape (t,), N.
             weight: G, shape (m, n), N m.
         """
-        routing, scale = self.tendons.routing, self._shares(position, sliding)
+        routing, scale, drag = self.tendons.routing, self._shares(position, sliding), self._drags(position, sliding)
         inverse, internal = self.inverse, self.internal
         torque, command = np.array(weight), np.full((len(position), len(internal)), np.inf)
         going = np.arange(len(position))
@@ -205,7 +207,7 @@ class FrictionLoop:
             minimal = torque[going] @ inverse.T
             level = np.max((minimum - minimal) / internal, axis=1, keepdims=True)
             tension = minimal + level * internal
-            strands = scale[going] * routing.strand_tension(tension)
+            strands = np.maximum(scale[going] * routing.strand_tension(tension) - drag[going], 0.0)
             residual = strands @ routing.strand_coupling - weights[going] * (strands @ routing.loads.T)
             residual -= weight[going]
             span = np.max(np.abs(tension), axis=1)
@@ -239,19 +241,24 @@ class FrictionLoop:
         arriving = (
             self._shares(position, np.broadcast_to(own, cases))[:, :, None] * routing.strand_tension(np.eye(count)).T
         )
-        balance = (routing.strand_coupling.T - weights[:, None] * routing.loads) @ arriving
+        arms = routing.strand_coupling.T - weights[:, None] * routing.loads
+        balance, needed = arms @ arriving, weight + self._drags(position, np.broadcast_to(own, cases)) @ arms.T
         turned, lengths, axes = np.linalg.svd(balance)
         kernel = axes[:, -1] * np.sign(axes[:, -1].sum(axis=1, keepdims=True))
-        base = np.einsum("mit,mi->mt", axes[:, :-1], np.einsum("mji,mj->mi", turned, weight) / lengths)
+        base = np.einsum("mit,mi->mt", axes[:, :-1], np.einsum("mji,mj->mi", turned, needed) / lengths)
         moves = np.all(kernel > _INSIDE * np.max(kernel, axis=1, keepdims=True), axis=1)
         found = np.where(moves, 0.0, np.inf)
         kernel, base, at = kernel[moves], base[moves], position[moves]
-        share = np.ones_like(base)
+        share, drag = np.ones_like(base), np.zeros_like(base)
         for way in sliding if moves.any() else ():
-            share[:, :actuated] = self._shares(at, np.broadcast_to(way, base.shape))[:, :actuated]
-            least = np.max((minimum * share - base) / kernel, axis=1, keepdims=True)
-            needed = ((base + least * kernel) / share)[:, :actuated]
-            found[moves] = np.maximum(found[moves], needed.max(axis=1))
+            ways = np.broadcast_to(way, base.shape)
+            share[:, :actuated] = self._shares(at, ways)[:, :actuated]
+            drag[:, :actuated] = self._drags(at, ways)[:, :actuated]
+            # A tendon at f0 that does not overcome its drag delivers nothing.
+            least = np.max((np.maximum(minimum * share - drag, 0.0) - base) / kernel, axis=1, keepdims=True)
+            delivered = base + least * kernel
+            command = np.where(delivered > _INSIDE * delivered.max(), (delivered + drag) / share, minimum)
+            found[moves] = np.maximum(found[moves], command[:, :actuated].max(axis=1))
         return found
 
     def _shares(self, position: Array, sliding: Array) -> Array:
@@ -263,3 +270,11 @@ class FrictionLoop:
         share = share * np.where(drawn > 0.0, self.gears[0], np.where(drawn < 0.0, self.gears[1], 1.0))
         pairs = np.stack([1.0 + friction[:, actuated:], 1.0 - friction[:, actuated:]], axis=-1)
         return np.concatenate([share, pairs.reshape(len(position), -1)], axis=1)
+
+    def _drags(self, position: Array, sliding: Array) -> Array:
+        """Return what drag takes of the tension of every strand besides, shape (m, s), N."""
+        routing, actuated = self.tendons.routing, self.tendons.routing.actuated
+        friction = sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position))
+        lost = sliding * self.tendons.drag
+        halves = np.repeat(0.5 * lost[:, actuated:], 2, axis=1) * np.tile([-1.0, 1.0], routing.passive)
+        return np.concatenate([lost[:, :actuated] / (1.0 + friction[:, :actuated]), halves], axis=1)

@@ -119,7 +119,7 @@ def force_polytope(
     if friction is Friction.HINDERING:
         raise InputError("friction", "must be none or helping; what hinders has a direction", friction.value)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
-    statics = TipStatics.of(finger, theta, friction, (), np.zeros(len(theta)))
+    statics = TipStatics.of(finger, theta, friction)
     left, values, _ = np.linalg.svd(statics.jacobian)
     basis = left[:, : int(np.sum(values > _RANK * np.max(values)))]
     if not basis.shape[1]:

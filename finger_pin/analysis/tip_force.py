@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from finger_pin.analysis.tip_statics import (
     INFEASIBLE,
     UNBOUNDED,
     Friction,
+    Slip,
     TipStatics,
     command_bounds,
     posture,
@@ -20,6 +22,7 @@ from finger_pin.analysis.tip_statics import (
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
 
 
@@ -70,17 +73,25 @@ def largest_force(
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     along = _unit(direction)
     worst = np.inf
-    for slide, signs in slips(finger, finger.rigid_body.jacobian(theta), along, friction):
-        statics = TipStatics.of(finger, theta, friction, slide, signs)
-        extra = (statics.jacobian.T @ along)[:, None]
-        if friction is Friction.HINDERING:
-            extra = extra + (signs * finger.joint_friction.kinetic)[:, None]
-        cost = np.append(-1.0, np.zeros(sum(statics.sizes)))
-        found = statics.solve(cost, extra, [(None, None), *bounds], np.zeros(len(theta)))
-        if found.status == INFEASIBLE:
+    for ways in slips(finger, finger.rigid_body.jacobian(theta), along, friction):
+        best = max(_most(finger, theta, along, friction, slip, bounds) for slip in ways)
+        if best == -np.inf:
             return float("nan")
-        worst = min(worst, np.inf if found.status == UNBOUNDED else float(found.x[0]))
+        worst = min(worst, best)
     return worst
+
+
+def _most(finger: Finger, theta: Array, along: Array, friction: Friction, slip: Slip | None, bounds: Any) -> float:
+    """Return the largest force along a direction in one way to slip, N; minus infinity where it cannot be."""
+    statics = TipStatics.of(finger, theta, friction, slip)
+    extra = (statics.jacobian.T @ along)[:, None]
+    if slip is not None:
+        extra = extra + (slip.joints * finger.joint_friction.kinetic)[:, None]
+    cost = np.append(-1.0, np.zeros(sum(statics.sizes)))
+    found = statics.solve(cost, extra, [(None, None), *bounds], np.zeros(len(theta)))
+    if found.status == INFEASIBLE:
+        return -np.inf
+    return np.inf if found.status == UNBOUNDED else float(found.x[0])
 
 
 def tension_for_force(
@@ -108,24 +119,35 @@ def tension_for_force(
     wanted = finite_vector("force", force, 3)
     jacobian = finger.rigid_body.jacobian(theta)
     needed: list[RequiredTension] = []
-    for slide, signs in slips(finger, jacobian, wanted, friction):
-        # Without HINDERING there are no signs.
-        demand = jacobian.T @ wanted + signs * finger.joint_friction.kinetic * np.linalg.norm(wanted)
-        statics = TipStatics.of(finger, theta, friction, slide, signs)
-        a, s, n = statics.sizes
-        cost, largest = np.append(1.0, np.zeros(a + s + n)), [(0.0, None)]
-        # z is the largest command: an inequality for each.
-        below_largest = np.hstack([-np.ones((a, 1)), np.eye(a)])
-        found = statics.solve(cost, np.zeros((n, 1)), [*largest, *bounds], demand, below_largest)
-        if found.status != 0:
+    for ways in slips(finger, jacobian, wanted, friction):
+        found = [each for slip in ways if (each := _least(finger, theta, wanted, friction, slip, bounds))]
+        if not found:
             raise InputError("force", "no tensions, however large, exert it", wanted.tolist())
-        strands = found.x[1 + a : 1 + a + s]
-        # A radius r of a strand enters its joint's row as r f: d(value) = -(multiplier) f dr.
-        by_strand = -np.asarray(found.eqlin.marginals)[:n, None] * strands * (finger.routing.loads > 0.0)
-        halves = by_strand[:, a:].reshape(n, -1, 2).sum(axis=2)
-        by_radius = np.hstack([by_strand[:, :a], halves]).T
-        needed.append(RequiredTension(float(found.x[0]), found.x[1 : 1 + a], strands, by_radius))
+        needed.append(min(found, key=lambda each: each.largest))
     return max(needed, key=lambda each: each.largest)
+
+
+def _least(
+    finger: Finger, theta: Array, wanted: Array, friction: Friction, slip: Slip | None, bounds: Any
+) -> RequiredTension | None:
+    """Return the tensions with the least maximum in one way to slip; None where it cannot be."""
+    statics = TipStatics.of(finger, theta, friction, slip)
+    demand = statics.jacobian.T @ wanted
+    if slip is not None:
+        demand = demand + slip.joints * finger.joint_friction.kinetic * np.linalg.norm(wanted)
+    a, s, n = statics.sizes
+    cost, largest = np.append(1.0, np.zeros(a + s + n)), [(0.0, None)]
+    # z is the largest command: an inequality for each.
+    below_largest = np.hstack([-np.ones((a, 1)), np.eye(a)])
+    found = statics.solve(cost, np.zeros((n, 1)), [*largest, *bounds], demand, below_largest)
+    if found.status != 0:
+        return None
+    strands = found.x[1 + a : 1 + a + s]
+    # A radius r of a strand enters its joint's row as r f: d(value) = -(multiplier) f dr.
+    by_strand = -np.asarray(found.eqlin.marginals)[:n, None] * strands * (finger.routing.loads > 0.0)
+    halves = by_strand[:, a:].reshape(n, -1, 2).sum(axis=2)
+    by_radius = np.hstack([by_strand[:, :a], halves]).T
+    return RequiredTension(float(found.x[0]), found.x[1 : 1 + a], strands, by_radius)
 
 
 def _unit(direction: Sequence[float] | Array) -> Array:

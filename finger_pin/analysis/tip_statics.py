@@ -16,6 +16,10 @@ limit, but never push. Friction enters in one of three ways.
   sign of (J^T E)_j, whichever is worse where E passes a joint's axis too closely to say. It depends on the direction
   of E, so it is asked about direction by direction; no polytope.
 
+A drag d, which no load makes, adds to the level, mu^d (f^a_i + f_i) + d, so that it takes d / (1 + mu^d) of a tension
+beside the capstan law: of HELPING that much more on either side, of HINDERING f_i = max(0, f^a_i exp(-mu_e phi_i) -
+d / (1 + mu^d)), where a tendon whose command does not overcome its drag delivers nothing.
+
 S_j is the sum of the tensions that cross joint j. The reaction (17) is |-e_j S_j - E|, at most S_j + |E|: so HINDERING
 is on the safe side, and HELPING leaves out what the contact itself adds to the friction.
 
@@ -32,11 +36,13 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand, finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.finger import Finger
 
 #: What scipy's linear programmes report.
@@ -54,13 +60,28 @@ class Friction(Enum):
 
 
 @dataclass(frozen=True, eq=False)
+class Slip:
+    """One way in which everything slips against a finger that pushes.
+
+    Attributes:
+        tendons: 1 where a tendon's far end loses, -1 where the near one does, shape (t,).
+        idle: Whether drag keeps a tendon from delivering anything, shape (t,).
+        joints: s, the sign of every joint's friction, shape (n,).
+    """
+
+    tendons: Array
+    idle: NDArray[np.bool_]
+    joints: Array
+
+
+@dataclass(frozen=True, eq=False)
 class TipStatics:
     """The linear constraints on x = (f^a, f, tau^f) that do not depend on E, and J^T.
 
     Attributes:
         jacobian: J, shape (3, n).
-        equal: Rows that vanish, shape (., a + s + n).
-        below: Rows that are at most zero, shape (., a + s + n).
+        equal: Rows that vanish, shape (., a + s + n + 1), the last number being a constant.
+        below: Rows that are at most zero, likewise.
         torque: Rows (n) of H_c2^T f - tau^f.
         weight: G and the torque of springs, shape (n,), N m.
         sizes: a, s, n.
@@ -74,37 +95,37 @@ class TipStatics:
     sizes: tuple[int, int, int]
 
     @classmethod
-    def of(cls, finger: Finger, theta: Array, friction: Friction, slide: tuple[float, ...], signs: Array) -> TipStatics:
-        """Collect the constraints; ``slide`` and ``signs`` serve HINDERING alone."""
+    def of(cls, finger: Finger, theta: Array, friction: Friction, slip: Slip | None = None) -> TipStatics:
+        """Collect the constraints; ``slip`` serves HINDERING alone."""
         routing, tendons = finger.routing, finger.tendons
         a, (s, n) = routing.actuated, routing.strand_coupling.shape
-        loss = np.exp(-tendons.surface * routing.curvature(theta))
-        command, strand, joint = np.split(np.eye(a + s + n), [a, a + s])
-        direct, proximal, distal = strand[:a], strand[a::2], strand[a + 1 :: 2]
+        turn = routing.curvature(theta)
+        loss = np.exp(-tendons.surface * turn)[:, None]
+        drag = (tendons.drag / (1.0 + capstan_coefficient(tendons.surface, turn)))[:, None]
+        command, strand, joint, one = np.split(np.eye(a + s + n + 1), [a, a + s, a + s + n])
+        # What pulls at either end of a friction: of passive tendons the proximal and the distal half.
+        near, far = np.vstack([command, strand[a::2]]), np.vstack([strand[:a], strand[a + 1 :: 2]])
         reaction = finger.joint_friction.kinetic[:, None] * (routing.loads @ strand)
         below: list[Array] = []
         if friction is Friction.NONE:
-            equal = [direct - command, distal - proximal, joint]
+            equal = [far - near, joint]
         elif friction is Friction.HINDERING:
-            ratio = loss[a:] ** np.array(slide)
-            equal = [direct - loss[:a, None] * command, distal - ratio[:, None] * proximal]
-            equal.append(joint - signs[:, None] * reaction)
+            assert slip is not None
+            ahead, idle = slip.tendons[:, None] > 0.0, slip.idle[:, None]
+            source, target = np.where(ahead, near, far), np.where(ahead, far, near)
+            arriving = loss * source - drag * one
+            equal = [np.where(idle, target, target - arriving), joint - slip.joints[:, None] * reaction]
+            below = [arriving[slip.idle]]
         else:
             equal = []
-            pairs = ((command, direct, loss[:a]), (proximal, distal, loss[a:]))
-            below = [
-                row
-                for before, after, least in pairs
-                for row in (least[:, None] * before - after, least[:, None] * after - before)
-            ]
+            below = [loss * near - far - drag * one, loss * far - near - drag * one]
             below += [joint - reaction, -joint - reaction]
-        torque = routing.strand_coupling.T @ strand - joint
         width = a + s + n
         return cls(
             jacobian=finger.rigid_body.jacobian(theta),
-            equal=np.concatenate([np.zeros((0, width)), *equal]),
-            below=np.concatenate([np.zeros((0, width)), *below]),
-            torque=torque,
+            equal=np.concatenate([np.zeros((0, width + 1)), *equal]),
+            below=np.concatenate([np.zeros((0, width + 1)), *below]),
+            torque=(routing.strand_coupling.T @ strand - joint)[:, :width],
             weight=finger.static_torque(theta),
             sizes=(a, s, n),
         )
@@ -131,37 +152,38 @@ class TipStatics:
         zeros = np.zeros((len(self.equal), count))
         below = np.hstack([np.zeros((len(self.below), count)), self.below])
         if further is not None:
-            below = np.vstack([below, np.hstack([further, np.zeros((len(further), s + n))])])
+            below = np.vstack([below, np.hstack([further, np.zeros((len(further), s + n + 1))])])
         return scipy.optimize.linprog(
             cost,
-            A_ub=below if len(below) else None,
-            b_ub=np.zeros(len(below)) if len(below) else None,
-            A_eq=np.vstack([np.hstack([-extra, self.torque]), np.hstack([zeros, self.equal])]),
-            b_eq=np.concatenate([self.weight + offset, np.zeros(len(self.equal))]),
+            A_ub=below[:, :-1] if len(below) else None,
+            b_ub=-below[:, -1] if len(below) else None,
+            A_eq=np.vstack([np.hstack([-extra, self.torque]), np.hstack([zeros, self.equal[:, :-1]])]),
+            b_eq=np.concatenate([self.weight + offset, -self.equal[:, -1]]),
             bounds=[*bounds, *[(0.0, None)] * s, *[(None, None)] * n],
         )
 
 
-def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> list[tuple[tuple[float, ...], Array]]:
-    """Return the ways to slip under a force E, shape (3,): signs of passive tendons, and of joints, shape (n,).
+def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> list[list[Slip | None]]:
+    """Return the ways to slip under a force E, shape (3,), each with the choices of what drag keeps idle.
 
     That is for HINDERING alone. A force that passes a joint's axis at no more than the coefficient M^d of its friction,
     inside of its friction circle, does not decide which way the joint slips: both ways must be looked at. Where it
     turns no joint at all the structure carries it, and nothing slips.
     """
-    passive, kinetic = finger.routing.passive, finger.joint_friction.kinetic
-    still: Array = np.zeros(len(kinetic))
+    routing, kinetic = finger.routing, finger.joint_friction.kinetic
     if friction is not Friction.HINDERING:
-        return [((0.0,) * passive, still)]
+        return [[None]]
     turn, size = jacobian.T @ force, float(np.linalg.norm(force))
-    joints = [still]
+    joints = [np.zeros(len(kinetic))]
     if np.max(np.abs(turn)) > _UNTURNED * size * np.max(np.abs(jacobian)):
         sides = [
             (np.sign(each),) if abs(each) >= least else (1.0, -1.0)
             for each, least in zip(turn, size * kinetic, strict=True)
         ]
         joints = [np.array(signs) for signs in product(*sides)]
-    return list(product(product((1.0, -1.0), repeat=passive), joints))
+    idle = [np.array(each) for each in product(*[(False, True) if d > 0.0 else (False,) for d in finger.tendons.drag])]
+    tendons = [np.array(each) for each in product(*[(1.0,)] * routing.actuated, *[(1.0, -1.0)] * routing.passive)]
+    return [[Slip(way, each, signs) for each in idle] for way, signs in product(tendons, joints)]
 
 
 def posture(finger: Finger, position: Sequence[float] | Array) -> Array:
