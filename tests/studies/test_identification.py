@@ -6,7 +6,6 @@ import pytest
 import finger_pin as fp
 from finger_pin.commands.application import run
 from finger_pin.description.recordings.units import in_si
-from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.studies.identification.ledger import NAME
 from finger_pin.studies.identification.recordings import read_table
 from finger_pin.views.report import summarize_identification, write_report
@@ -196,6 +195,21 @@ def test_weights_on_a_servo_tell_what_its_gears_lose_either_way():
     assert np.diff(result.law_bic)[0] > 50.0
 
 
+@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy", "arctan"])
+def test_outliers_count_less_under_a_loss_that_is_robust(loss):
+    clean = readings(np.random.default_rng(9))
+    spoilt = {**clean, "out": clean["out"] + np.where(np.arange(30) % 7 == 0, 1.0, 0.0)}
+    expected, plain, robust = found(clean), found(spoilt), found(spoilt, loss=loss)
+    away = [np.abs(each.estimate.values - expected.estimate.values) for each in (plain, robust)]
+    assert away[1][1] < 0.7 * away[0][1]
+    assert robust.lower[0] <= robust.estimate[0] <= robust.upper[0] < plain.upper[0] + 0.01
+
+
+def test_a_loss_that_is_none_is_refused():
+    with pytest.raises(fp.InputError, match="must be one of linear, soft_l1"):
+        found(readings(np.random.default_rng(9)), loss="square")
+
+
 def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
     result = found(readings(np.random.default_rng(2)), starts=3)
     assert (result.attrs["searches"], result.attrs["searches_alike"]) == (3, 3)
@@ -208,15 +222,15 @@ def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
 
 
 def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path):
-    data, asked = readings(np.random.default_rng(2)), []
-    whole = found(data, starts=3)
+    data, asked, before = readings(np.random.default_rng(2)), [], []
+    whole = found(data, starts=3, stop=lambda: bool(before.append(0)))
 
     def stop():
         asked.append(0)
-        return len(asked) == 60
+        return len(asked) == len(before) - 4
 
     part = found(data, starts=3, output=tmp_path, stop=stop)
-    assert "unfinished" in part.attrs and (tmp_path / NAME).exists() and len(asked) == 60
+    assert "unfinished" in part.attrs and (tmp_path / NAME).exists() and len(asked) == len(before) - 4
     assert "determine every parameter" not in summarize_identification(part)
     again = found(data, starts=3, output=tmp_path)
     assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]
@@ -225,7 +239,7 @@ def test_an_interrupted_search_keeps_its_best_and_goes_on_where_it_was(tmp_path)
 
 
 def test_a_search_that_is_interrupted_goes_on_from_where_it_was(tmp_path):
-    """Stopped again and again after six evaluations it gets there; begun anew every time, it never would."""
+    """Stopped again and again after three evaluations it gets there; begun anew every time, it never would."""
     data = readings(np.random.default_rng(2))
     whole = found(data)
 
@@ -233,7 +247,7 @@ def test_a_search_that_is_interrupted_goes_on_from_where_it_was(tmp_path):
         asked = []
         return lambda: len(asked) >= count or bool(asked.append(0))
 
-    reached = [found(data, output=tmp_path, stop=stop_after(6)).estimate.values for _ in range(3)]
+    reached = [found(data, output=tmp_path, stop=stop_after(3)).estimate.values for _ in range(4)]
     np.testing.assert_allclose(reached[-1], whole.estimate, rtol=1e-3)
     assert np.abs(reached[0] / whole.estimate.values - 1.0).max() > 0.01
 
@@ -262,183 +276,6 @@ def test_a_scenario_that_no_file_has_is_written_out_with_the_numbers_found(tmp_p
     result = fp.identify(**bench, parameters=BOUNDS, **recorded, starts=1, output=tmp_path)
     numbers = dict(zip(result.parameter.values.tolist(), result.estimate.values.tolist(), strict=True))
     assert fp.load_scenario(tmp_path / "identified.toml") == fp.load_scenario("canal", turn | numbers)
-
-
-def ramp(rng, coulomb, drag, correlation=0.0, rate=100.0):
-    """The scenario canal drawn in evenly, in closed form: k theta + c theta' = r f, f by the capstan law and a drag.
-
-    Bristles follow friction F that grows later: F' = s v (1 - F / level) leaves F F' / (s v (1 + d)), where
-    d = tanh(mu phi / 2).
-    """
-    turn, radius, stiffness, viscous, rise, bristles = np.pi / 2.0, 0.02, 0.2, 2e-3, 4.0, 5e4
-    time = np.arange(0.5, 3.0, 1.0 / rate)
-    pull = 3.0 + rise * time
-    passing, share = np.exp(-coulomb * turn), np.tanh(coulomb * turn / 2.0)
-    out = pull * passing - drag / (1.0 + share)
-    sliding = radius**2 * rise * passing / stiffness
-    out += (pull - out) * rise * (1.0 - passing) / (bristles * sliding * (1.0 + share))
-    angle = (radius * out - viscous * radius * rise * passing / stiffness) / stiffness
-    noise = np.zeros((2, time.size))
-    for k, fresh in enumerate(rng.normal(size=(time.size, 2))):
-        noise[:, k] = correlation * noise[:, k - 1] + np.sqrt(1.0 - correlation**2) * fresh
-    return {"t": time, "in": pull, "f": out + 0.03 * noise[0], "q": np.degrees(angle + 2e-3 * noise[1])}
-
-
-MOTION = {
-    "time": "t",
-    "start": "recorded",
-    "settle": 0.2,
-    "inputs": {"tendon_command.T1": "in"},
-    "outputs": {"tendon_tension.T1": "f", "joint_position.drum": {"column": "q", "unit": "deg"}},
-}
-
-
-@pytest.mark.parametrize("more", [{}, {"window": 1.0}, {"start": "found"}], ids=["whole", "windows", "start found"])
-def test_a_recorded_motion_gives_the_friction_that_it_was_made_with(more):
-    truth = {COULOMB: 0.15, DRAG: 0.5}
-    data = ramp(np.random.default_rng(4), *truth.values())
-    recordings = {"pull": {**MOTION, **more}}
-    result = fp.identify("canal", parameters=BOUNDS, recordings=recordings, data={"pull": data}, starts=1)
-    np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
-    np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
-    assert result.parameter.size == 2 and result.signal.size == 2
-
-
-def test_a_finger_of_ones_own_is_identified_with_the_rows_that_it_has():
-    """Half of the drum's spring is a row of its own: the motion is the same, and so is the friction found in it."""
-    truth, half = {COULOMB: 0.15, DRAG: 0.5}, {"finger.joints.drum.spring.stiffness": 0.1}
-    spring = fp.Rows("drum_spring", JOINT_SPRING, ("drum",), [[0.1], [0.0], [0.0]], np.ones((1, 1)))
-    finger = fp.Finger(fp.load_scenario("canal", half).finger, rows=[spring])
-    data = {"pull": ramp(np.random.default_rng(4), *truth.values())}
-    result = fp.identify("canal", parameters=BOUNDS, recordings={"pull": MOTION}, data=data, starts=1, finger=finger)
-    np.testing.assert_allclose(result.estimate, list(truth.values()), rtol=0.05)
-    np.testing.assert_allclose(result.noise, [0.03, 2e-3], rtol=0.2)
-
-
-def test_estimates_from_motions_scatter_about_the_truth_as_their_intervals_say():
-    truth, rows = np.array([0.15, 0.5]), []
-    for seed in range(100, 112):
-        data = ramp(np.random.default_rng(seed), *truth)
-        found = fp.identify("canal", parameters=BOUNDS, recordings={"pull": MOTION}, data={"pull": data}, starts=1)
-        rows.append([found.estimate.values, found.lower.values, found.upper.values])
-    estimate, lower, upper = np.array(rows).transpose(1, 0, 2)
-    # Of 24, each with 95 %: fewer than 19 happen once in a thousand times. A mean of 12 beyond 3 / sqrt(12) likewise.
-    assert np.sum((lower <= truth) & (truth <= upper)) >= 19
-    away = (estimate - truth) / ((upper - lower) / 3.92)
-    assert np.all(np.abs(away.mean(axis=0)) < 3.0 / np.sqrt(12.0))
-
-
-def test_the_made_up_recording_that_ships_tells_the_numbers_it_was_made_with():
-    result = fp.identify("to_and_fro", starts=1)
-    truth = [0.12, 0.4, 0.03]
-    assert np.all((result.lower.values <= truth) & (truth <= result.upper.values))
-    assert result.signal_correlation.values == pytest.approx([0.6, 0.0], abs=0.15)
-
-
-def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interruption(tmp_path):
-    """A third of the samples is missing in one; the other is another pull of the same canal."""
-    rng, truth, asked, before = np.random.default_rng(12), [0.15, 0.5], [], []
-    data = {name: ramp(rng, *truth) for name in ("one", "two")}
-    missing = rng.uniform(size=data["one"]["t"].size) < 1.0 / 3.0
-    data["one"]["f"] = np.where(missing, np.nan, data["one"]["f"])
-    given = {"parameters": BOUNDS, "recordings": dict.fromkeys(data, MOTION), "data": data, "starts": 1}
-    whole = fp.identify("canal", **given, stop=lambda: bool(before.append(0)))
-    np.testing.assert_allclose(whole.estimate, truth, rtol=0.03)
-    later = data["one"]["t"] - data["one"]["t"][0] >= MOTION["settle"]
-    samples = dict(zip(whole.signal.values, whole.signal_samples.values, strict=True))
-    assert samples["one.tendon_tension.T1"] == np.sum(later & ~missing)
-    assert samples["two.tendon_tension.T1"] == np.sum(later)
-
-    def stop():
-        asked.append(0)
-        return len(asked) == len(before) - 2
-
-    part = fp.identify("canal", **given, output=tmp_path, stop=stop)
-    assert "unfinished" in part.attrs and len(asked) == len(before) - 2
-    again = fp.identify("canal", **given, output=tmp_path)
-    assert "unfinished" not in again.attrs and again.attrs["evaluations"] < whole.attrs["evaluations"]
-    for name in ("estimate", "lower", "upper"):
-        np.testing.assert_allclose(again[name], whole[name], rtol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"start": "recorded", "outputs": {"joint_position.drum": "q"}}, "cannot be reached: drum begins at"),
-        ({"start": "recorded", "outputs": {"tendon_tension.T1": "f"}}, "needs joint_position among the outputs"),
-        ({"inputs": {"joint_position.drum": "q"}}, "a motion is given tendon_command, joint_reference"),
-        ({"time": "f"}, "times must increase"),
-        ({"start": "rest", "outputs": {"joint_position.wheel": "f"}}, "there is no wheel; there are drum"),
-        ({"start": "rest", "outputs": {"joint_positon.drum": "f"}}, "did you mean joint_position?"),
-    ],
-)
-def test_wrong_recordings_of_motions_are_refused_in_one_line(change, said):
-    recordings = {"pull": {**MOTION, **change}}
-    data = ramp(np.random.default_rng(1), 0.15, 0.5)
-    data["f"][3:5] = data["f"][3]
-    data["q"] = data["q"] + 500.0
-    with pytest.raises(fp.InputError) as refused:
-        fp.identify("canal", parameters=BOUNDS, recordings=recordings, data={"pull": data}, starts=1)
-    assert said in str(refused.value) and "\n" not in str(refused.value)
-
-
-def test_windows_of_one_motion_are_held_out_in_turn_where_laws_are_compared():
-    data = ramp(np.random.default_rng(5), 0.15, 0.5)
-    result = fp.identify(
-        "canal",
-        parameters=BOUNDS,
-        recordings={"pull": {**MOTION, "window": 1.0}},
-        compare={"capstan": {DRAG: 0.0}},
-        data={"pull": data},
-        starts=1,
-    )
-    own, capstan = result.law_held_out.values
-    # What was not seen is met as well as noise allows; without the drag it is not.
-    assert 0.8 < own < 1.2
-    assert capstan > 1.5
-
-
-def test_residuals_that_follow_each_other_count_as_fewer():
-    """With a correlation of 0.9 between neighbours, one sample in 19 is independent (Bartlett)."""
-    given = {"parameters": BOUNDS, "recordings": {"pull": MOTION}, "starts": 1}
-    white, red = (
-        fp.identify("canal", data={"pull": ramp(np.random.default_rng(8), 0.15, 0.5, rho)}, **given)
-        for rho in (0.0, 0.9)
-    )
-    assert white.independent_share.values == pytest.approx([1.0, 1.0], abs=0.15)
-    assert red.independent_share.values == pytest.approx([1 / 19, 1 / 19], rel=0.6)
-    width = [float(each.upper[1] - each.lower[1]) for each in (white, red)]
-    assert 2.5 < width[1] / width[0] < 8.0
-
-
-def test_an_offset_and_a_delay_of_an_output_are_found():
-    data = ramp(np.random.default_rng(6), 0.15, 0.5)
-    data["f"] = np.interp(data["t"] - 0.05, data["t"], data["f"]) + 0.2
-    key = "recordings.pull.tendon_tension.T1"
-    parameters = {COULOMB: (0.005, 1.0), f"{key}.offset": (-1.0, 1.0)}
-    columns = {**MOTION["outputs"], "tendon_tension.T1": {"column": "f", "delay": 0.05}}
-    recordings = {"pull": {**MOTION, "outputs": columns}}
-    given = {"data": {"pull": data}, "starts": 1, "overrides": {DRAG: 0.5}}
-    result = fp.identify("canal", parameters=parameters, recordings=recordings, **given)
-    np.testing.assert_allclose(result.estimate, [0.15, 0.2], rtol=0.05)
-    assert result.units.values.tolist() == ["1", "N"]
-    with pytest.raises(fp.InputError, match="must be recordings"):
-        wrong = {**parameters, f"{key}.gain": (0.1, 2.0)}
-        fp.identify("canal", parameters=wrong, recordings=recordings, **given)
-
-
-def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
-    """At one load they cannot be told apart; a load that varies tells them."""
-    steady = {"kind": "ramp", "time": 0.0, "duration": 0.2, "height": 8.0}
-    rising = {"kind": "ramp", "time": 0.0, "duration": 1.0, "height": 16.0}
-    candidates = {name: {"controller.tensions.T1": each} for name, each in (("held", steady), ("rising", rising))}
-    overrides = {"simulation.duration": 1.0}
-    given = {"parameters": {COULOMB: (0.05, 0.2), DRAG: (0.0, 1.0)}, "outputs": {"tendon_tension.T1": 0.05}}
-    found = fp.propose("canal", candidates, **given, overrides=overrides)
-    assert found.candidate.values[0] == "rising"
-    assert (found.deviation[0] < found.deviation[1]).all() and (found.deviation < [0.0375, 0.25]).all()
-    with pytest.raises(fp.InputError, match="at least one"):
-        fp.propose("canal", {}, **given)
 
 
 def test_a_column_of_tensions_with_the_wrong_sign_is_named():

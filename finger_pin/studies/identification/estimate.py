@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
 from finger_pin.studies.identification.problem import Problem, minus_twice_likelihood, pooled
 
-# Rounds of residuals and noise in turn, and where they have settled.
-_ROUNDS, _SETTLED = 5, 1e-2
-# Where a search ends: relative changes of z, and of the objective before and after the noise is known.
-_CLOSE, _ROUGH, _STILL = 1e-7, 1e-2, 1e-3
-# Steps on the way to the others' best values where one is held, and how little they may still gain.
-_STEPS, _GAIN = 4, 0.01
+# Rounds of steps and weights in turn; steps in each, and how many of them in a row may fail.
+_ROUNDS, _STEPS, _FAILS = 5, 40, 3
+# Where steps end, by how much minus twice the likelihood may still fall: of motions, whose own errors it feels, and of
+# closed forms.
+_GAIN, _EXACT = 1e-3, 1e-9
+# Damping at first and at the least, of the information; how it falls and rises (Levenberg, Marquardt).
+_DAMPING, _LESS, _MORE = 1e-3, 0.2, 30.0
+# What a motion's own errors may hide of what a step gains: mostly, and at the most.
+_FEIGNED, _MOST_FEIGNED = 0.05, 1.0
+# Parts of what a step promises: from what gain on it is taken, and up to what error of it the slopes serve again.
+_TAKEN, _SERVED = 0.05, 0.3
+#: What a squared residual u counts for where outliers are to count less, and how fast that grows.
+LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
+    "linear": (lambda u: u, np.ones_like),
+    "soft_l1": (lambda u: 2.0 * (np.sqrt(1.0 + u) - 1.0), lambda u: 1.0 / np.sqrt(1.0 + u)),
+    "huber": (lambda u: np.where(u > 1.0, 2.0 * np.sqrt(u) - 1.0, u), lambda u: 1.0 / np.sqrt(np.maximum(u, 1.0))),
+    "cauchy": (np.log1p, lambda u: 1.0 / (1.0 + u)),
+    "arctan": (np.arctan, lambda u: 1.0 / (1.0 + u * u)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +43,8 @@ class Fit:
         noise: rms of the residuals of every signal, shape (s,).
         correlation: Of neighbouring residuals, shape (s,).
         weights: Part of the samples that are independent, (1 - rho) / (1 + rho), shape (s,) (Bartlett).
-        objective: Sum of w n log(SSE / n).
+        objective: Sum of w n log(SSE / n), outliers as they count.
+        slopes: Of every signal's residuals, those of the last step, which need not be of here; none without steps.
     """
 
     z: Array
@@ -38,15 +53,18 @@ class Fit:
     correlation: Array
     weights: Array
     objective: float
+    slopes: Sequence[Array] | None = None
 
 
 def fit(
     problem: Problem,
     start: Array,
     *,
-    held: dict[int, float] | None = None,
+    held: Mapping[int, float] | None = None,
     weights: Array | None = None,
     loss: str = "linear",
+    slopes: Sequence[Array] | None = None,
+    scale: Array | None = None,
 ) -> Fit:
     """Return the minimum that is reached from a start.
 
@@ -55,93 +73,128 @@ def fit(
         start: Shape (p,), transformed.
         held: Entries of z that stay as they are.
         weights: Of the signals; by default they follow from the residuals at the end.
-        loss: As of `scipy.optimize.least_squares`, for outliers.
+        loss: One of `LOSSES`, for outliers.
+        slopes: Of the residuals near the start, to step with as long as they serve; by default those at the start.
+        scale: Beyond which residuals are outliers, of the signals; by default their rms.
     """
-    from scipy.optimize import least_squares
-
-    z = start.copy()
+    z, free = start.copy(), np.ones(len(start), dtype=bool)
     for k, value in (held or {}).items():
-        z[k] = value
-    free = np.array([k for k in range(len(z)) if k not in (held or {})], dtype=int)
-    low, high = (bound[free] for bound in problem.box)
+        z[k], free[k] = value, False
     shares = np.ones(len(problem.signals)) if weights is None else weights
-    residuals = problem.residuals(z)
+    residuals: Sequence[Array] = problem.residuals(z)
     if not all(np.isfinite(e).all() for e in residuals):
         # What cannot be integrated there is the worst of all minima.
         nothing = np.zeros(len(residuals))
         return Fit(z, residuals, nothing, nothing, nothing, math.inf)
-    noise = _noise(problem, residuals)
-
-    def at(part: Array) -> Array:
-        whole = z.copy()
-        whole[free] = part
-        return whole
-
-    def weighed(parts: Sequence[Array]) -> Array:
-        return np.concatenate([f * part for f, part in zip(np.sqrt(shares) / noise, parts, strict=True)])
-
-    several, count = problem.groups.max(initial=0) > 0, sum(map(len, residuals))
-    for k in range(_ROUNDS if free.size else 0):
-        margin = 1e-9 * (high - low)
-        found = least_squares(
-            lambda part: weighed(problem.residuals(at(part))),
-            np.clip(z[free], low + margin, high - margin),
-            lambda part: weighed(problem.slopes(at(part)))[:, free],
-            (low, high),
-            x_scale=high - low,
-            loss=loss,
-            xtol=_CLOSE,
-            # What it may still fall is little against what ends an interval; before the noise is known, more.
-            ftol=_ROUGH if several and k == 0 else _STILL / count,
-        )
-        z = at(found.x)
-        residuals = problem.residuals(z)
-        before, noise = noise, _noise(problem, residuals)
-        if weights is None:
-            shares = _independent(problem, residuals)[1]
-        # What counts is how the signals are weighed against each other.
-        if not several or np.ptp(np.log(noise / before)) < _SETTLED:
+    for k in range(_ROUNDS if free.any() else 0):
+        before = z
+        z, residuals, slopes, ended = _descend(problem, z, residuals, free, shares, loss, slopes, scale)
+        if weights is not None or not ended or (k > 0 and z is before):
             break
+        shares = _independent(problem, residuals)[1]
     correlation, own = _independent(problem, residuals)
     shares = own if weights is None else weights
-    objective = minus_twice_likelihood(residuals, shares, problem.groups)
-    return Fit(z, residuals, noise, correlation, shares, objective)
-
-
-def fit_beside(problem: Problem, found: Fit, guess: Array, held: int) -> Fit:
-    """Return the minimum where one entry of z is held near a minimum, by steps with the slopes of that minimum.
-
-    Args:
-        problem: What is fitted.
-        found: The minimum.
-        guess: Where to start; its entry ``held`` stays.
-        held: Which.
-    """
-    others = np.arange(len(guess)) != held
-    slopes, factors = problem.slopes(found.z), found.weights / found.noise**2
-    inner = sum(f * j[:, others].T @ j[:, others] for f, j in zip(factors, slopes, strict=True))
-    solve = np.linalg.pinv(np.atleast_2d(inner), rcond=1e-12, hermitian=True)
-    low, high = problem.box
-    best = _fit_at(problem, guess, found.weights)
-    for _ in range(_STEPS if others.any() else 0):
-        pull = sum(f * j[:, others].T @ e for f, j, e in zip(factors, slopes, best.residuals, strict=True))
-        z = best.z.copy()
-        z[others] = np.clip(z[others] - solve @ pull, low[others], high[others])
-        if float(pull @ solve @ pull) < _GAIN:
-            break
-        next_ = _fit_at(problem, z, found.weights)
-        if not next_.objective < best.objective:
-            # The slopes have changed too much.
-            return fit(problem, best.z, held={held: guess[held]}, weights=found.weights)
-        best = next_
-    return best
-
-
-def _fit_at(problem: Problem, z: Array, weights: Array) -> Fit:
-    residuals = problem.residuals(z)
     noise = _noise(problem, residuals)
-    objective = minus_twice_likelihood(residuals, weights, problem.groups)
-    return Fit(z, residuals, noise, np.zeros(len(weights)), weights, objective)
+    counted = _counted(residuals, noise if scale is None else scale, loss)[0]
+    objective = minus_twice_likelihood(counted, shares, problem.groups)
+    return Fit(z, residuals, noise, correlation, shares, objective, slopes)
+
+
+def _descend(
+    problem: Problem,
+    z: Array,
+    residuals: Sequence[Array],
+    free: NDArray[np.bool_],
+    shares: Array,
+    loss: str,
+    slopes: Sequence[Array] | None,
+    scale: Array | None,
+) -> tuple[Array, Sequence[Array], Sequence[Array], bool]:
+    """Return where the likelihood is greatest, the residuals, the slopes of the last step, and whether it was found.
+
+    Steps are those of Gauss and Newton, damped. A run costs less than its slopes: these are made anew only where a
+    step gains much less than they promise.
+    """
+    fresh, damping, failed = slopes is None, _DAMPING, 0
+    slopes = problem.slopes(z) if slopes is None else list(slopes)
+    enough, feigned = (_GAIN, _FEIGNED) if any(signal.ordered for signal in problem.signals) else (_EXACT, 0.0)
+    for _ in range(_STEPS):
+        noise = _noise(problem, residuals) if scale is None else scale
+        met, inner, pull = _normal(problem, residuals, slopes, shares, noise, loss)
+        move, promised = _step(problem, z, free, inner, pull, damping)
+        if promised < enough:
+            return z, residuals, slopes, True
+        there = problem.residuals(z + move)
+        sums = [minus_twice_likelihood(each, shares, problem.groups) for each in (met, _counted(there, noise, loss)[0])]
+        gained = sums[0] - sums[1]
+        taken, served = gained > _TAKEN * promised, abs(gained - promised) < _SERVED * promised + feigned
+        if taken:
+            z, residuals, failed, damping = z + move, there, 0, max(damping * _LESS, _DAMPING)
+        elif fresh:
+            failed, damping = failed + 1, damping * _MORE
+        if failed > (_FAILS if promised > _MOST_FEIGNED else 0):
+            return z, residuals, slopes, promised <= _MOST_FEIGNED
+        if not taken and promised < feigned:
+            return z, residuals, slopes, True
+        if not served and (taken or not fresh):
+            slopes, fresh = problem.slopes(z), True
+        elif taken:
+            fresh = False
+    return z, residuals, slopes, False
+
+
+def _normal(
+    problem: Problem, residuals: Sequence[Array], slopes: Sequence[Array], shares: Array, scale: Array, loss: str
+) -> tuple[Sequence[Array], Array, Array]:
+    """Return the residuals as they count, and half of what minus twice the likelihood bends and slopes there."""
+    met, growth = _counted(residuals, scale, loss)
+    factors = shares / _noise(problem, met) ** 2
+    grown = [each[:, None] * j for each, j in zip(growth, slopes, strict=True)]
+    inner = sum(f * j.T @ j for f, j in zip(factors, grown, strict=True))
+    pull = sum(f * j.T @ e for f, j, e in zip(factors, grown, met, strict=True))
+    return met, np.asarray(inner), np.asarray(pull)
+
+
+def _step(
+    problem: Problem, z: Array, free: NDArray[np.bool_], inner: Array, pull: Array, damping: float
+) -> tuple[Array, float]:
+    """Return a step within the bounds, and by how much minus twice the likelihood falls with it to second order."""
+    low, high = problem.box
+    width = high - low
+    size = np.diag(inner) * width**2
+    damped = inner + np.diag(damping * np.maximum(size, 1e-12 * np.max(size)) / width**2)
+    move = np.zeros(len(z))
+    loose = free & ~((z <= low) & (pull > 0.0)) & ~((z >= high) & (pull < 0.0))
+    while loose.any():
+        rest = pull[loose] + inner[np.ix_(loose, ~loose)] @ move[~loose]
+        scaled = damped[np.ix_(loose, loose)] * np.outer(width[loose], width[loose])
+        move[loose] = -width[loose] * (np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) @ (width[loose] * rest))
+        beyond = loose & ((z + move < low) | (z + move > high))
+        move = np.clip(z + move, low, high) - z if beyond.any() else move
+        if not beyond.any():
+            break
+        loose &= ~beyond
+    return move, -float(2.0 * pull @ move + move @ inner @ move)
+
+
+def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[Array], list[Array]]:
+    """Return the residuals as they count, their squares summed, and how fast they grow with the residuals."""
+    if loss == "linear":
+        return list(residuals), [np.ones(len(e)) for e in residuals]
+    rho, growth = LOSSES[loss]
+    counted, factors = [], []
+    for e, n in zip(residuals, scale, strict=True):
+        u = np.maximum((e / n) ** 2, 1e-12)
+        ratio = np.sqrt(rho(u) / u)
+        counted.append(ratio * e)
+        factors.append(growth(u) / ratio)
+    return counted, factors
+
+
+def best_of(problem: Problem, fits: Sequence[Fit]) -> Fit:
+    """Return the minimum at which the recordings are met best, all samples counted alike."""
+    alike = np.ones(len(problem.signals))
+    return min(fits, key=lambda each: minus_twice_likelihood(each.residuals, alike, problem.groups))
 
 
 def information(problem: Problem, found: Fit) -> Array:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.threads import in_threads
 from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array
@@ -21,9 +18,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.studies.fingerprint import finger_digest
-from finger_pin.studies.identification.comparing import LawComparison, compare_laws
-from finger_pin.studies.identification.estimate import Fit, fit
-from finger_pin.studies.identification.intervals import Side, covariance, profile
+from finger_pin.studies.identification.estimate import LOSSES, fit
 from finger_pin.studies.identification.ledger import Ledger, digest
 from finger_pin.studies.identification.motions import RecordedMotion, windows
 from finger_pin.studies.identification.outcome import outcome, write_outcome
@@ -32,20 +27,15 @@ from finger_pin.studies.identification.problem import (
     RecordedSignal,
     RecordingModel,
     Stopped,
-    minus_twice_likelihood,
 )
 from finger_pin.studies.identification.readings import SteadyReadings
 from finger_pin.studies.identification.recordings import Recording, read_recording, unit_of
+from finger_pin.studies.identification.searching import Progress, Work, starting_points
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Called with what is being done, how much of it is finished, and how much there is.
-Progress = Callable[[str, int, int], None]
 Data = Mapping[str, Mapping[str, Any]]
-_Found = TypeVar("_Found")
-# So many places are tried for each further search, by one evaluation each.
-_TRIED = 4
 
 
 def identify(
@@ -85,7 +75,8 @@ def identify(
             kept there too, so that the same call goes on where another was stopped.
         starts: From how many points to search.
         seed: Of those points.
-        loss: ``linear``, or as of `scipy.optimize.least_squares` where outliers are to count less.
+        loss: ``linear``, or where outliers are to count less ``soft_l1``, ``huber``, ``cauchy`` or ``arctan``, as of
+            `scipy.optimize.least_squares`.
         restart: Whether to forget what the folder holds of this.
         progress: Called with what is being done, how much of it is finished, and how much there is.
         stop: Asked now and then; when it returns true the best so far is returned, attribute ``unfinished``.
@@ -101,6 +92,8 @@ def identify(
             felt by no output.
         OSError: If the folder cannot be written.
     """
+    if loss not in LOSSES:
+        raise InputError("loss", f"must be one of {', '.join(LOSSES)}", loss)
     given = {"parameters": parameters, "recordings": recordings, "compare": compare}
     entries = {name: {key: _plain(each) for key, each in table.items()} for name, table in given.items() if table}
     scenario, settings = load_bench(bench, overrides, entries)
@@ -111,8 +104,8 @@ def identify(
     problem.stop = _latched(stop or (lambda: False))
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Ledger(None if output is None else Path(output), asked, restart) as ledger:
-        work = _Work(problem, ledger, loss, progress)
-        result = _work(problem, settings, _starts(problem, starts, seed), starts, work)
+        work = Work(problem, ledger, loss, progress)
+        result = _work(problem, settings, starting_points(problem, starts, seed), starts, work)
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
             write_outcome(result, Path(output), bench, problem)
@@ -161,105 +154,11 @@ def _signal(recording: Recording, name: str, values: Array, rows: NDArray[np.int
     )
 
 
-class _Work:
-    """What is done, piece by piece; whatever is finished when it is stopped counts."""
-
-    def __init__(self, problem: Problem, ledger: Ledger, loss: str, progress: Progress | None) -> None:
-        self.problem, self.ledger, self.loss = problem, ledger, loss
-        self.tell = progress or (lambda words, done, total: None)
-        self.fits: list[Fit] = []
-        self.sides: dict[tuple[int, int], Side] = {}
-        self.spread: Array | None = None
-        self.comparison: LawComparison | None = None
-
-    @property
-    def best(self) -> Fit:
-        return min(self.fits, key=lambda each: each.objective)
-
-    def screened(self, places: Sequence[Array], count: int) -> list[Array]:
-        """Return the first place, and those of the others where the recordings are met best."""
-
-        def one(item: tuple[int, Problem]) -> float:
-            residuals = item[1].residuals(places[1 + item[0]])
-            met = all(np.isfinite(each).all() for each in residuals)
-            return minus_twice_likelihood(residuals, np.ones(len(residuals)), item[1].groups) if met else np.inf
-
-        met = self._side_by_side("trying starts", one, len(places) - 1)
-        return [places[0], *(places[1 + k] for k in np.argsort(met, kind="stable")[: count - 1])]
-
-    def search(self, starts: Sequence[Array]) -> None:
-        """Search from all starts."""
-        found: dict[int, Fit] = {}
-
-        def one(item: tuple[int, Problem]) -> None:
-            k, twin = item
-            work = partial(fit, twin, self.ledger.reached(f"start {k}", starts[k]), loss=self.loss)
-            found[k] = self.ledger.fit(f"start {k}", twin, work)
-
-        try:
-            self._side_by_side("searching", one, len(starts))
-        finally:
-            self.fits += [found[k] for k in sorted(found)]
-        if not np.isfinite(self.best.objective):
-            raise InputError(
-                "identify.recordings", "the motion fails wherever the search starts; narrow the parameters"
-            )
-        _check_felt(self.problem, [self.best.z, *starts])
-
-    def follow(self) -> None:
-        """Follow all profiles; from a lower minimum, if one turns up on the way, all over again."""
-        best = self.best
-        self.spread = covariance(self.problem, best)
-        ends = [(k, way) for k in range(self.problem.asked) for way in (-1, 1)]
-
-        def one(item: tuple[int, Problem]) -> Fit | None:
-            (k, way), twin, spread = ends[item[0]], item[1], self.spread
-            assert spread is not None
-            work = partial(profile, twin, best, k, way, spread)
-            side = self.ledger.side(f"side {k} {way} {len(self.fits)}", work)
-            if side.better is None:
-                self.sides[k, way] = side
-            return side.better
-
-        better = [each for each in self._side_by_side("following the likelihood", one, len(ends)) if each is not None]
-        if better:
-            lowest = min(better, key=lambda each: each.objective)
-            self.fits.append(fit(self.problem, lowest.z, loss=self.loss))
-            self.sides.clear()
-            self.follow()
-
-    def _side_by_side(self, words: str, task: Callable[[tuple[int, Problem]], _Found], count: int) -> list[_Found]:
-        """Do a task by number, each with a problem of its own; where runs are made, in threads."""
-        twins, finished = [self.problem.alone() for _ in range(count)], itertools.count(1)
-        self.tell(words, 0, count)
-
-        def one(item: tuple[int, Problem]) -> _Found:
-            found = task(item)
-            self.tell(words, next(finished), count)
-            return found
-
-        runs, items = any(signal.ordered for signal in self.problem.signals), list(enumerate(twins))
-        try:
-            return in_threads(one, items) if runs else [one(item) for item in items]
-        finally:
-            for twin in twins:
-                self.problem.join(twin)
-
-    def compare(self, settings: IdentifySettings) -> None:
-        """Fit other laws, if there are any."""
-        if settings.compare:
-            self.tell("comparing laws", 0, 1)
-            work = partial(compare_laws, self.problem, settings, self.best)
-            self.comparison = self.ledger.comparison(work)
-
-
-def _work(
-    problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: _Work
-) -> xr.Dataset:
+def _work(problem: Problem, settings: IdentifySettings, places: Sequence[Array], starts: int, work: Work) -> xr.Dataset:
     unfinished = ""
     try:
         work.search(work.screened(places, starts))
-        work.follow()
+        work.follow(work.best)
         work.compare(settings)
     except Stopped:
         unfinished = "interrupted: the best so far, and the intervals that are finished"
@@ -267,16 +166,7 @@ def _work(
         if not work.fits:
             reached = problem.best[1] if len(problem.best[1]) else problem.start
             work.fits.append(fit(problem, reached, held=dict(enumerate(reached))))
-    return outcome(problem, work.fits, work.sides, work.spread, work.comparison, unfinished)
-
-
-def _starts(problem: Problem, count: int, seed: int) -> list[Array]:
-    """Return the points to start from, in turn: the scenario's own numbers, and a Latin hypercube to choose from."""
-    low, high = problem.box
-    rng = np.random.default_rng(seed)
-    further = _TRIED * max(count - 1, 0)
-    cells = np.array([rng.permutation(further) for _ in low]).T + rng.uniform(size=(further, len(low)))
-    return [problem.start, *(low + (high - low) * cells / max(further, 1))]
+    return outcome(problem, work.fits, work.best, work.sides, work.spread, work.comparison, unfinished)
 
 
 def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:
@@ -289,19 +179,6 @@ def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:
         return told.is_set()
 
     return asked
-
-
-def _check_felt(problem: Problem, places: Sequence[Array]) -> None:
-    felt = np.zeros(len(problem.keys), dtype=bool)
-    for z in places:
-        for signal, slopes in zip(problem.signals, problem.slopes(z), strict=True):
-            size = max(float(np.max(np.abs(signal.measured))), 1e-300)
-            low, high = problem.box
-            felt |= np.any(np.abs(slopes) * (high - low) > 1e-9 * size, axis=0)
-        if felt.all():
-            return
-    key = problem.keys[int(np.flatnonzero(~felt)[0])]
-    raise InputError(f"identify.parameters.{key}", "no output of any recording feels it; leave it out")
 
 
 def _plain(value: Any) -> Any:

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.studies.identification.estimate import Fit, fit_beside, information
+from finger_pin.studies.identification.estimate import Fit, fit, information
 from finger_pin.studies.identification.problem import Problem
 
 #: 95 % of the chi-squared distribution with one degree of freedom.
 LEVEL = 3.841
-# Where the search for an end stops: how near to the level, and after how many fits.
-_NEAR, _MOST = 0.02, 8
+# Where the search for an end stops: so near to the level that the root of the rise is straight, or after so many fits.
+_NEAR, _MOST = 0.06, 8
+# How far below the minimum another one must be to count as one: more than a motion's own errors feign.
+_BELOW = 0.2
 # A direction is free where its standard deviation is this part of the range that was given, or more.
 _FREE = 0.25
 # Entries of a direction that are not worth a word, of the largest.
@@ -45,7 +47,7 @@ def covariance(problem: Problem, found: Fit) -> Array:
     return np.asarray(np.linalg.pinv(scaled, rcond=1e-14, hermitian=True) * np.outer(width, width))
 
 
-def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array) -> Side:
+def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss: str = "linear") -> Side:
     """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841.
 
     Args:
@@ -54,6 +56,7 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array) -> Si
         k: Which parameter.
         way: 1 for the upper end, -1 for the lower.
         spread: Covariance of z.
+        loss: As for `fit`.
     """
     low, high = problem.box
     limit = high[k] if way > 0 else low[k]
@@ -63,42 +66,39 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array) -> Si
     path = [(float(found.z[k]), 0.0)]
     reach = min(room, max(math.sqrt(LEVEL) * deviation, 1e-6 * (high[k] - low[k])))
     inner, outer = (0.0, 0.0), (math.inf, math.inf)
-    start, end = found.z.copy(), math.inf * way
-    for _ in range(_MOST):
-        if room <= 1e-9 * (high[k] - low[k]):
-            break
+    slopes: Sequence[Array] = problem.slopes(found.z)
+    there, end = found, math.inf * way
+    for _ in range(_MOST if room > 1e-9 * (high[k] - low[k]) else 0):
         at = found.z[k] + way * reach
-        guess = np.clip(start + tilt * (at - start[k]), low, high)
-        guess[k] = at
-        there = fit_beside(problem, found, guess, k)
-        rise, start = there.objective - found.objective, there.z
+        guess = np.clip(there.z + tilt * (at - there.z[k]), low, high)
+        same = {"weights": found.weights, "scale": found.noise}
+        there = fit(problem, guess, held={k: at}, loss=loss, slopes=slopes, **same)
+        slopes, rise = there.slopes or slopes, there.objective - found.objective
         path.append((at, rise))
-        if rise < -0.05:
+        if rise < -_BELOW:
             return Side(end, np.array(path), there)
-        if abs(rise - LEVEL) < _NEAR * LEVEL:
-            end = at
-            break
-        if rise < LEVEL:
+        if rise >= LEVEL:
+            outer = (reach, math.sqrt(rise))
+        else:
             inner = (reach, math.sqrt(max(rise, 0.0)))
             if reach >= room * (1.0 - 1e-12):
                 break
-        else:
-            outer = (reach, math.sqrt(rise))
-        end, reach = _next(inner, outer, room, found.z[k], way, end)
+        crossing, near = _crossing(inner, outer), abs(rise - LEVEL) < _NEAR * LEVEL
+        if near or math.isfinite(outer[0]):
+            end = found.z[k] + way * min(crossing, room)
+        if near:
+            break
+        further = 0.0 if math.isfinite(outer[0]) else max(1.2 * inner[0], 1e-6 * room)
+        reach = min(room, max(crossing, further))
     return Side(end, np.array(path))
 
 
-def _next(
-    inner: tuple[float, float], outer: tuple[float, float], room: float, z: float, way: int, end: float
-) -> tuple[float, float]:
-    """Return the best estimate of the end so far, and where to look next: the root of the rise is nearly straight."""
+def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
+    """Return where the root of the rise, nearly straight, reaches the level's, from points on either side of it."""
     target = math.sqrt(LEVEL)
     if math.isinf(outer[0]):
-        further = inner[0] * min(4.0, max(1.2, target / max(inner[1], 1e-3)))
-        return end, min(room, max(further, 1e-6 * room))
-    share = (target - inner[1]) / (outer[1] - inner[1])
-    crossing = inner[0] + share * (outer[0] - inner[0])
-    return z + way * crossing, crossing
+        return inner[0] * min(4.0, target / max(inner[1], 1e-3))
+    return inner[0] + (target - inner[1]) / (outer[1] - inner[1]) * (outer[0] - inner[0])
 
 
 def free_directions(problem: Problem, found: Fit) -> list[tuple[str, list[int]]]:

@@ -40,6 +40,8 @@ _NEAR = 0.3
 _FIRST = 9
 # Relative error of slopes: a search needs no more, and at its end residuals and slopes are nearly orthogonal.
 _ALLOWED = 1e-2
+# Tolerances where numbers are told finely, of a scenario's; never smaller than this.
+_FINER, _FINEST = 0.1, 1e-10
 # Where slopes are wilder than so many ranges of the signal, a larger change and steps of their own serve.
 _WILD, _COARSE = 30.0, 1e-3
 
@@ -81,12 +83,17 @@ class RecordedMotion:
         self.scenario = read_scenario(table)
         self._finger = finger
         self._last: tuple[Any, list[Array], tuple[Setup, Trajectory] | None] | None = None
+        self._fine = False
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return what the scenario does at the recorded times, shape (m,) for each output; not a number if it fails."""
         computed, motion = self._made(scenario, own)
         self._last = ((scenario, dict(own)), computed, motion)
         return computed
+
+    def refine(self) -> None:
+        """Integrate from now on with a tenth of the tolerances."""
+        self._fine, self._last = True, None
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of what is computed by the values, shape (m, p) for each output.
@@ -152,7 +159,7 @@ class RecordedMotion:
         """Return the outputs, not numbers if the motion fails, and the motion."""
         try:
             setup = self._setup(scenario, own)
-            trajectory = setup.integrate()
+            trajectory = setup.integrate(scenario=_finer(setup.scenario) if self._fine else None)
             failed = bool(trajectory.failure)
         except IntegrationError:
             failed = True
@@ -241,6 +248,14 @@ class RecordedMotion:
             self.own = tuple(
                 Own(f"{prefix}.{joint}", angle - _NEAR, angle + _NEAR, angle) for joint, angle in positions.items()
             )
+
+
+def _finer(scenario: Scenario) -> Scenario:
+    """Return a scenario with a tenth of its tolerances."""
+    own = scenario.simulation
+    rtol, atol = (min(each, max(_FINER * each, _FINEST)) for each in (own.rtol, own.atol_scale))
+    finer = own.model_copy(update={"rtol": rtol, "atol_scale": atol})
+    return scenario.model_copy(update={"simulation": finer})
 
 
 def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:

@@ -19,20 +19,18 @@ from finger_pin.files import replacing
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit
-from finger_pin.studies.identification.intervals import Side, free_directions
-from finger_pin.studies.identification.problem import Problem, RecordedSignal
+from finger_pin.studies.identification.intervals import LEVEL, Side, free_directions
+from finger_pin.studies.identification.problem import Problem, RecordedSignal, minus_twice_likelihood
 from finger_pin.studies.keys import describe, split
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Minima whose objective differs by less than this are the same one.
-_SAME = 1.0
-
 
 def outcome(
     problem: Problem,
     fits: Sequence[Fit],
+    best: Fit,
     sides: Mapping[tuple[int, int], Side],
     spread: Array | None,
     comparison: LawComparison | None,
@@ -41,7 +39,6 @@ def outcome(
     """Return the Dataset of an identification; what is not finished is not a number."""
     import xarray as xr
 
-    best = min(fits, key=lambda each: each.objective)
     count, keys = problem.asked, problem.keys[: problem.asked]
     free = free_directions(problem, best) if spread is not None else []
     variables: dict[str, Any] = {
@@ -59,14 +56,17 @@ def outcome(
         coordinates["law"] = comparison.law
         for name in ("parameters", "bic", "rms", "held_out"):
             variables[f"law_{name}"] = ("law", getattr(comparison, name), {"units": "1"})
-    alike = sum(each.objective < best.objective + _SAME for each in fits)
+    # What is met as well as at the ends of the intervals is the same minimum.
+    met = [minus_twice_likelihood(each.residuals, best.weights, problem.groups) for each in fits]
+    least = minus_twice_likelihood(best.residuals, best.weights, problem.groups)
+    alike = sum(each < least + LEVEL for each in met)
     attrs = {
         "scenario": problem.scenario.name,
         "undetermined": [words for words, _ in free],
         "searches": len(fits),
         "searches_alike": alike,
         "evaluations": problem.evaluations,
-        "bic": best.objective + count * math.log(max(sum(w * len(e) for e, w in _pairs(best)), 1.0)),
+        "bic": least + count * math.log(max(sum(w * len(e) for e, w in _pairs(best)), 1.0)),
     }
     attrs |= {"unfinished": unfinished} if unfinished else {}
     return xr.Dataset(variables, coordinates, attrs)

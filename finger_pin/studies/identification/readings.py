@@ -97,6 +97,9 @@ class SteadyReadings:
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
+    def refine(self) -> None:
+        """Do nothing: a closed form has no errors."""
+
     def _place(self, where: str, label: str, names: Sequence[str]) -> int:
         if label not in names:
             raise InputError(f"{self._entry}.{where}", f"there is no {label}; there are {', '.join(names) or 'none'}")
