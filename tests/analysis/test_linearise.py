@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from validation.mujoco_motion import EXPRESSIBLE
 
 import finger_pin as fp
 
@@ -46,6 +47,37 @@ def test_the_map_over_a_step_is_the_matrix_exponential_at_rest(drum):
     scale = np.abs(whole[:4]).max(axis=1, keepdims=True)
     found = np.concatenate([step.A.values, step.B.values, step.E.values], axis=1)
     np.testing.assert_allclose(found / scale, whole[:4] / scale, atol=2e-5)
+
+
+def test_the_map_over_a_step_is_what_mujoco_s_steps_near_as_they_get_shorter():
+    """Between states in motion; MuJoCo's map of a step is Euler's, of first order, and maps of many steps multiply."""
+    mujoco = pytest.importorskip("mujoco")
+    finger, dt, tensions = fp.Finger(fp.load_finger("planar", EXPRESSIBLE)), 4e-3, [4.0, 3.0, 5.0]
+    x, names = finger.rest_state(np.array([0.5, 0.6])), list(finger.layout.names)
+    kept = [name for name in names if name.startswith(("joint_position", "joint_velocity"))]
+    x[[names.index(name) for name in kept[2:]]] = [1.0, -2.0]
+    ours = fp.linearise(finger, x, tensions, dt=dt)
+    expected = np.hstack([ours.A.sel(state=kept, by_state=kept), ours.B.sel(state=kept)])
+    # In radians, and radians per step.
+    units = np.array([1.0, 1.0, dt, dt])
+    errors = []
+    for count in (16, 32, 64):
+        text = fp.to_mjcf(finger.description, timestep=dt / count, integrator="Euler", shapes=False)
+        model = mujoco.MjModel.from_xml_string(text)
+        data, whole, a, b = mujoco.MjData(model), np.eye(4, 7), np.zeros((4, 4)), np.zeros((4, 3))
+        data.qpos, data.qvel, data.ctrl = [0.5, 0.6], [1.0, -2.0], tensions
+        for _ in range(count):
+            mujoco.mjd_transitionFD(model, data, 1e-6, True, a, b, None, None)
+            mujoco.mj_step(model, data)
+            whole = a @ whole
+            whole[:, 4:] += b
+        errors.append(units[:, None] * (whole - expected) / np.concatenate([units, np.ones(3)]))
+    largest = [abs(each).max(axis=0) for each in errors]
+    assert np.all(largest[-1] < 2e-3) and np.all(abs(expected[:2, 4:]).max(axis=0) > 2e-3)
+    np.testing.assert_allclose(largest[0] / largest[1], 2.0, rtol=0.1)
+    np.testing.assert_allclose(largest[1] / largest[2], 2.0, rtol=0.05)
+    # What is of first order in the step taken out.
+    assert np.all(abs(2.0 * errors[2] - errors[1]) < 0.1 * largest[-1])
 
 
 def test_what_cannot_be_linearised_is_refused(drum):
