@@ -1,10 +1,12 @@
-"""Writes the recordings of the benches `to_and_fro` and `weights`, made up: their numbers stand in the benches."""
+"""Writes the recordings of benches that are made up; the numbers that they hide stand in the benches."""
 
 import csv
 import sys
+from typing import Any
 
 import numpy as np
 from intervals import Made, motion
+from scipy.integrate import solve_ivp
 
 COULOMB, DRAG, DELAY, TURN = 0.12, 0.4, 0.03, np.pi / 2.0
 
@@ -28,7 +30,36 @@ def weights() -> Made:
     return {"weight_kg": weight, "spool_speed_rad_s": way * speed, "current_A": current}
 
 
-MADE = {"to_and_fro": to_and_fro, "weights": weights}
+def winding() -> Made:
+    """Return four seconds of a servo, its current led to and fro, that winds a tendon against a spring."""
+    spool, drum, constant, inertia, spring = 0.008, 0.02, 0.37, 1.895e-3, 0.4
+    arm, bearing, tendon, damping = 0.02 * (0.04**2 / 3.0 + 0.01**2 / 4.0), 2e-3, 3e4, 10.0
+    dry, viscous, winding_in, paying_out, bristles = 0.012, 4.6e-3, 0.22, 0.08, 50.0
+    time = np.arange(0.0, 4.0, 0.01)
+
+    def current(at: Any) -> Any:
+        return 0.15 - 0.15 * np.cos(2.0 * np.pi * at * np.where(at < 2.0, 0.5, 1.0))
+
+    def rate(at: float, state: np.ndarray) -> list[float]:
+        angle, speed, turned, turning, friction = state
+        stretch, stretching = spool * angle - drum * turned, spool * speed - drum * turning
+        pull = max(tendon * stretch + damping * stretching, 0.0)
+        level = dry + (winding_in if speed > 0.0 else paying_out) * spool * pull
+        torque = constant * current(at)
+        return [
+            speed,
+            (torque - friction - viscous * speed - spool * pull) / inertia,
+            turning,
+            (drum * pull - spring * turned - bearing * turning) / arm,
+            bristles * (speed - friction * abs(speed) / level),
+        ]
+
+    found = solve_ivp(rate, (0.0, time[-1]), np.zeros(5), "Radau", time, rtol=1e-8, atol=1e-10, max_step=0.01)
+    step, noise = 2.0 * np.pi / 4096, np.random.default_rng(31).normal(0.0, 1e-3, time.size)
+    return {"time_s": time, "current_A": current(time), "angle_rad": step * np.round((found.y[0] + noise) / step) + 0.0}
+
+
+MADE = {"to_and_fro": to_and_fro, "weights": weights, "winding": winding}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -210,6 +210,15 @@ def test_a_loss_that_is_none_is_refused():
         found(readings(np.random.default_rng(9)), loss="square")
 
 
+def test_the_current_and_the_angle_of_a_servo_against_a_spring_tell_the_same():
+    """Integrated apart from the package: 12 mN m, 4.6 mN m s/rad, 0.22 in, 0.08 out; noise 1 mrad, 4096 steps."""
+    result = fp.identify("winding", starts=1)
+    truth = [0.012, 4.6e-3, 0.22, 0.08]
+    assert np.all((result.lower.values <= truth) & (truth <= result.upper.values)) and result.determined.all()
+    assert result.noise.values == pytest.approx([np.hypot(1e-3, 2.0 * np.pi / 4096 / np.sqrt(12.0))], rel=0.15)
+    assert np.diff(result.law_bic)[0] > 50.0
+
+
 def test_few_searches_that_agree_are_said_before_the_numbers(tmp_path):
     result = found(readings(np.random.default_rng(2)), starts=3)
     assert (result.attrs["searches"], result.attrs["searches_alike"]) == (3, 3)

@@ -5,8 +5,10 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
+from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.studies.identification.identifying import build_problem
+from finger_pin.studies.identification.motions import windows
 from finger_pin.studies.identification.problem import minus_twice_likelihood
 from finger_pin.studies.identification.recordings import read_recording
 
@@ -184,6 +186,18 @@ def test_windows_of_one_motion_are_held_out_in_turn_where_laws_are_compared():
     # What was not seen is met as well as noise allows; without the drag it is not.
     assert 0.8 < own < 1.2
     assert capstan > 1.5
+
+
+def test_windows_begin_before_what_is_compared_so_that_no_sample_but_the_first_is_lost():
+    data = ramp(np.random.default_rng(4), 0.15, 0.5)
+    settings = RecordingSettings.model_validate({**MOTION, "window": 1.0})
+    recording = read_recording("pull", settings, data)
+    parts = [recording.time[rows] for rows in windows(recording)]
+    np.testing.assert_allclose([part[0] for part in parts], [0.0, 0.8, 1.8], atol=1e-9)
+    np.testing.assert_allclose([part[-1] for part in parts], [0.99, 1.99, 2.49], atol=1e-9)
+    given = {"recordings": {"pull": {**MOTION, "window": 1.0}}, "data": {"pull": data}, "starts": 1}
+    result = fp.identify("canal", parameters=BOUNDS, **given)
+    assert result.signal_samples.values.tolist() == [230, 230]
 
 
 def test_residuals_that_follow_each_other_count_as_fewer():

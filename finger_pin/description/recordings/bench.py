@@ -51,7 +51,7 @@ class RecordingSettings(Description):
         None, unit="s", source="chosen", doc="Motion: cut into pieces of this length with starts of their own."
     )
     settle: Annotated[float, real(0.0, 1e6)] = quantity(
-        0.0, unit="s", source="chosen", doc="Motion: not compared after every start, where bristles begin relaxed."
+        0.0, unit="s", source="chosen", doc="Motion: run before what is compared, as bristles begin relaxed."
     )
 
     @model_validator(mode="after")

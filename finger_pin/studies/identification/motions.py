@@ -259,10 +259,15 @@ def _finer(scenario: Scenario) -> Scenario:
 
 
 def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:
-    """Return the rows of the windows that a recording is cut into, each with two rows at least."""
-    length = recording.settings.window
-    whole = np.arange(len(recording.time))
+    """Return the rows of the windows that a recording is cut into, each with two rows at least.
+
+    A window begins before what is compared of it by the time that bristles take to follow the motion: how they are bent
+    where it begins is not recorded, and where they slide they forget it.
+    """
+    length, time = recording.settings.window, recording.time
     if length is None:
-        return [whole]
-    number = np.floor(recording.time / length * (1.0 + 1e-12)).astype(int)
-    return [rows for rows in (whole[number == k] for k in np.unique(number)) if len(rows) > 1]
+        return [np.arange(len(time))]
+    number = np.floor(time / length * (1.0 + 1e-12)).astype(int)
+    pieces = [time[number == k] for k in np.unique(number)]
+    begun = [(piece[0] - recording.settings.settle, piece[-1]) for piece in pieces if len(piece) > 1]
+    return [np.flatnonzero((time >= first - 1e-9) & (time <= last)) for first, last in begun]

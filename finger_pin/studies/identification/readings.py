@@ -47,14 +47,12 @@ class SteadyReadings:
         for name, values in recording.inputs.items():
             variable, _, label = name.partition(".")
             if variable in ("tendon_command", "spool_tension"):
-                if np.max(values) < 0.0:
-                    pulls = "a tendon only pulls; scale = -1 turns the sign of a column"
-                    raise InputError(f"{self._entry}.inputs.{name}", f"has no tension above 0 N: {pulls}")
-                self.load[:, self._place(f"inputs.{name}", label, tendons)] = values
                 if np.any(values < 0.0):
-                    row = int(np.flatnonzero(values < 0.0)[0])
-                    allowed = f"a tendon only pulls: a tension must be at least 0 N, and is not in row {row + 1}"
-                    raise InputError(f"{self._entry}.inputs.{name}", allowed, float(values[row]))
+                    row = int(np.flatnonzero(values < 0.0)[0]) + 1
+                    hint = "" if np.any(values > 0.0) else "; scale = -1 turns the sign of a column"
+                    below = f"is below 0 N in row {row}, and a tendon only pulls{hint}"
+                    raise InputError(f"{self._entry}.inputs.{name}", below)
+                self.load[:, self._place(f"inputs.{name}", label, tendons)] = values
             elif variable == "joint_position":
                 self._position[:, self._place(f"inputs.{name}", label, joints)] = values
             else:
