@@ -199,5 +199,6 @@ def command_bounds(
     count = finger.routing.actuated
     low, high = expand(minimum, count), expand(limit, count)
     if not (np.all(low >= 0.0) and np.all(high > low)):
-        raise InputError("limit", "must be above the least tension, which must not be negative", high.tolist())
+        allowed = "must be above the least tension, which must not be negative"
+        raise InputError("maximum_tension", allowed, high.tolist())
     return [(float(a), None if np.isinf(b) else float(b)) for a, b in zip(low, high, strict=True)]

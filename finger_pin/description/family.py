@@ -67,8 +67,11 @@ class Family:
         """Return the family of a scenario in which nothing but a finger or a hand is of account.
 
         Raises:
-            InputError: If there is no such key.
+            InputError: If there is no such key, or one is not of a finger or a hand.
         """
+        for key in keys:
+            if key.partition(".")[0] not in ("finger", "hand"):
+                raise InputError(key, "does not act on a finger alone; keys begin with finger or hand")
         hand, table = description.hand, {"name": description.name, "controller": {"kind": "tensions"}}
         return cls(validate(Scenario, table | ({"hand": hand} if hand else {"finger": description}), ()), keys)
 

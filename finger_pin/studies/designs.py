@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -220,6 +220,8 @@ def _checked(values: Mapping[str, Sequence[Value]]) -> dict[str, tuple[Value, ..
     checked: dict[str, tuple[Value, ...]] = {}
     for key, given in values.items():
         split(key)
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise InputError(key, "must be given a list of values", given)
         axis = np.asarray(list(given)).tolist()
         if not axis:
             raise InputError(key, "needs at least one value")

@@ -186,7 +186,7 @@ def test_a_push_at_a_joint_s_axis_is_no_stronger_than_those_that_pass_it_on_eith
 
 
 def test_wrong_arguments_are_named(finger):
-    with pytest.raises(fp.InputError, match="limit"):
+    with pytest.raises(fp.InputError, match="maximum_tension"):
         force_polytope(finger, POSTURE, 1.0, minimum_tension=2.0)
     with pytest.raises(fp.InputError, match="friction"):
         force_polytope(finger, POSTURE, 10.0, friction=Friction.HINDERING)

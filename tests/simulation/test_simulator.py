@@ -234,6 +234,8 @@ def test_other_parameters_make_the_finger_that_is_read_with_them(simulator: Simu
     before = simulator.x
     with pytest.raises(fp.InputError, match="must be at least 0"):
         simulator.set_parameters({key: -1.0})
+    with pytest.raises(fp.InputError, match=r"controller\.gain: does not act on a finger"):
+        simulator.set_parameters({key: 0.1, "controller.gain": 2.0})
     assert np.array_equal(simulator.x, before) and simulator.finger.tendons.surface[0] == value
 
 

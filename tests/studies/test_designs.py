@@ -102,3 +102,9 @@ def test_wrong_ranges_are_told_in_one_line(text):
 def test_designs_that_are_none_are_refused(make):
     with pytest.raises(fp.InputError):
         make()
+
+
+@pytest.mark.parametrize("given", [3.0, "abc", None])
+def test_what_is_no_list_of_values_is_refused(given):
+    with pytest.raises(fp.InputError, match=r"controller\.gain.*: must be given a list of values"):
+        fp.studies.Grid({"controller.gain": given})
