@@ -152,7 +152,7 @@ def _over(finger: Finger, x: Array, u: Array, dt: float) -> _Map:
         found = integrate_compiled(stepper, dt, other.layout.names)
         if found.failure:
             raise InputError("state", f"cannot be integrated over dt: {found.failure}")
-        taken = [each.times for each in found.islands] or [found.breakpoints]
+        taken = list(found.ends) or [found.breakpoints]
         return stepper.x, taken
 
     # At rest nothing moves, and one step would do: those of a motion nearby follow what a change sets off.

@@ -87,7 +87,7 @@ def nearby(
         linear = _linear(motions, chosen, knots, changes[near], allowed)
         for k, stepper, moved in zip(near, chosen[1:], linear, strict=False):
             found[k] = replace(trajectory, interpolate=joined(stepper, moved), islands=())
-    steps = [each.times for each in motions] or [trajectory.breakpoints]
+    steps = trajectory.ends or (trajectory.breakpoints,)
 
     def again(k: int) -> Trajectory:
         return found[k] if k in found else others[k].integrate(steps=steps)

@@ -159,7 +159,9 @@ class Setup:
             stepper.drive(loop.drives.compiled)
         knots = loop.knots(settings.rtol)
         if steps is not None:
-            stepper.repeat([np.union1d(ends, knots) for ends in steps])
+            # Numbers that join what moved apart, or part it, leave the steps of all to each.
+            own = steps if len(steps) == len(stepper.parts) else [np.concatenate(steps)] * len(stepper.parts)
+            stepper.repeat([np.union1d(ends, knots) for ends in own])
         return integrate_compiled(
             stepper,
             settings.duration,

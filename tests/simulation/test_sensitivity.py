@@ -92,6 +92,19 @@ def test_of_a_sampled_controller_they_are_the_differences_of_tight_runs_too():
     assert np.max(np.abs(error)) < 1e-2 * np.max(np.abs(expected))
 
 
+def test_of_a_hand_whose_controller_is_sampled_every_finger_keeps_steps_of_its_own():
+    entries = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0, "controller.sampling": {"period": 5e-3}}
+    keys = ["hand.fingers.index.finger.tendon_friction.coulomb"]
+    prepared, exact = (
+        fp.prepare(fp.load_scenario("hand", entries | more), keys, ["joint_position"]) for more in ({}, TIGHT)
+    )
+    (value,) = prepared.values
+    slopes = prepared.run(sensitivities=True).slopes["joint_position"][0]
+    ends = [exact.run([value * (1.0 + way)])["joint_position"] for way in (1e-5, -1e-5)]
+    expected = (ends[0] - ends[1]) / (2e-5 * value)
+    assert np.sqrt(np.mean((slopes - expected) ** 2)) < 1e-2 * np.sqrt(np.mean(expected**2))
+
+
 def test_what_has_no_slope_is_refused():
     prepared = fp.prepare(fp.load_scenario("fig6", {"simulation.duration": 0.01}), ["simulation.method"])
     with pytest.raises(fp.InputError, match="single numbers"):

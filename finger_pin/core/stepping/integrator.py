@@ -153,6 +153,7 @@ def integrate_compiled(
         estimated_error=_error(stepper, recorders) if judged else np.nan,
         # Inputs that are held in between are not the core's own.
         islands=() if not known or stepper.held else tuple(steps),
+        ends=tuple(each.times for each in steps),
     )
 
 

@@ -56,6 +56,7 @@ class Trajectory:
         interrupted: Whether it was asked to stop.
         estimated_error: Of the joints' angles, root mean square over joints and time, rad; NaN where not estimated.
         islands: Motions of what moves apart, where the core computes all inputs itself; none otherwise.
+        ends: Ends of the steps of each that moves apart, s; none where all move together.
     """
 
     breakpoints: Array
@@ -65,6 +66,7 @@ class Trajectory:
     interrupted: bool = False
     estimated_error: float = np.nan
     islands: tuple[Apart, ...] = ()
+    ends: tuple[Array, ...] = ()
 
 
 def integrate(
