@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,9 @@ from matplotlib.figure import Figure
 
 from finger_pin.views.plots.lines import trace
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
 
 #: Rise of minus twice the likelihood at the ends of a 95 % interval.
 _LEVEL = 3.841
@@ -36,9 +40,8 @@ def plot_identification(result: xr.Dataset) -> Figure:
         over, label = (load, "load (N)") if by_load else (instant, "reading" if steady else "time (s)")
         unit = str(result["signal_units"].values[k])
         if steady:
-            order = np.argsort(over, kind="stable")
             met.plot(over, measured, "o", color=BLUE, markersize=3.5, alpha=0.6, label="measured")
-            met.plot(over[order], (measured - residual)[order], color=VERMILLION, label="computed")
+            _computed(met, over, measured - residual)
             left.plot(over, residual, "o", color=BLUE, markersize=3.5, alpha=0.6)
         else:
             trace(met, over, measured, color=BLUE, label="measured")
@@ -49,6 +52,17 @@ def plot_identification(result: xr.Dataset) -> Figure:
         left.set(title=f"left over, rms {result['noise'].values[k]:.3g} {unit}", xlabel=label)
     grid[0, 0].legend(loc="best")
     return figure
+
+
+def _computed(axes: Axes, over: Array, computed: Array) -> None:
+    """Draw what is computed of steady readings: a curve, or marks where one load has several, as to and fro."""
+    _, place = np.unique(over, return_inverse=True)
+    means = np.bincount(place, computed) / np.bincount(place)
+    if np.allclose(computed, means[place], rtol=0.0, atol=1e-6 * float(np.max(np.abs(computed)))):
+        order = np.argsort(over, kind="stable")
+        axes.plot(over[order], computed[order], color=VERMILLION, label="computed")
+    else:
+        axes.plot(over, computed, "_", color=VERMILLION, markersize=10.0, label="computed")
 
 
 @styled
