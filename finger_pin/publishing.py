@@ -1,4 +1,4 @@
-"""A set of files that takes the place of another at one instant, for every reader, even if a process is killed.
+"""Publication of a set of files in the place of another, at one instant for every reader, even if a process is killed.
 
 The new set is complete in a hidden folder inside the one that it is for, beside hard links to the earlier set, and a
 symbolic link ``now`` says which of the two is valid. While files change places every name in the folder leads through

@@ -1,4 +1,4 @@
-"""Levers: displacements of a gap's two bodies against each other per unit of a coordinate."""
+"""Bounds of motion: displacements of a gap's two bodies against each other per unit of a coordinate."""
 
 from __future__ import annotations
 

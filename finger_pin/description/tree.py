@@ -1,4 +1,4 @@
-"""A hand as a tree of bodies, with tendons, couplings and actuators, such as a MuJoCo model has.
+"""A hand as a tree of bodies, with tendons, couplings and actuators, such as a MuJoCo model.
 
 It stands beside the joints and tendons of a `FingerDescription`, which keep the joints' ranges and springs. Units are
 SI: of a joint that slides, angles are lengths in m and torques are forces in N. Frames and signs are MuJoCo's: a body's

@@ -1,4 +1,4 @@
-"""The reach of a compiled function: all functions that it calls, and the values that it takes for constants.
+"""Dependencies of a compiled function: all functions that it calls, and the values that it takes for constants.
 
 Code on disk holds as long as this is the same. Comments, docstrings and line numbers are not part of it.
 """

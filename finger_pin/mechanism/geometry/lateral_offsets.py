@@ -1,4 +1,4 @@
-"""Lanes: how far along each joint axis a tendon runs, so that tendons lie beside each other."""
+"""Lateral offsets of the tendons: places along the joint axes, by which they lie beside each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reach of the fingertip: images of the joint ranges under (1), with the passive tendons' constraint (4)."""
+"""Surfaces of the fingertip's workspace: images of the joint ranges by (1), with the constraint (4) of passive tendons."""
 
 from __future__ import annotations
 

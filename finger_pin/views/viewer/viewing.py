@@ -1,4 +1,4 @@
-"""Looking at a result, or at a simulation in progress, in a browser on this machine."""
+"""Views of a result, or of a simulation in progress, in a browser on this machine."""
 
 from __future__ import annotations
 
