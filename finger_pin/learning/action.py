@@ -1,4 +1,4 @@
-"""What a policy does to a finger: tensions that are held, or goals of motors in position drive."""
+"""Actions of a policy: tensions that are held, or goals of motors in position drive."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Action(LoopController):
         low: Least action, shape (k,).
         high: Largest action, shape (k,).
         given: The last action, shape (k,).
-        held: What acts now, shape (u,), N; zero before the first action, and for motors in position drive.
+        held: Present inputs, shape (u,), N; zero before the first action, and for motors in position drive.
         channels: Inputs that are voltages of motors in position drive.
     """
 
@@ -45,7 +45,7 @@ class Action(LoopController):
             kind: One of `task.ACTIONS`.
             finger: The finger.
             duration: Of an episode, s.
-            nominal: What the drives take it for: goals of joints become angles of its spools.
+            nominal: Finger that the drives assume: goals of joints become angles of its spools.
             coupling: The joints that passive tendons drive.
 
         Raises:
@@ -100,10 +100,10 @@ class Action(LoopController):
         self._waiting.append((arrival, self._goals(action)))
 
     def next_piece(self, stepper: Stepper, begin: float, end: float) -> float:
-        """Hold what has arrived; return until when it acts, s, at most until the end.
+        """Hold the inputs that have arrived; return the time until which they act, s, at most the end.
 
         Args:
-            stepper: Where to hold it.
+            stepper: Stepper that holds it.
             begin: Now, s.
             end: Of the control period, s.
         """
@@ -128,13 +128,13 @@ class Action(LoopController):
         return drives._replace(**fresh, voltages=np.zeros_like(drives.voltages))
 
     def replayed(self) -> Replayed:
-        """Return what holds the same inputs once more."""
+        """Return a controller that holds the same inputs once more."""
         return Replayed(self._begins, self._values)
 
     def command(
         self, time: Array | float, reference: ReferenceSignals, position: Array, velocity: Array
     ) -> ControlSignals:
-        """Return what is held at the present or an earlier time, or at times (m,); nothing before the first action."""
+        """Return the inputs held at the present or an earlier time, or at times (m,); zero before the first action."""
         routing = self._finger.routing
         lead = np.shape(time)
         tension, inputs = np.zeros((*lead, len(routing.tendons))), None
@@ -145,11 +145,11 @@ class Action(LoopController):
         return ControlSignals(np.zeros((*lead, len(routing.joints))), tension, inputs=inputs)
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
-        """Return what is asked for: nothing is planned for motors in position drive."""
+        """Return the commands as they are: nothing is planned for motors in position drive."""
         return control
 
     def voltages(self, time: Array | float) -> Array:
-        """Return what was held at one time, or at times (m,), by motor, V."""
+        """Return the voltages held at one time, or at times (m,), by motor, V."""
         assert self._drives is not None
         index = np.floor(np.asarray(time) / self._drives.period * (1.0 + 1e-12)).astype(int)
         held: Array = self._drives.voltages[np.clip(index, 0, len(self._drives.voltages) - 1)]
@@ -205,12 +205,12 @@ class Replayed:
     """Inputs of an episode, held again at the same times."""
 
     def __init__(self, begins: Sequence[float], values: Sequence[Array]) -> None:
-        """Take times, s, and what is held from each on."""
+        """Take times, s, and the inputs held from each on."""
         self._begins, self._values, self._next = begins, values, 0
 
     @property
     def instant(self) -> float:
-        """When the next inputs begin, s."""
+        """Time at which the next inputs begin, s."""
         return self._begins[self._next] if self._next < len(self._begins) else math.inf
 
     def act(self, x: Array) -> Array:

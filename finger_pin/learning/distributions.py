@@ -1,4 +1,4 @@
-"""What is drawn anew at every reset: numbers of a scenario, of its sensors, of its action."""
+"""Distributions of numbers that are drawn anew at every reset: of a scenario, of its sensors, of its action."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from finger_pin.exceptions import InputError
 
 
 class Distribution(Protocol):
-    """Anything that draws a number, or a name, from a generator."""
+    """A distribution of a number or a name."""
 
     def draw(self, random: np.random.Generator) -> Any:
         """Return one draw."""

@@ -45,7 +45,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """Prepare a scenario for episodes.
 
         Args:
-            scenario: What is simulated: from `load_scenario`, or the name of one, or the path of a file. Its controller
+            scenario: The scenario: from `load_scenario`, or the name of one, or the path of a file. Its controller
                 and reference do not act; the reference's start is where episodes begin. Its tolerances are those of
                 the motion.
             finger: Replaces the finger that the scenario describes, as for `fp.simulate`, and its objects where it is

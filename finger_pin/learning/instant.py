@@ -29,7 +29,7 @@ _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", 
 
 
 def instant(loop: ClosedLoop, time: float, x: Array) -> SampledMotion:
-    """Return what is known of a state, shape (size,), at a time, s."""
+    """Return the signals of a state, shape (size,), at a time, s."""
     return _motions(loop, np.array([time]), x[None], None)
 
 
@@ -53,7 +53,7 @@ class SideBySide(ClosedLoop):
 
     Attributes:
         loops: Of the worlds.
-        actions: What is done to them.
+        actions: Actions on them.
         accelerated: Whether accelerations are wanted.
     """
 
@@ -67,7 +67,7 @@ class SideBySide(ClosedLoop):
 
         Args:
             loops: Of the worlds; of all the same where they have the same numbers.
-            actions: What is done to them.
+            actions: Actions on them.
             names: Of the variables that will be asked for.
             apart: Whether every world has numbers of its own.
         """
@@ -91,7 +91,7 @@ class SideBySide(ClosedLoop):
         return not isinstance(self.dynamics, CompiledFingers)
 
     def at(self, times: Array, x: Array) -> SampledMotion:
-        """Return what is known of packed states, shape (w, size), at times (w,), s."""
+        """Return the signals of packed states, shape (w, size), at times (w,), s."""
         return _motions(self, times, x, ["joint_acceleration"] if self.accelerated else [])
 
     def force(self, time: Array | float) -> Array:

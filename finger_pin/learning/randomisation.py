@@ -1,4 +1,4 @@
-"""What is drawn at a reset, by key: numbers of the scenario, of sensors, and the delay of the action."""
+"""Draws at a reset, by key: numbers of the scenario, of sensors, and the delay of the action."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ACTING = ("finger.", "hand.", "environment.", "reference.", "simulation.initial
 
 
 class Randomisation:
-    """Distributions, sorted by what they are of.
+    """Distributions, sorted by scenario, sensors and action.
 
     Attributes:
         keys: Dotted keys of the scenario, in the order in which they are drawn.
@@ -72,7 +72,7 @@ class Randomisation:
         return {key: each.draw(random) for key, each in self._distributions.items()}
 
     def ends(self) -> Iterator[list[Any]]:
-        """Yield what stands at the keys where every distribution is at an end: all least ones, all largest ones.
+        """Yield the values at the keys with every distribution at an end: all least ones, all largest ones.
 
         Of a `Choice` all values follow each other; what another distribution may draw is not known.
         """

@@ -1,4 +1,4 @@
-"""What sensors make of the truth: noise, quantisation, an offset, and a delay of whole control periods."""
+"""Errors of sensors: noise, quantisation, an offset, and a delay of whole control periods."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Measurement:
         self._count[world] = 0
 
     def sample(self, truth: Array, worlds: NDArray[np.int64], randoms: Sequence[np.random.Generator]) -> Array:
-        """Return what is observed in some worlds; an episode's first sample stands for those before it.
+        """Return the observation in some worlds; an episode's first sample stands for those before it.
 
         Args:
             truth: In these worlds, shape (k, ...).

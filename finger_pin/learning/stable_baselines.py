@@ -65,7 +65,7 @@ class StableBaselinesEnvironment(VecEnv):
         setattr(self.worlds, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the worlds, and return what it returns once for each."""
+        """Return the result of a method of the worlds, once for each."""
         found = getattr(self.worlds, method_name)(*args, **kwargs)
         return [found for _ in self._get_indices(indices)]
 

@@ -1,4 +1,4 @@
-"""What an environment asks of a policy: action, observation, reward, end, and what is drawn at every reset."""
+"""Tasks of a policy: action, observation, reward, end, and draws at every reset."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Task:
     randomise: Mapping[str, Distribution] | str | os.PathLike[str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check what does not depend on the scenario."""
+        """Check the entries that do not depend on the scenario."""
         if self.action not in ACTIONS:
             raise InputError("action", f"must be one of {', '.join(ACTIONS)}", self.action)
         for name in ("reward", "done", "draw"):
@@ -77,7 +77,7 @@ class Task:
 
     @property
     def observed(self) -> tuple[str, ...]:
-        """Names of what is observed, in order, before what is drawn for an episode."""
+        """Names of the observed signals, in order, before those drawn for an episode."""
         return tuple(self._observed)
 
     @cached_property
@@ -86,7 +86,7 @@ class Task:
         return {name: each for name, each in self._observed.items() if isinstance(each, Sensor)}
 
     def derive(self, told: Signals, worlds: int) -> dict[str, Array]:
-        """Return what is computed of what sensors show and of what was drawn, by name, shapes (worlds, ...).
+        """Return the task's own signals, of readings and of draws, by name, shapes (worlds, ...).
 
         Raises:
             InputError: If a function returns another shape, or what is not finite.
@@ -141,7 +141,7 @@ def per_world(function: Callable[[Signals], Any]) -> Function:
 
 
 def _told(name: str, function: Function, signals: Signals) -> ArrayLike:
-    """Return what a function makes of signals; refuse one that asks for what is not among them."""
+    """Return the result of a function of signals; refuse one that asks for a name that is not among them."""
     try:
         return function(signals)
     except KeyError as error:
@@ -160,7 +160,7 @@ def _numbers(name: str, value: Any) -> Array:
 
 
 def _shaped(name: str, function: Function, signals: Signals, worlds: int) -> Array:
-    """Return what a function makes of signals, one number per world."""
+    """Return the result of a function of signals, one number per world."""
     found = _numbers(name, _told(name, function, signals))
     if found.shape != (worlds,):
         allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front; see per_world"

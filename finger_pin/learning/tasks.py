@@ -71,7 +71,7 @@ def to_goal(signals: Signals) -> Array:
 
 
 def missing_force(signals: Signals) -> Array:
-    """Return what the wanted force is more than all contacts press, shape (worlds, 1), N."""
+    """Return the wanted force less that of all contacts, shape (worlds, 1), N."""
     return np.asarray(signals["wanted_force"] - signals["contact_normal_force"].sum(axis=-1, keepdims=True))
 
 

@@ -38,7 +38,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """Prepare worlds.
 
         Args:
-            num_envs: How many.
+            num_envs: Number of worlds.
             scenario: As for `Environment`.
             finger: As for `Environment`.
             render_mode: As for `Environment`.

@@ -1,4 +1,4 @@
-"""One world of an environment: a scenario in steps, and what is drawn for an episode."""
+"""One world of an environment: a scenario in steps, and the draws of an episode."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import nearest
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
 from finger_pin.learning.instant import instant, known_variables
@@ -44,12 +44,12 @@ class World:
     """One world.
 
     Attributes:
-        task: What is asked of the policy.
+        task: The task of the policy.
         origin: The scenario's own loop, whose controller does not act.
-        action: What acts in its place.
-        stepper: What moves.
-        drawn: What was drawn for the episode: numbers by key, and what the task draws.
-        context: What the task has drawn of it.
+        action: Action that acts in its place.
+        stepper: Its stepper.
+        drawn: Draws of the episode: numbers by key, and those of the task.
+        context: Draws of the task.
         sensors: The sensors of the episode.
         reason: Why the motion cannot go on; empty if it can.
         now: Simulated time that the motion has reached, s.
@@ -98,14 +98,13 @@ class World:
         known = known_variables(world.origin)
         for name in task.variables:
             if name not in known:
-                near = nearest(name, known)
-                hint = f"; did you mean {near}?" if near else ""
+                hint = suggestion(name, known)
                 entry = "observation" if name in task.sensors else "privileged"
                 raise InputError(entry, f"no such variable; there are {', '.join(known)}{hint}", name)
         return world
 
     def twin(self) -> World:
-        """Return another world of the same scenario and task; all share what no reset draws anew."""
+        """Return another world of the same scenario and task; all share the parts that no reset draws anew."""
         origin = None if self._randomisation.keys else self.origin
         return World(self._family, self.task, self._randomisation, self._given, origin)
 
@@ -115,7 +114,7 @@ class World:
         return bool(self._randomisation.keys)
 
     def _build(self, scenario: Scenario, origin: ClosedLoop | None = None) -> None:
-        """Build what moves, under inputs that are held."""
+        """Build the loop, under inputs that are held."""
         if origin is None:
             finger = self._given
             if self._nominal is not None:
@@ -131,7 +130,7 @@ class World:
 
     @property
     def loop(self) -> ClosedLoop:
-        """What moves, with the actions in the place of its controller."""
+        """The loop, with the actions in the place of its controller."""
         driven = self.action if self.action.compiled is not None else None
         return replace(self.origin, controller=self.action, drives=driven)
 
@@ -185,7 +184,7 @@ class World:
         self.action.begin(self._randomisation.delay(self.drawn, task.delay))
 
     def _context(self) -> dict[str, Array]:
-        """Return what the task draws for an episode, by name."""
+        """Return the task's draws for an episode, by name."""
         if self.task.draw is None:
             return {}
         drawn = self.task.draw(self._random)
@@ -231,14 +230,14 @@ class World:
         self.action.take(action, self.time)
 
     def next_end(self) -> float:
-        """Hold what acts now, and return until when, s; `RESTING` where the period is over."""
+        """Hold the inputs that act now, and return the time of their end, s; `RESTING` where the period is over."""
         end = (self._step + 1) * self.task.period
         if self.reason or self.now >= end:
             return RESTING
         return self.action.next_piece(self.stepper, self.now, end)
 
     def reach(self, end: float, status: int) -> None:
-        """Take note of how a stepper ended a piece."""
+        """Note the status with which a stepper ended a piece."""
         self.now = end
         if status:
             self.now = self.stepper.time
@@ -264,7 +263,7 @@ class World:
         return found
 
     def picture(self) -> NDArray[np.uint8]:
-        """Return a picture of the present posture, seen from where all postures are in view, of bytes."""
+        """Return a picture of the present posture, from a point with all postures in view, of bytes."""
         method = self._scenario.simulation.method
         motions = instant(self.loop, self.stepper.time, self.stepper.x)
         found = record(self._scenario, motions, method, list(known_variables(self.origin)))

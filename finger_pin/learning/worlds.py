@@ -1,4 +1,4 @@
-"""Worlds of one scenario side by side: what is done to all of them, and what is seen of all of them, at once."""
+"""Worlds of one scenario side by side, stepped and observed at once."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Worlds:
     """Some worlds; arrays have them in front.
 
     Attributes:
-        task: What is asked of the policy.
+        task: The task of the policy.
         each: The worlds.
     """
 
@@ -52,7 +52,7 @@ class Worlds:
         self._variables = {name: known[name] for name in self.task.variables}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but what computes the variables, which are functions without names of their own."""
+        """Return all but the functions of the variables, which have no names of their own."""
         return {name: value for name, value in self.__dict__.items() if name != "_variables"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -116,7 +116,7 @@ class Worlds:
             each[i].end_period()
 
     def observe(self, places: _Places) -> tuple[NDArray[np.float32], dict[str, Array]]:
-        """Return what policies see in some worlds, shape (k, o), and the truth in all by name, shapes (w, ...).
+        """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
 
         Raises:
             InputError: If a function that is observed returns another shape, or what is not finite.
@@ -137,7 +137,7 @@ class Worlds:
 
     @property
     def over(self) -> NDArray[np.bool_]:
-        """Where the episode is truncated, shape (w,)."""
+        """A mask of the worlds whose episode is truncated, shape (w,)."""
         return np.array([world.over for world in self.each])
 
 
@@ -159,7 +159,7 @@ def read_actions(actions: Any, space: Box) -> Array:
 
 
 def read_render_mode(mode: str | None) -> str | None:
-    """Return how pictures are asked for.
+    """Return the mode of pictures.
 
     Raises:
         InputError: If there is no such way.

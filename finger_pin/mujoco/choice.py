@@ -1,4 +1,4 @@
-"""What users say of which tendons and joints: names with stars, keys of the descriptions, checked as these are."""
+"""Selections of tendons and joints: names with stars, keys of the descriptions, checked as these are."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from fnmatch import fnmatchcase
 from typing import Annotated, Any
 
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.validation import Description, nearest, quantity, real, validate
+from finger_pin.description.validation import Description, quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
 
 
 class RoutedFriction(TendonFrictionSettings):
-    """Law (9) for a tendon, and by how much its path turns."""
+    """Law (9) for a tendon, and the turn of its path."""
 
     curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
         0.0, unit="rad", source="(15)", doc="phi_off, the turn that the model does not show."
@@ -42,8 +42,7 @@ def choose(
             raise InputError(f"{entry}.{pattern}", "must be a table of keys", keys)
         matching = [name for name in names if fnmatchcase(name, pattern)]
         if not matching:
-            near = nearest(pattern, names)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(pattern, names)
             raise InputError(f"{entry}.{pattern}", f"matches none of {', '.join(names) or 'no names'}{hint}")
         for key, value in validate(kind, dict(keys), (entry, pattern)):
             if isinstance(value, tuple) and key != "bends":

@@ -26,7 +26,7 @@ _T3, _T5, _T7, _T9, _T11, _T13, _T15, _T17, _T19 = (1.0 / k for k in range(3, 20
 
 @numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
 def exponential(x: Any) -> Any:
-    """Return exp(x) of x <= 0 to 4e-16 of it: by 2^n and Taylor's series of what is left, at most ln 2 / 2."""
+    """Return exp(x) of x <= 0 to 4e-16 of it: by 2^n and Taylor's series of the rest, at most ln 2 / 2."""
     x = _LEAST if x < _LEAST else x
     rounded = x * _PER_LN2 + _ROUND
     n = rounded - _ROUND

@@ -27,7 +27,7 @@ from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, 
 def tendon(
     m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
 ) -> Any:
-    """Return speed, tension, what presses, the most that holds it back, and turn of a tendon: (14). See `lanes`."""
+    """Return speed, tension, normal force, largest friction and turn of a tendon: (14). See `lanes`."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)
@@ -65,7 +65,7 @@ def _turn(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, tendon: Any) -> 
 
 @compiled
 def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -> Any:
-    """Return speed, load, what presses, most and turn of a slide that is a passive tendon's mass: (14c)."""
+    """Return speed, load, normal force, largest friction and turn of a slide that is a passive tendon's mass: (14c)."""
     p, objects, types = (
         numbers(m, at.tuple_objprm, e),
         integers(m, at.tuple_objid, e),
@@ -86,7 +86,7 @@ def mass(m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, reactions: Any) -
 
 @compiled
 def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> Any:
-    """Return speed, load, what presses, most and turn of a joint's pin: (17)."""
+    """Return speed, load, normal force, largest friction and turn of a joint's pin: (17)."""
     joint = integer_in(m, at.tuple_objid, e)
     dof = integer_in(m, at.jnt_dofadr, joint)
     speed, load = number_in(d, of.qvel, dof), reactions[dof]
@@ -100,7 +100,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> 
 
 @compiled
 def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
-    """Return e_j: from the joint before to this one, or the x axis of what carries it where there is none."""
+    """Return e_j: from the joint before to this one, or the x axis of its carrier where there is none."""
     parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)
     anchor, own = numbers(d, of.xanchor), integer_in(m, at.jnt_bodyid, joint)
     body = parent[own]

@@ -1,4 +1,4 @@
-"""The frictions of a compiled MuJoCo model: what they rub on, in which row of the solver, and what loads them."""
+"""The frictions of a compiled MuJoCo model: their elements, rows of the solver, and loads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Law (9) in MuJoCo's solver: what the plugin's callbacks compute.
+"""Law (9) in MuJoCo's solver: the callbacks of the plugin.
 
 The solver's row of a friction exerts -clip(F - x + (c + b) v', +-L) with v and v' the speed before and after the step:
 F is the bristles' force F^s, c = s0 dt, so that bristles which stick are stepped by Euler's implicit method, stable at
@@ -109,7 +109,7 @@ def init(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> Any:
 
 @compiled
 def copy(to: Any, d: Any, instance: Any, of: Any) -> None:
-    """Copy what `init` has noted."""
+    """Copy the notes of `init`."""
     words(to, of.plugin_data)[instance] = words(d, of.plugin_data)[instance]
 
 
@@ -189,7 +189,7 @@ def _start(m: Any, at: Any, key: Any, instance: Any) -> Any:
 
 @compiled
 def advance(m: Any, d: Any, instance: Any, at: Any, of: Any, contact: Any, kinds: Any) -> None:
-    """Move bristles by (9a), and note what the solver has found: the force of each friction, what will load it next."""
+    """Move bristles by (9a), and note the solver's force of each friction, and its next load."""
     key, width = words(d, of.plugin_data)[instance], size(m, at.nv)
     e, end = _entries(m, at, key >> 32)
     z, x, place = _start(m, at, key, instance)

@@ -79,7 +79,7 @@ def exerted(x: Any, dt: Any) -> None:
 
 @compiled
 def slid(force: Any, moved: Any, level: Any) -> Any:
-    """Return F^s by (9a) after a way s0 v dt at this speed and level, exactly, and how much of it is left."""
+    """Return F^s by (9a) after a way s0 v dt at this speed and level, exactly, and the share of it that is left."""
     steady, decay = math.copysign(level, moved), exponential(-abs(moved) / level)
     return steady + (force - steady) * decay, decay
 

@@ -1,4 +1,4 @@
-"""Where MuJoCo keeps its numbers: offsets in mjModel, mjData and mjContact, for the version at hand.
+"""Memory of MuJoCo: offsets in mjModel, mjData and mjContact, for the version at hand.
 
 They follow from the tables that MuJoCo ships (`mujoco.introspect`) by the rules of C, and are compared with the
 addresses that NumPy sees, so that a version with another layout is refused in one line.

@@ -1,4 +1,4 @@
-"""What loads frictions in MuJoCo: actuators and springs of this step, the solver's forces of the last."""
+"""Loads of frictions in MuJoCo: actuators and springs of this step, the solver's forces of the last."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from finger_pin.mujoco.memory import (
 
 @compiled
 def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any) -> None:
-    """Add what actuators exert along tendons, N, and on degrees of freedom, N m or N, within their limits.
+    """Add the actuators' forces along tendons, N, and on degrees of freedom, N m or N, within their limits.
 
     MuJoCo clamps forces after plugins have been asked, so that they are clamped here.
     """
@@ -100,7 +100,7 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
 
 @compiled
 def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> None:
-    """Add what limits and equalities exert along tendons, N, by the solver's last forces."""
+    """Add the forces of limits and equalities along tendons, N, by the solver's last forces."""
     kind, which, force = integers(d, of.efc_type), integers(d, of.efc_id), numbers(d, of.efc_force)
     couples, first, second = integers(m, at.eq_type), integers(m, at.eq_obj1id), integers(m, at.eq_obj2id)
     for r in range(integer(d, of.nefc)):
@@ -114,7 +114,7 @@ def held_tensions(m: Any, d: Any, at: Any, of: Any, kinds: Any, found: Any) -> N
 
 @compiled
 def contact_loads(m: Any, d: Any, at: Any, of: Any, contact: Any, kinds: Any, place: Any, act: Any) -> None:
-    """Add the contact forces on what lies beyond joints, world frame, N: ``place`` says where in act, or is 0."""
+    """Add the contact forces on bodies beyond joints, world frame, N: ``place`` is the index in act, or 0."""
     first = size(d, of.contact)
     parent, carrier = integers(m, at.body_parentid), integers(m, at.geom_bodyid)
     joints, count = integers(m, at.body_jntadr), integers(m, at.body_jntnum)

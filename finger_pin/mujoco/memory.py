@@ -32,7 +32,7 @@ def _viewer(kind: Any) -> Any:
 
 
 def _loader(kind: Any) -> Any:
-    """Return a function that reads one number at an address: arrays cost more than what is done with their numbers."""
+    """Return a function that reads one number at an address: arrays cost more than the use of their numbers."""
 
     @_intrinsic
     def load(typing_context: Any, address: Any) -> Any:
@@ -57,7 +57,7 @@ def scratch(typing_context: Any, count: Any) -> Any:
 
 @_intrinsic
 def two_to_the(typing_context: Any, rounded: Any) -> Any:
-    """Return 2^n of what has the integer n in its last bits, as bits of a number's exponent."""
+    """Return 2^n of a number with the integer n in its last bits, as bits of its exponent."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = context.get_value_type(_types.int64)

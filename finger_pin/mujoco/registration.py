@@ -37,14 +37,14 @@ class _Plugin(ctypes.Structure):
 
 
 def _fingerprint() -> str:
-    """Return a hash of the files that callbacks come from: numba sees one of them, not what it calls."""
+    """Return a hash of the files that callbacks come from: numba sees one of them, not those that it calls."""
     modules = (kernel, elements, elementary, lanes, loads, memory, rows, table, bristle, capstan)
     texts = (Path(str(each.__file__)).read_bytes() for each in modules)
     return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
 def _compiled(at: Any, of: Any, contact: Any, kinds: Any, made_of: str) -> dict[str, Any]:
-    """Return the callbacks. Offsets are constants of theirs, and numba keeps what it compiles by them."""
+    """Return the callbacks. Offsets are constants of theirs, and numba keeps compiled code by them."""
     word, whole, nothing = types.intp, types.int32, types.void
     options: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 

@@ -1,4 +1,4 @@
-"""The solver's rows of friction: what is written into them, and what the solver has found of them."""
+"""The solver's rows of friction: limits that are written, and forces that are read."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _diagonal(m: Any, d: Any, at: Any, of: Any, kinds: Any, r: Any, nefc: Any) -
 
 @compiled
 def row_forces(m: Any, d: Any, at: Any, of: Any, kinds: Any, width: Any, found: Any) -> None:
-    """Note what the solver's rows of friction take, by degree of freedom and tendon."""
+    """Note the forces of the solver's rows of friction, by degree of freedom and tendon."""
     ne = integer(d, of.ne)
     for r in range(ne, ne + integer(d, of.nf)):
         row = integer_in(d, of.efc_id, r)

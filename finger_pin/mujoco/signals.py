@@ -1,4 +1,4 @@
-"""What frictions in a MuJoCo model do at present, as arrays of MuJoCo's own memory."""
+"""Present signals of frictions in a MuJoCo model, as arrays of MuJoCo's own memory."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Signals:
 
     Attributes:
         names: Of the tendons and joints, shape (k,).
-        level: What steady sliding settles at, by the speed and load of the last step.
-        friction: What the last step took, along the tendon's length or the joint's coordinate, against the motion.
+        level: Friction of steady sliding, by the speed and load of the last step.
+        friction: Friction of the last step, along the tendon's length or the joint's coordinate, against the motion.
         bristle: F^s of (9a), the part of it that is elastic.
-        tension: What loads it, N: of a tendon its tension, of a joint the reaction (17).
+        tension: Its load, N: of a tendon its tension, of a joint the reaction (17).
         turn: phi, rad, of a tendon.
     """
 

@@ -1,8 +1,7 @@
-"""Warnings about a run: its own error, masses that ring in it, and memory that it does not fit into."""
+"""Warnings about a run: its own error, masses that ring in it, and contacts too stiff for it."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
@@ -13,8 +12,7 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario, SimulationSettings
-from finger_pin.exceptions import InputError
+from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
 from finger_pin.laws.contact import CONTACT
 from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.finger import Finger
@@ -71,9 +69,9 @@ class Attempt:
     Attributes:
         scenario: With the tolerances that it took.
         trajectory: Its solution.
-        result: What was recorded of it.
+        result: Its Dataset.
         left: Which share of the energy its account leaves open (`left_open`).
-        coarser: What it replaces, if it is a repetition.
+        coarser: Run that it replaces, if it is a repetition.
     """
 
     scenario: Scenario
@@ -95,7 +93,7 @@ def close_account(
     result says at which tolerances it ran.
 
     Args:
-        scenario: What was simulated.
+        scenario: The scenario of the run.
         trajectory: Its solution.
         repeated: Integrates the scenario with other tolerances until it is asked to stop.
         recorded: Makes the result of a trajectory.
@@ -125,7 +123,7 @@ def close_account(
 def estimate_error(
     scenario: Scenario, run: Attempt, repeated: Callable[[Scenario, Stop], Trajectory], *, margin: float
 ) -> tuple[float, str]:
-    """Return a run's error, rad rms over joints and time, and what to say if it is worse than expected; else empty.
+    """Return a run's error, rad rms over joints and time, and a warning if it is worse than expected; else empty.
 
     Of objects it is that of their turns and places, rad and m, where that is larger.
 
@@ -135,8 +133,8 @@ def estimate_error(
     as of a motion that impacts make chaotic, the error is not a number.
 
     Args:
-        scenario: What was asked for.
-        run: What was simulated.
+        scenario: The scenario asked for.
+        run: The run of it.
         repeated: Integrates the scenario with other tolerances until it is asked to stop.
         margin: Of the joints' friction to what locks the finger; infinite where not known.
     """
@@ -229,25 +227,6 @@ def open_account(result: xr.Dataset, share: float) -> str:
     )
 
 
-def finite_part(result: xr.Dataset) -> tuple[xr.Dataset, str]:
-    """Return a result up to its first sample that is not finite, and the first variable that is not, else empty."""
-    length, excess = result.sizes["time"], ""
-    for name in result.data_vars:
-        values = result.variables[name].values
-        # The sum alone tells in most cases.
-        if np.isfinite(np.sum(values)):
-            continue
-        finite = np.isfinite(values)
-        if not finite.all():
-            first = int(np.argmin(finite.reshape(len(values), -1).all(axis=1)))
-            if first < length:
-                length, excess = first, str(name)
-    if excess:
-        result = result.isel(time=slice(max(length, 1)))
-        result.attrs["end_time"] = float(result["time"][-1])
-    return result, excess
-
-
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
     """Return the mass that rings undamped where a run took many short steps, with its frequency; else empty.
 
@@ -274,7 +253,7 @@ def too_stiff(result: xr.Dataset, finger: Finger, tolerance: float) -> str:
     """Return the warning if bodies have touched whose contact is too stiff for the tolerance; else empty.
 
     Args:
-        result: What happened.
+        result: Dataset of the run.
         finger: The finger.
         tolerance: Of the joints' angles, rad: a tenth of that, m, at what they carry.
     """
@@ -300,22 +279,3 @@ def _jacobian(loop: ClosedLoop, time: float, x: Array, scales: Array) -> Array:
         (loop.rhs(time, x + step) - loop.rhs(time, x - step)) / (2.0 * step[i]) for i, step in enumerate(np.diag(steps))
     ]
     return np.array(columns).T / scales[:, None] * scales
-
-
-def check_memory(settings: SimulationSettings, finger: Finger) -> None:
-    """Refuse a result that cannot fit into the machine's memory.
-
-    Raises:
-        InputError: Naming the sample rate.
-    """
-    samples = settings.duration * settings.sample_rate
-    # Every signal of a result, and what it is computed from: measured, 3.5 kB a sample of fig6 and 19 kB of pinch.
-    rows = sum(table.count for table in finger.mechanism.rows)
-    needed = samples * 8.0 * (25 * rows + 3 * finger.layout.size)
-    present = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else np.inf
-    if needed > present:
-        allowed = (
-            f"{samples:.3g} samples need about {needed / 2**30:.3g} GiB of memory, of which there are "
-            f"{present / 2**30:.3g}; must be at most {settings.sample_rate * present / needed:.3g}"
-        )
-        raise InputError("simulation.sample_rate", allowed, settings.sample_rate)

@@ -27,7 +27,7 @@ _CONTACT, _SPACE = ("time", "contact"), ("time", "contact", "axis")
 
 
 def contact_variables(finger: Finger) -> Variables:
-    """Return dimensions, units and names of what contacts and free objects do; nothing without surroundings."""
+    """Return the variables of contacts and free objects; none without surroundings."""
     around = finger.surroundings
     if around is None:
         return {}

@@ -1,4 +1,4 @@
-"""Does a result depend on its tolerance? The run repeated at a tighter one, and where the two part."""
+"""Convergence of a result: the run repeated at a tighter tolerance, and the time at which the two part."""
 
 from __future__ import annotations
 
@@ -135,11 +135,11 @@ def check_convergence(
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,
 ) -> Convergence:
-    """Repeat a run at a tighter tolerance, and find how far and where the two part.
+    """Return the difference of a run to its repetition at a tighter tolerance, and the time at which they part.
 
     Args:
-        scenario: What was or is to be simulated, its name, or the path of a file.
-        result: What `simulate` returned for it; simulated now by default.
+        scenario: The scenario, simulated already or now, its name, or the path of a file.
+        result: Dataset of `simulate` for it; simulated now by default.
         factor: By which both tolerances are divided.
         limit: Joints that differ by more than this have parted, rad.
         controller: As for `simulate`.

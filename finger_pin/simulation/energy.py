@@ -1,4 +1,4 @@
-"""The energy account: where the energy is, where it enters and where it goes.
+"""The energy account: energies stored, supplied and lost, by name.
 
     d/dt (kinetic + gravity + what the rows store) = supplied by rows + fingertip force - lost in rows
 
@@ -36,7 +36,7 @@ class Flows:
 
     Attributes:
         values: By name, shape (..., f).
-        booked: What the f of them are.
+        booked: Energies and powers of the f of them.
     """
 
     values: Array
@@ -97,7 +97,7 @@ def entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:
     """Return the energies in a result's account, J, that are of some kinds: stored, supplied or lost.
 
     Args:
-        result: What `simulate` returned.
+        result: Dataset of `simulate`.
         kinds: Of `mechanism.books`.
 
     Returns:

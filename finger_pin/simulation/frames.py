@@ -22,7 +22,7 @@ def in_world(result: xr.Dataset) -> xr.Dataset:
     Places gain the palm's, velocities of objects what the palm's motion adds; all else is turned.
 
     Args:
-        result: What `simulate` returned or saved, with the four variables of its palm if that moves.
+        result: Dataset that `simulate` returned or saved, with the four variables of its palm if that moves.
 
     Raises:
         InputError: If it is a result of a palm that moves, and lacks one of these.
@@ -69,6 +69,6 @@ class _Palm:
 
     @staticmethod
     def _each(values: Array, change: Callable[[Array], Array]) -> Array:
-        """Change vectors or quaternions, shape (m, ..., k), at all samples, for each of what there are several."""
+        """Change vectors or quaternions, shape (m, ..., k), at all samples, for each of several items."""
         flat = values.reshape(len(values), -1, values.shape[-1])
         return np.stack([change(flat[:, k]) for k in range(flat.shape[1])], axis=1).reshape(values.shape)

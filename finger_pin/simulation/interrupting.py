@@ -1,4 +1,4 @@
-"""Ctrl-C in a script or notebook: what runs ends where it is, and what has been computed is kept."""
+"""Ctrl-C in a script or notebook: the run ends where it is, and its result so far is kept."""
 
 from __future__ import annotations
 

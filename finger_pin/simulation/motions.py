@@ -38,7 +38,7 @@ class SampledMotion:
             loop: The system.
             trajectory: Its solution.
             times: Shape (m,), in order, s.
-            names: What will be asked for, as names of `variables`; by default all.
+            names: Names of `variables` that will be asked for; by default all.
         """
         self._accelerated = names is None or "joint_acceleration" in names
         self.loop, self.trajectory = loop, trajectory
@@ -71,7 +71,7 @@ class SampledMotion:
 
     @cached_property
     def signals(self) -> LoopSignals:
-        """Everything that the finger does."""
+        """All signals of the finger."""
         return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
 
     @property

@@ -20,8 +20,8 @@ def notebook_bar(unit: str, total: float | None = None) -> Callable[..., None] |
     """Return the function that moves a bar in a notebook; None elsewhere.
 
     Args:
-        unit: What is counted, such as ``s``.
-        total: How much there will be; without it the last number of every call says so.
+        unit: Unit of the count, such as ``s``.
+        total: The whole count; by default the last number of every call.
 
     Returns:
         To be called with how much is done.

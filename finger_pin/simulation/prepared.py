@@ -18,7 +18,7 @@ from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import nearest
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
@@ -54,7 +54,7 @@ def prepare(
         print(run.time, run["joint_position"], run.units("joint_position"))
 
     Args:
-        scenario: What to simulate, its name, or the path of a file.
+        scenario: The scenario to simulate, its name, or the path of a file.
         parameters: Dotted keys, as of `load_scenario`, whose values every run is given; ``[2]`` at the end of one
             stands for one number of a list, a star for every name.
         record: The variables of the result that runs return, by their names in a Dataset.
@@ -78,7 +78,7 @@ class Prepared:
     """
 
     def __init__(self, family: Family, record: tuple[str, ...], finger: Finger | None = None) -> None:
-        """Build what the runs share; use `prepare`."""
+        """Build the parts that the runs share; use `prepare`."""
         self.family, self.record, self._given = family, record, finger
         loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
         refuse_unknown("record", record, variables(loop))
@@ -89,7 +89,7 @@ class Prepared:
         self._bindings: list[Bindings] = []
 
     def __repr__(self) -> str:
-        """Return the scenario, what may be changed of it, and what is recorded."""
+        """Return the scenario, the keys that may be changed, and the variables recorded."""
         given = [f"{key}={value!r}" for key, value in zip(self.parameters, self.values, strict=True)]
         return f"Prepared({', '.join([self.family.scenario.name, *given])}; records {', '.join(self.record)})"
 
@@ -119,7 +119,7 @@ class Prepared:
         stop: Stop | None = None,
         sensitivities: bool = False,
     ) -> RunArrays:
-        """Simulate, and return what is recorded, and no more: bit for bit as in the result of `simulate`.
+        """Simulate, and return the recorded variables alone: bit for bit as in the result of `simulate`.
 
         Nothing is judged: whether the energy account closes, or how large the error is, `simulate` says.
 
@@ -233,8 +233,7 @@ def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> No
     known = list(known)
     for name in names:
         if name not in known:
-            near = nearest(name, known)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(name, known)
             raise InputError(entry, f"the result has no such variable; it has {', '.join(known)}{hint}", name)
 
 

@@ -1,4 +1,4 @@
-"""A quantity that a result can have: its dimensions, unit, name and equation, and how it follows from a motion."""
+"""A quantity of a result: its dimensions, unit, name and equation, and its function of a motion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Quantity(NamedTuple):
         long_name: In words.
         equation: Number of its equation in the paper; empty for none.
         frame: Whose axes its components are along, `BASE_FRAME` or `WORLD_FRAME`; empty for what has none.
-        booked: What it is of the energy account, if it belongs there.
+        booked: Its part in the energy account, if any.
     """
 
     dims: tuple[str, ...]
@@ -36,7 +36,7 @@ class Quantity(NamedTuple):
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Unit, name, frame and equation, and what it is of the account."""
+        """Unit, name, frame and equation, and its part in the account."""
         found = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
         if self.booked is not None:
             found |= {"account": self.booked.kind, "label": self.booked.label}

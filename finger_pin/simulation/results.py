@@ -39,7 +39,7 @@ class ResultFolder:
 
     Attributes:
         path: The folder.
-        stage: Where to write; it has the layout of the folder.
+        stage: Temporary folder with the layout of the final one.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -83,7 +83,7 @@ class ResultFolder:
         save(result, self.stage / "trajectory.nc")
 
     def publish(self) -> None:
-        """Put what is in the stage into place, and what an earlier run left out of the way, at one instant.
+        """Put the files of the stage in the place of an earlier run's, at one instant.
 
         Raises:
             OSError: If a file cannot be written; the earlier results are then in place.
@@ -109,11 +109,11 @@ class ResultFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Remove what is left of the stage."""
+        """Remove the rest of the stage."""
         self.discard()
 
     def _refuse_foreign(self) -> None:
-        """Raise where writing here would replace files that no run wrote."""
+        """Refuse to replace files that no run wrote."""
         given = str(self.path)
         for folder in (self.path, self.path / _FIGURES):
             if folder.exists() and not folder.is_dir():

@@ -21,7 +21,7 @@ class RunArrays:
     Attributes:
         variables: Dimensions, of which time is the first, values and attributes, by name.
         coordinates: Likewise, or the values alone.
-        attrs: How far the run went, and what it took.
+        attrs: End, cost and settings of the run.
         slopes: Derivatives of the variables by the values that the run was given, shape (p, ...), if they were asked
             for.
     """

@@ -27,16 +27,14 @@ from finger_pin.exceptions import (
 )
 from finger_pin.simulation.accuracy import (
     CHUNK,
-    check_memory,
     close_account,
     estimate_error,
-    finite_part,
     open_account,
     ringing,
     too_stiff,
 )
 from finger_pin.simulation.motions import SampledMotion
-from finger_pin.simulation.recording import record
+from finger_pin.simulation.recording import check_memory, finite_part, record
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
 
 if TYPE_CHECKING:
@@ -57,9 +55,9 @@ def run(
     """Simulate as `simulate` does, given the loop; Ctrl-C is left to the caller.
 
     Args:
-        scenario: What to simulate.
+        scenario: The scenario to simulate.
         loop: Its loop, where something in it is a user's own.
-        own: What that is, as `own_parts` says.
+        own: Names of the parts given in place of the scenario's, from `own_parts`.
         control_period: As for `simulate`, like what follows.
         progress: Called with the simulated time, s.
         observe: Called with the simulated time, s, and all signals.
@@ -114,7 +112,7 @@ def run(
 
 
 def _whole(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) -> xr.Dataset:
-    """Return a result of a run that reached its end; raise with what there is of any other."""
+    """Return the result of a run that reached its end; raise with the partial result of any other."""
     reached = float(trajectory.breakpoints[-1])
     result, excess = finite_part(result)
     if trajectory.failure:

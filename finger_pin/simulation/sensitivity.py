@@ -1,4 +1,4 @@
-"""Sensitivities of a run: derivatives of what is recorded by the numbers that the run is given.
+"""Sensitivities of a run: derivatives of recorded variables by the numbers that the run is given.
 
 They obey a linear equation along the motion, which is solved by itself: S' = A S + E, where A is exact and E a
 difference of rates (`core.stepping.collocation`), with relative errors of about the root of the run's tolerance.
@@ -45,7 +45,7 @@ def changed(
     Args:
         values: p numbers.
         sizes: Of what size they are.
-        make: What to make of values.
+        make: Function of values.
 
     Raises:
         InputError: If neither way is allowed.
@@ -70,8 +70,8 @@ def nearby(
     """Return the motions that changed numbers make of one, to first order.
 
     Args:
-        setup: What has moved.
-        trajectory: How.
+        setup: The setup of the run.
+        trajectory: Its trajectory.
         others: The same with one number changed each.
         changes: By how much, shape (p,).
         allowed: Relative error of the derivatives, roughly; at the least the root of the run's tolerance.
@@ -119,7 +119,7 @@ def add_slopes(run: RunArrays, values: Sequence[float], moved: Sequence[RunArray
     """Put the derivatives of all variables into a run, as `RunArrays.slopes`, and return it.
 
     Args:
-        run: What is to have them.
+        run: The run that is to have them.
         values: Numbers that it was given.
         moved: The run with each number changed.
         changes: By how much.

@@ -1,4 +1,4 @@
-"""A scenario made ready: everything that moves it, once, and what integrates it."""
+"""A scenario made ready: loop, stepper and recorded variables, built once."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Setup:
     """A scenario with everything that moves it, once.
 
     Attributes:
-        scenario: What is simulated.
+        scenario: The scenario.
         loop: Finger, controller and reference, with what is sampled for this one motion.
         method: The integrator; not the scenario's where its controller is Python and acts continuously.
         answers: The controller itself, where the loop samples it.
-        sampled: What samples it, if anything does.
-        bindings: What serves this run as it has served others; None for what is bound for each integration.
+        sampled: Its sampled controller, if it has one.
+        bindings: Compiled code bound for several runs; None to bind it for each integration.
     """
 
     scenario: Scenario
@@ -68,11 +68,11 @@ class Setup:
         """Make a scenario ready.
 
         Args:
-            scenario: What to simulate.
+            scenario: The scenario to simulate.
             loop: Its loop, where something in it is a user's own.
-            own: What that is, as `own_parts` says.
+            own: Names of the parts given in place of the scenario's, from `own_parts`.
             control_period: As for `simulate`.
-            bindings: What has served other runs, and serves this one where it differs in numbers alone.
+            bindings: Those of other runs, which serve this one where it differs in numbers alone.
 
         Raises:
             InputError: If the method cannot sample, the controller must be sampled, bodies overlap or
@@ -194,7 +194,7 @@ class Setup:
 
         Args:
             trajectory: One that failed.
-            slow: What made it slow, if that is known.
+            slow: Cause of its slowness, if that is known.
         """
         answers, settings = self.answers, self.scenario.simulation
         if answers.problem_time >= trajectory.breakpoints[-1]:

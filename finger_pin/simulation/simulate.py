@@ -46,7 +46,7 @@ def simulate(
     method: that takes seconds for a simulated second.
 
     Args:
-        scenario: What to simulate, its name, or the path of a file.
+        scenario: The scenario to simulate, its name, or the path of a file.
         controller: Replaces the scenario's controller: an object with ``command``, asked for one time at a time, or
             tensions in open loop, as times, shape (m,), s, and tensions of the actuated tendons, shape (m, a), N.
         reference: Replaces the scenario's reference: an object with ``at``, asked for one time at a time, or times,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,7 @@ from finger_pin.core.stepping.batch import Together
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.description.family import Family
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import nearest
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
@@ -71,10 +70,7 @@ class Simulator:
             InputError: Naming the argument that is wrong, or bodies that start deep in each other.
         """
         if method not in TABLEAUS:
-            near = nearest(method, TABLEAUS)
-            raise InputError(
-                "method", f"must be one of {', '.join(TABLEAUS)}{f'; did you mean {near}?' if near else ''}", method
-            )
+            raise InputError("method", f"must be one of {', '.join(TABLEAUS)}{suggestion(method, TABLEAUS)}", method)
         for name, value in (("rtol", rtol), ("atol_scale", atol_scale)):
             if not 0.0 < value <= 0.1:
                 raise InputError(name, "must be above 0 and at most 0.1", value)
@@ -82,8 +78,7 @@ class Simulator:
         self._family: Family | None = None
         self._bindings = Bindings()
         self._build(as_finger(finger))
-        limiter = self.finger.stroke_limiter
-        self._posture = 0.5 * (limiter.lower + limiter.upper)
+        self._posture = 0.5 * (self.finger.stroke_limiter.lower + self.finger.stroke_limiter.upper)
         if position is not None:
             self._posture = numbers("position", position, self._posture.shape)
         self._begin(self._at(self._posture), 0.0)
@@ -94,7 +89,7 @@ class Simulator:
         return f"Simulator({self.finger.description.name} at t = {self.time:.6g} s, theta = [{posture}] rad)"
 
     def _build(self, finger: Finger) -> None:
-        """Build what steps a finger; `_begin` says from where."""
+        """Build the stepper of a finger; `_begin` gives it a state."""
         self.finger, mechanism = finger, finger.mechanism
         control = held_control(mechanism.channels, mechanism.coordinates)
         self._guides = Guides.of(finger, 0.0, self._settings["rtol"])
@@ -209,14 +204,14 @@ class Simulator:
         """
         self._hold(*self._checked(inputs, dt, fingertip_force))
         status = self._stepper.advance(self._stepper.time + dt)
-        self._keep()
+        self._told.add(self._stepper.time, self._tension, self._force)
         return self._reached(status)
 
     def _checked(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
         command, force = numbers("inputs", inputs, self._tension.shape), self._unloaded
         if min(command.tolist(), default=0.0) < 0.0 and (command[self._pulling] < 0.0).any():
             raise InputError("inputs", "a tension must not be negative: a tendon cannot push", command.tolist())
-        if not isinstance(dt, Real) or not 0.0 < dt < math.inf:
+        if not isinstance(dt, Real) or not 0.0 < dt < np.inf:
             raise InputError("dt", "must be above 0 and finite", dt)
         if fingertip_force is not None:
             force = numbers("fingertip_force", fingertip_force, force.shape)
@@ -228,15 +223,11 @@ class Simulator:
         self._tension, self._force = command, force
         self._stepper.hold(command)
 
-    def _keep(self) -> None:
-        self._told.add(self._stepper.time, self._tension, self._force)
-
     def _reached(self, status: int) -> State:
         """Return the state after a step, unless it failed."""
-        stepper = self._stepper
         if status:
-            raise IntegrationError(stepper.time, stepper.failure(status, self.finger.layout.names), _ADVICE)
-        return self.finger.layout.unpack(stepper.x)
+            raise IntegrationError(self.time, self._stepper.failure(status, self.finger.layout.names), _ADVICE)
+        return self.finger.layout.unpack(self._stepper.x)
 
     def result(self, *, sample_rate: float = 1000.0, reference: Reference | Samples | None = None) -> xr.Dataset:
         """Return the Dataset of all steps so far, as `simulate` does: for figures, the viewer and `save`.
@@ -303,8 +294,7 @@ def step_many(
     acting = [one._checked(inputs, dt, own) for one, inputs, own in zip(simulators, tensions, forces, strict=True)]
     for simulator, (command, force) in zip(simulators, acting, strict=True):
         simulator._hold(command, force)
-    steppers = [simulator._stepper for simulator in simulators]
-    statuses = Together(steppers).advance([stepper.time + dt for stepper in steppers])
+    statuses = Together([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])
     for simulator in simulators:
-        simulator._keep()
+        simulator._told.add(simulator._stepper.time, simulator._tension, simulator._force)
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses.tolist(), strict=True)]

@@ -24,9 +24,9 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import Reference, SignalReference
 from finger_pin.references.signal import Signal
-from finger_pin.simulation.accuracy import check_memory, left_open, open_account
+from finger_pin.simulation.accuracy import left_open, open_account
 from finger_pin.simulation.motions import SampledMotion
-from finger_pin.simulation.recording import record
+from finger_pin.simulation.recording import check_memory, record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +51,7 @@ class Told:
         return start
 
     def add(self, end: float, inputs: Array, force: Array) -> None:
-        """Keep a step: when it ended, s, and what was held during it: inputs (u,), and forces (3,) or (f, 3), N."""
+        """Keep a step: its end, s, and what it held: inputs (u,), and forces (3,) or (f, 3), N."""
         self._numbers.append(end)
         self._numbers.frombytes(inputs.tobytes() + force.tobytes())
 
@@ -122,7 +122,7 @@ class Told:
 
 
 class _Repeated:
-    """Holds again what was held.
+    """A controller that holds recorded inputs once more.
 
     Attributes:
         instant: When the next step begins, s.

@@ -81,7 +81,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _frame(name: str, variable: Quantity) -> str:
-    """Return the frame of a variable with components: the base's, but for where that itself is."""
+    """Return the frame of a variable with components: the base's, but the world's for the base's own place."""
     if not {"axis", "quaternion"} & set(variable.dims):
         return ""
     return WORLD_FRAME if name.startswith("palm_") else BASE_FRAME

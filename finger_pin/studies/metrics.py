@@ -49,7 +49,7 @@ class Run:
     """
 
     def __init__(self, scenario: ScenarioLike, stop: Stop | None = None, finger: Finger | None = None) -> None:
-        """Keep a scenario, what its simulation asks whether it is to stop, and a finger that replaces its own."""
+        """Keep a scenario, the function that stops its simulation, and a finger that replaces its own."""
         self.scenario, self._stop, self._finger = described_by(load_scenario(scenario), finger), stop, finger
 
     def parts(self) -> dict[str, tuple[Scenario, Finger]]:

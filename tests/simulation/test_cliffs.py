@@ -14,7 +14,7 @@ import finger_pin as fp
 from finger_pin.exceptions import AccuracyWarning, SelfLockingWarning
 from finger_pin.laws.spring import JOINT_SPRING, spring_energy
 from finger_pin.mechanism.rows import Rows
-from finger_pin.simulation import accuracy
+from finger_pin.simulation import accuracy, recording
 from finger_pin.views.summary import summarize
 
 LINK = {"length": 0.04, "width": 0.015, "mass": 5e-3}
@@ -142,7 +142,7 @@ def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monk
         fp.simulate(scenario)
     fitting = float(str(found.value).rsplit(" ", 1)[-1])
     settings = scenario.simulation.model_copy(update={"sample_rate": 0.99 * fitting})
-    accuracy.check_memory(settings, fp.Finger("ub"))
+    recording.check_memory(settings, fp.Finger("ub"))
 
 
 def test_a_simulator_refuses_what_is_no_time_and_tensions_that_push(finger):

@@ -1,1 +1,1 @@
-"""Identification: from recordings of a finger to the numbers of its scenario, with how sure they are."""
+"""Identification: from recordings of a finger to the numbers of its scenario, with intervals."""

@@ -1,4 +1,4 @@
-"""Which law: the same recordings under several, by BIC and by what was held out."""
+"""Comparison of laws: the same recordings under several, by BIC and by samples held out."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LawComparison:
 
     Attributes:
         law: Names.
-        parameters: How many were found.
+        parameters: Number of parameters found.
         bic: k log n + sum of w n log(SSE / n).
         rms: Of residuals over the noise under the scenario's own law.
         held_out: The same of samples that the fit had not seen; not a number where nothing can be held out.
@@ -50,7 +50,7 @@ class LawComparison:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Self:
-        """Return what was plain."""
+        """Read a table of `plain`."""
         return cls(**table)
 
 
@@ -95,12 +95,12 @@ def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:
 
 
 def _asked(problem: Problem) -> tuple[Sequence[str], Array, Array]:
-    """Return the keys that were asked for, without what belongs to a recording, and their bounds."""
+    """Return the keys that were asked for, without those of a recording, and their bounds."""
     return problem.keys[: problem.asked], problem.low[: problem.asked], problem.high[: problem.asked]
 
 
 def _places(law: Problem, own: Problem, z: Array) -> list[Array]:
-    """Return where to search under a law: where the own one's minimum is, further keys spread over their ranges."""
+    """Return the starts of searches under a law: the own one's minimum, further keys spread over their ranges."""
     low, high = law.box
     shared = [key in own.keys for key in law.keys]
     known = np.array([z[own.keys.index(key)] if key in own.keys else 0.0 for key in law.keys])
@@ -113,7 +113,7 @@ def _best(law: Problem, weights: Array, places: Sequence[Array]) -> Fit:
 
 
 def _folds(problem: Problem) -> list[list[NDArray[np.bool_]]]:
-    """Return which samples of every signal are held out in turn: recordings, windows, or readings of the same load."""
+    """Return masks of samples that are held out in turn: recordings, windows, or readings of the same load."""
     names = list(dict.fromkeys(signal.recording for signal in problem.signals))
     if len(names) > 1:
         return [[np.full(len(s.measured), s.recording == name) for s in problem.signals] for name in names]

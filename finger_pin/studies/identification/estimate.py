@@ -38,7 +38,7 @@ class Fit:
     """A minimum.
 
     Attributes:
-        z: Where, as it is searched for, shape (p,).
+        z: Search variables, shape (p,).
         residuals: Of every signal.
         noise: rms of the residuals of every signal, shape (s,).
         correlation: Of neighbouring residuals, shape (s,).
@@ -69,7 +69,7 @@ def fit(
     """Return the minimum that is reached from a start.
 
     Args:
-        problem: What is fitted.
+        problem: The problem to fit.
         start: Shape (p,), transformed.
         held: Entries of z that stay as they are.
         weights: Of the signals; by default they follow from the residuals at the end.
@@ -206,7 +206,7 @@ def information(problem: Problem, found: Fit) -> Array:
 
 
 def _noise(problem: Problem, residuals: Sequence[Array]) -> Array:
-    """Return the rms of the residuals of every output, never less than what rounding leaves of it."""
+    """Return the rms of the residuals of every output, never less than its rounding."""
     groups = problem.groups
     count, square = pooled(residuals, np.ones(len(residuals)), groups)
     rms = np.where(count > 0.0, np.sqrt(square), 1.0)[groups]

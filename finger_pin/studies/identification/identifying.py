@@ -1,4 +1,4 @@
-"""Identification: from recordings to the numbers of a scenario, and how sure they are."""
+"""Identification: from recordings to the numbers of a scenario, with intervals."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def identify(
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> xr.Dataset:
-    """Find the numbers of a scenario with which it does what was recorded, with intervals by the profile likelihood.
+    """Find the numbers with which a scenario fits its recordings, with intervals by the profile likelihood.
 
     Every signal has a noise of its own, estimated with the parameters. Neighbouring residuals of a motion are
     correlated: n of them count as n (1 - rho) / (1 + rho) (Bartlett). Parameters whose least value is positive are
@@ -170,7 +170,7 @@ def _work(problem: Problem, settings: IdentifySettings, places: Sequence[Array],
 
 
 def _latched(stop: Callable[[], bool]) -> Callable[[], bool]:
-    """Return what asks until it is told to stop once: threads end together."""
+    """Return a stop that stays true once it has been: threads end together."""
     told = threading.Event()
 
     def asked() -> bool:

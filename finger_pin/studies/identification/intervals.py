@@ -51,7 +51,7 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
     """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841.
 
     Args:
-        problem: What was fitted.
+        problem: The problem that was fitted.
         found: Its minimum.
         k: Which parameter.
         way: 1 for the upper end, -1 for the lower.
@@ -102,7 +102,7 @@ def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
 
 
 def free_directions(problem: Problem, found: Fit) -> list[tuple[str, list[int]]]:
-    """Return what the recordings do not determine, in words and which parameters these are about; sorted."""
+    """Return the combinations that the recordings leave open, in words and with their parameters; sorted."""
     low, high = problem.box
     width = high - low
     values, vectors = np.linalg.eigh(information(problem, found) * np.outer(width, width))
@@ -117,7 +117,7 @@ def free_directions(problem: Problem, found: Fit) -> list[tuple[str, list[int]]]
 
 
 def _in_words(problem: Problem, direction: Array, shown: list[int]) -> str:
-    """Return a direction of z as what it leaves open."""
+    """Return a direction of z in words."""
     size = np.abs(direction) / np.max(np.abs(direction))
     names = [problem.keys[k] for k in shown]
     if len(shown) == 1:

@@ -1,4 +1,4 @@
-"""What an identification has finished, kept in its folder, so that the same call goes on where another was stopped."""
+"""The finished pieces of an identification, kept in its folder, so that the same call goes on after a stop."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Ledger:
     """Finished pieces of work by name; in memory alone without a folder."""
 
     def __init__(self, folder: Path | None, asked: str, restart: bool) -> None:
-        """Read what is there of the same identification; that of another one is forgotten."""
+        """Read the pieces of the same identification; those of another one are forgotten."""
         self._path = None if folder is None else folder / NAME
         self._asked, self._done = asked, {}
         if self._path is not None and not restart:
@@ -72,7 +72,7 @@ class Ledger:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Keep what is done, whatever has happened; of what was asked for wrongly, nothing."""
+        """Keep the finished pieces, whatever has happened; none of a wrong question."""
         if self._path is None:
             return
         if isinstance(error, InputError):
@@ -83,7 +83,7 @@ class Ledger:
                 Path(temporary).write_text(json.dumps({"asked": self._asked, "done": self._done}), encoding="utf-8")
 
     def fit(self, name: str, problem: Problem, work: Callable[[], Fit]) -> Fit:
-        """Return a minimum, from where it was found before if it was."""
+        """Return a minimum, or the one found before."""
         if name in self._done:
             z: Array = np.array(self._done[name])
             return fit(problem, z, held=dict(enumerate(z)))

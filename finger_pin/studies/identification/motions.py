@@ -1,4 +1,4 @@
-"""Recorded motions: a scenario moved by what was recorded of its inputs, and what it does at the recorded times."""
+"""Recorded motions: a scenario under recorded inputs, and its signals at the recorded times."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class RecordedMotion:
     """A motion, or a window of one, beside a scenario.
 
     Attributes:
-        recording: What was recorded.
+        recording: The recording.
         rows: Which of its rows, shape (m,).
         scenario: Moved by the recorded inputs.
         own: Numbers of its own that are to be found: where its joints start.
@@ -86,7 +86,7 @@ class RecordedMotion:
         self._fine = False
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
-        """Return what the scenario does at the recorded times, shape (m,) for each output; not a number if it fails."""
+        """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
         computed, motion = self._made(scenario, own)
         self._last = ((scenario, dict(own)), computed, motion)
         return computed
@@ -96,12 +96,12 @@ class RecordedMotion:
         self._fine, self._last = True, None
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
-        """Return the derivatives of what is computed by the values, shape (m, p) for each output.
+        """Return the derivatives of the outputs by the values, shape (m, p) each.
 
         Args:
             at: Maps values to a scenario and the numbers of this motion.
-            values: Where, shape (p,).
-            sizes: How large changes of the values are, shape (p,).
+            values: Values of the parameters, shape (p,).
+            sizes: Sizes of changes of the values, shape (p,).
         """
         here = at(values)
         last = self._last

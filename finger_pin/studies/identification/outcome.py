@@ -1,4 +1,4 @@
-"""What comes out of an identification: a Dataset, a scenario with the numbers found, and a page."""
+"""The result of an identification: a Dataset, a scenario with the numbers found, and a page."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def outcome(
     comparison: LawComparison | None,
     unfinished: str = "",
 ) -> xr.Dataset:
-    """Return the Dataset of an identification; what is not finished is not a number."""
+    """Return the Dataset of an identification; unfinished pieces are not a number."""
     import xarray as xr
 
     count, keys = problem.asked, problem.keys[: problem.asked]
@@ -118,7 +118,7 @@ def _pairs(best: Fit) -> list[tuple[Array, float]]:
 
 
 def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side]) -> tuple[Array, Array]:
-    """Return values and rises along every profile, ascending, filled up with what is not a number."""
+    """Return values and rises along every profile, ascending, filled up with NaN."""
     rows: list[Array] = []
     for k in range(problem.asked):
         paths = [side.path for (j, _), side in sides.items() if j == k]
@@ -175,7 +175,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
 
 
 def _replicates(signal: RecordedSignal) -> float:
-    """Return the rms by which readings of the same inputs differ from their mean: what no law can explain."""
+    """Return the rms by which readings of the same inputs differ from their mean, which no law can explain."""
     groups = signal.alike
     if signal.ordered or groups.max() + 1 == len(groups):
         return math.nan
@@ -226,7 +226,7 @@ def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, probl
 
 
 def _from_folder(bench: str, folder: Path) -> str:
-    """Return what a scenario in a folder extends: a name as it is, a path from the folder."""
+    """Return the entry ``extends`` of a scenario in a folder: a name as it is, a path from the folder."""
     path = Path(bench).expanduser()
     if path.suffix != ".toml":
         return bench

@@ -1,4 +1,4 @@
-"""What is to be found, and how far what is computed is from what was measured."""
+"""The problem of an identification: parameters, bounds, and residuals of its recordings."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RecordingModel(Protocol):
 
     @property
     def own(self) -> tuple[Own, ...]:
-        """What is to be found for it alone."""
+        """The numbers to be found for it alone."""
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
@@ -71,7 +71,7 @@ class RecordedSignal:
         measured: Shape (m,), those that are numbers.
         rows: Which rows of the recording they are, shape (m,).
         instant: Time of each, s; of steady readings its number.
-        load: What fed the model there; not a number where several inputs do.
+        load: Input of the model there; not a number where there are several.
         alike: The number of the group of equal readings that each is of, shape (m,).
         ordered: Whether its samples follow each other in time, so that neighbours may err alike.
     """
@@ -96,7 +96,7 @@ class Problem:
     """Recordings and the parameters to be found in them, searched for as logarithms where they are positive.
 
     Attributes:
-        scenario: Where all other numbers come from.
+        scenario: Scenario with all other numbers.
         keys: Dotted keys.
         low: Least values.
         high: Greatest values.
@@ -104,7 +104,7 @@ class Problem:
         signals: All outputs, in the order of the models.
         held: Numbers that the scenario is given first, by key.
         stop: Asked before every evaluation.
-        evaluations: How many scenarios were computed.
+        evaluations: Number of scenarios computed.
         best: The least objective so far, and where.
     """
 
@@ -166,7 +166,7 @@ class Problem:
         return np.array([order.index(name) for name in names], dtype=np.intp)
 
     def to_search(self, values: Array) -> Array:
-        """Return values as they are searched for: logarithms of what is positive."""
+        """Return the search variables of values: logarithms of positive ones."""
         safe = np.where(self.logarithmic, values, 1.0)
         return np.where(self.logarithmic, np.log(safe), values)
 
@@ -237,7 +237,7 @@ class Problem:
         return twin
 
     def join(self, twin: Problem) -> None:
-        """Add what another one has done to what this one has."""
+        """Add the evaluations of a twin, and take its best point if that is better."""
         self.evaluations += twin.evaluations
         self._slopes = twin._slopes or self._slopes
         self.best = min(self.best, twin.best, key=lambda each: each[0])

@@ -1,4 +1,4 @@
-"""Which experiment next: of given motions the one that narrows the intervals most, from sensitivities alone."""
+"""The next experiment: of given motions the one that narrows the intervals most, from sensitivities alone."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ def propose(
     known: Mapping[str, float] | None = None,
     rate: float = 100.0,
 ) -> xr.Dataset:
-    """Rank motions by what they would determine: D-optimal, the greatest determinant of the information first.
+    """Rank motions by their information on the parameters: D-optimal, the greatest determinant first.
 
         fp.propose("canal", {"slow": {...}, "fast": {...}}, {"finger.tendon_friction.coulomb": (0.01, 1.0)},
                    {"tendon_tension.T1": 0.05})
 
     Args:
-        scenario: What is identified: a scenario, its name, or the path of a file.
+        scenario: The scenario to identify, its name, or the path of a file.
         candidates: By name, the entries in which the motion of each differs.
         parameters: By dotted key, the least and the greatest value; sure to that much without any motion.
-        outputs: What would be measured, by variable.label, and its noise, SI, rms.
+        outputs: Signals that would be measured, by variable.label, and their noise, SI, rms.
         overrides: Entries of all of them, such as what is known by now.
         finger: Replaces the finger that the scenario describes, as for `fp.simulate`.
         known: By key, standard deviations that earlier recordings have left, in units of the parameter.

@@ -1,4 +1,4 @@
-"""Steady readings: what the closed forms of a scenario's tendons and servos say of every row."""
+"""Steady readings: the closed forms of a scenario's tendons and servos for every row."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class SteadyReadings:
     """A recording of steady states beside a scenario.
 
     Attributes:
-        recording: What was read.
+        recording: The recording.
         load: The pull at the entrance of the canals, shape (m, a), N.
         scenario: Whose states they are.
         own: Nothing is to be found for them alone.
@@ -79,7 +79,7 @@ class SteadyReadings:
         ]
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
-        """Return the derivatives of what is computed by the values, shape (m, p) for each output; by differences."""
+        """Return the derivatives of the outputs by the values, shape (m, p) each; by differences."""
         columns = []
         for k, size in enumerate(_CHANGE * sizes):
             ends = []

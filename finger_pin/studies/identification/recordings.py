@@ -14,7 +14,7 @@ import numpy as np
 from finger_pin.description.recordings.bench import Column, RecordingSettings
 from finger_pin.description.recordings.units import in_si
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import nearest
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 
 #: SI units of what is recorded most; of anything else a column is in SI.
@@ -88,8 +88,7 @@ def read_recording(
 
     def column(key: str, given: Column, si: str, missing: bool = False) -> Array:
         if given.column not in table:
-            near = nearest(given.column, table)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggestion(given.column, table)
             raise InputError(f"{entry}.{key}", f"no such column; there are {', '.join(table)}{hint}", given.column)
         words = table[given.column]
         if words.dtype == object:

@@ -28,7 +28,7 @@ _TRIED, _JUMP, _TINY = 4, 10.0, 1e-5
 
 
 class Work:
-    """What is done, piece by piece; whatever is finished when it is stopped counts."""
+    """The work of an identification, piece by piece; pieces that are finished when it is stopped count."""
 
     def __init__(self, problem: Problem, ledger: Ledger, loss: str, progress: Progress | None) -> None:
         """Begin; nothing is done yet."""

@@ -1,4 +1,4 @@
-"""Surfaces of the fingertip's workspace: images of the joint ranges by (1), with the constraint (4) of passive tendons."""
+"""Surfaces of the fingertip's workspace: images of the joint ranges by (1), with constraint (4) of passive tendons."""
 
 from __future__ import annotations
 
