@@ -18,7 +18,7 @@ from finger_pin.control.compiled import core_signal
 from finger_pin.core.control import held_control
 from finger_pin.core.stepping.integrator import integrate_compiled
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
-from finger_pin.description.hand import PathSignal
+from finger_pin.description.palm import PathSignal
 from finger_pin.description.parameters import Link
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.contacts import contact_rows

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.hand import PathSignal
 from finger_pin.description.objects import PATH
+from finger_pin.description.palm import PathSignal
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.surroundings import POSE, VELOCITY

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.hand import PATH, HandSettings
+from finger_pin.description.hand import HandSettings
+from finger_pin.description.palm import PATH
 from finger_pin.description.routing import Array
 from finger_pin.laws.palm import base_motion
 from finger_pin.mechanism.finger import Finger

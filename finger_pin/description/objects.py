@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from finger_pin.description.hand import PathSignal
+from finger_pin.description.palm import PathSignal
 from finger_pin.description.routing import Array
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
 from finger_pin.description.validation import Name, choice, problem, quantity, real, vector

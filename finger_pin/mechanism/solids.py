@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.hand import Palm
 from finger_pin.description.objects import Object
+from finger_pin.description.palm import Palm
 from finger_pin.description.parameters import FingerDescription, Link
 from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array

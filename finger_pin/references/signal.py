@@ -253,19 +253,17 @@ def _polynomials(settings: Sequence[SignalSettings], tolerance: float) -> list[P
 
 def _polynomial(settings: SignalSettings) -> PPoly | None:
     """Return the polynomial that a kind without samples adds to the sinusoid, or None."""
-    if settings.times is not None:
-        from scipy.interpolate import PPoly
+    if settings.times is None and settings.time is None:
+        return None
+    from scipy.interpolate import PPoly
 
+    if settings.times is not None:
         times, values = np.array(settings.times), np.array(settings.values)
         length, change = np.diff(times), np.diff(values)
         nothing = np.zeros_like(change)
         terms = [6.0 / length**5, -15.0 / length**4, 10.0 / length**3]
         return PPoly(np.array([*(change * term for term in terms), nothing, nothing, values[:-1]]), times)
-    if settings.time is None:
-        return None
-    from scipy.interpolate import PPoly
-
-    start, height = settings.time, settings.height or 0.0
+    start, height = settings.time or 0.0, settings.height or 0.0
     if settings.duration is None:
         return PPoly(np.array([[0.0, height]]), np.array([start - 1.0, start, start + 1.0]))
     return PPoly(np.array([[height / settings.duration], [0.0]]), np.array([start, start + settings.duration]))

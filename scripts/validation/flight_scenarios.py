@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.hand import PathSignal
 from finger_pin.description.objects import Object
+from finger_pin.description.palm import PathSignal
 from finger_pin.description.routing import Array
 
 G = 9.81
