@@ -28,6 +28,8 @@ th, td { padding: .3rem .8rem .3rem 0; } td { border-bottom: 1px solid #e3e6ec; 
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .soft { color: #5d6678; } .open { color: #a15c00; }
 img { display: block; max-width: 100%; height: auto; }
+@media (max-width: 40rem) { img { max-width: none; } table { font-size: .8rem; }
+  td:first-child { min-width: 7.5rem; overflow-wrap: anywhere; } }
 """
 
 

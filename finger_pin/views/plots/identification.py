@@ -73,7 +73,7 @@ def plot_profiles(result: xr.Dataset) -> Figure:
         result: Dataset of `identify`.
     """
     names = result["parameter"].values
-    columns = min(len(names), 3)
+    columns = 2 if len(names) == 4 else min(len(names), 3)
     rows = -(-len(names) // columns)
     figure = new_figure(2.9 * columns + 0.4, 2.5 * rows + 0.2, "constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -102,4 +102,5 @@ def _profile(axes: Axes, one: xr.Dataset) -> None:
     unit = str(one["units"].values)
     key = str(one["parameter"].values)
     axes.set_title(".".join(key.split(".")[-2:]), color=BLACK)
+    axes.locator_params(axis="x", nbins=3)
     axes.set(xlabel="" if unit == "1" else f"({unit})", ylim=(-0.3, max(8.0, 1.2 * _LEVEL)))
