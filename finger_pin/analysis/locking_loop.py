@@ -272,7 +272,7 @@ class FrictionLoop:
         return np.concatenate([share, pairs.reshape(len(position), -1)], axis=1)
 
     def _drags(self, position: Array, sliding: Array) -> Array:
-        """Return what drag takes of the tension of every strand besides, shape (m, s), N."""
+        """Return the drag on every strand besides, shape (m, s), N."""
         routing, actuated = self.tendons.routing, self.tendons.routing.actuated
         friction = sliding * capstan_coefficient(self.tendons.surface, routing.curvature(position))
         lost = sliding * self.tendons.drag

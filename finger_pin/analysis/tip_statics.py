@@ -164,7 +164,7 @@ class TipStatics:
 
 
 def slips(finger: Finger, jacobian: Array, force: Array, friction: Friction) -> list[list[Slip | None]]:
-    """Return the ways to slip under a force E, shape (3,), each with the choices of what drag keeps idle.
+    """Return the ways to slip under a force E, shape (3,), each with choices of tendons that drag keeps idle.
 
     That is for HINDERING alone. A force that passes a joint's axis at no more than the coefficient M^d of its friction,
     inside of its friction circle, does not decide which way the joint slips: both ways must be looked at. Where it

@@ -240,7 +240,7 @@ def _joined(parts: dict[str, FingerDescription], group: str, table: type[_Table]
 
 
 def _kinds(part: FingerDescription, group: str) -> tuple[str, ...]:
-    """Return what the numbers of a table stand in the order of: actuated tendons of all come before passive ones."""
+    """Return the kinds by which the numbers of a table are ordered: actuated tendons of all before passive ones."""
     if group == "tendon_friction":
         return tuple(tendon.kind for tendon in part.tendons.values())
     return ("",) * len(part.passive_names if group == "passive_tendon" else part.joints)

@@ -1,4 +1,4 @@
-"""The energy account of a trajectory: powers integrated over time, and what is left unexplained."""
+"""The energy account of a trajectory: powers integrated over time, and the residual."""
 
 from __future__ import annotations
 
@@ -99,14 +99,14 @@ def account(
 
 
 def _worst(opened: Array, allowed: float) -> Iterator[NDArray[np.int64]]:
-    """Yield where the account opens most, as spans between saved times: first half of it all, then the rest.
+    """Yield the spans between saved times in which the account opens most: first half of it all, then the rest.
 
     What it opens elsewhere is less than half of what is allowed, J. What stays open where halving steps does not help
     is no error of the quadrature.
 
     Args:
         opened: By how much it opens in each span, shape (m - 1,), J.
-        allowed: How much may stay open, J.
+        allowed: Largest residual, J.
     """
     order = np.argsort(-opened)
     sums = np.cumsum(opened[order])
@@ -155,7 +155,7 @@ def _quadrature_error(power: Callable[[Array], Array], begin: Array, length: Arr
 
 
 def _parts(loop: ClosedLoop, trajectory: Trajectory) -> list[_Part]:
-    """Return breakpoints and powers of what moves apart, or of the whole."""
+    """Return breakpoints and powers of islands, or of the whole."""
     reached = trajectory.breakpoints[-1]
     found: list[_Part] = []
     for island in trajectory.islands:

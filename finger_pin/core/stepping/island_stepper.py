@@ -72,7 +72,7 @@ class Part:
         memory: Time, step size, error history and counters.
         judged: Whether its error is estimated.
         joints: Coordinates whose error is; none of what is moved along paths.
-        objects: Those of free objects, likewise.
+        objects: Coordinates of free objects, likewise.
         drives: Loops of motors in position drive, which sample on the way; None for none.
         knots: Times at which steps end, s, positive, in order.
     """
