@@ -12,7 +12,7 @@ from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, 
 from finger_pin.core.evaluation.charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
-from finger_pin.core.jit import bound, fits, indices
+from finger_pin.core.jit import alike, bound, fits
 from finger_pin.core.tables import build_tables
 from finger_pin.description.routing import Array
 from finger_pin.laws.contact import CONTACT
@@ -51,7 +51,7 @@ class CompiledMechanism:
         own, tables = self.mechanism, build_tables(mechanism)
         if (own.moved, own.channels) != (mechanism.moved, mechanism.channels) or not fits(self.tables, tables):
             return False
-        if indices(tables) != indices(self.tables):
+        if not alike(self.tables, tables):
             return False
         self.mechanism, self.tables, self.charts = mechanism, tables, Charts.of(mechanism)
         self.models.renew(tables)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -14,8 +16,10 @@ from finger_pin.core.evaluation.law_code import SIGNALS, addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.remembering import Remembered
+from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import Form, RigidBody
+from finger_pin.mechanism.rows import Rows
 
 # Columns of the table of groups.
 FIRST, END, FED, PRESSED, KINK = range(5)
@@ -121,7 +125,8 @@ class Tables(NamedTuple):
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
 _PATHS: Remembered[Paths] = Remembered()
-_CHAINS: WeakKeyDictionary[Form, Chains] = WeakKeyDictionary()
+_WIRED: Remembered[dict[str, Any]] = Remembered()
+_FORMS: WeakKeyDictionary[Form, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
 
 
 def build_tables(mechanism: Mechanism) -> Tables:
@@ -143,25 +148,58 @@ def _read(mechanism: Mechanism) -> Tables:
         InputError: If a joint neither turns nor slides about a fixed axis, nor translates or is spherical.
     """
     body, rows = mechanism.body, mechanism.rows
-    if body.form not in _CHAINS:
-        _CHAINS[body.form] = read_chains(body.model)
-    chains, count = _CHAINS[body.form], sum(table.count for table in rows)
-    legs = tuple(table.paths for table in rows)
-    paths = _PATHS.of((legs, body.form), lambda: read_paths([path for each in legs for path in each], chains))
+    if body.form not in _FORMS:
+        chains = read_chains(body.model)
+        _FORMS[body.form] = chains, _of_form(body, chains)
+    chains, placed = _FORMS[body.form]
+    # Inertias and parameters of laws change from run to run; how rows are wired seldom does.
+    wired = _WIRED.of((body.form, *map(_content, rows)), partial(_of_rows, mechanism, chains))
     return Tables(
         guided=mechanism.guided,
         lumps=mechanism.inertia,
-        laws=np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
-        books=_books(mechanism),
-        paths=paths,
-        **_of_body(body, chains),
-        **_of_states(mechanism, count),
-        **_of_wiring(mechanism, count),
-        **_of_arms(mechanism, reached(paths, count, mechanism.coordinates)),
+        bodies=weighed(chains, body.model),
+        gravity=np.array(body.model.gravity.linear),
+        tip_force=np.zeros((len(body.tips), 3)),
+        loaded=False,
+        parameters=_parameters(rows),
+        **placed,
+        **wired,
     )
 
 
-def _of_body(body: RigidBody, chains: Chains) -> dict[str, Any]:
+def _content(table: Rows) -> tuple[Any, ...]:
+    """Return everything that a table of rows holds but the parameters of its law, to be compared by value."""
+    arrays = (table.arm, table.measure, table.offset, table.channels, table.pins, table.bends, table.curvature_offset)
+    weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in (table.inputs, table.loads)]
+    named = (table.group, table.law, table.paths, table.stored, table.powers)
+    return *named, *table.arm.shape, *weighted, *(each.tobytes() for each in arrays)
+
+
+def _parameters(rows: Sequence[Rows]) -> Array:
+    """Return the parameters of the laws of all rows, shape (most parameters, K)."""
+    ends = np.cumsum([0, *(table.count for table in rows)])
+    found = np.zeros((max((len(table.law.parameters) for table in rows), default=0), ends[-1]))
+    for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True):
+        found[: len(table.parameters), begin : end : table.law.arms] = table.parameters
+    return found
+
+
+def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
+    """Return laws, states, wiring, arms and paths of the rows."""
+    rows, count = mechanism.rows, sum(table.count for table in mechanism.rows)
+    legs = tuple(table.paths for table in rows)
+    paths = _PATHS.of((legs, mechanism.body.form), lambda: read_paths([path for each in legs for path in each], chains))
+    return {
+        "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
+        "books": _books(mechanism),
+        "paths": paths,
+        **_of_states(mechanism, count),
+        **_of_wiring(mechanism, count),
+        **_of_arms(mechanism, reached(paths, count, mechanism.coordinates)),
+    }
+
+
+def _of_form(body: RigidBody, chains: Chains) -> dict[str, Any]:
     """Return the tree of rigid bodies, its tips, and the loads of joints as pins."""
     model, last, turns = body.model, chains.last, chains.turns
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
@@ -174,14 +212,10 @@ def _of_body(body: RigidBody, chains: Chains) -> dict[str, Any]:
         "parents": chains.parents,
         "roots": chains.roots,
         "kinds": chains.kinds,
-        "bodies": weighed(chains, model),
         "charts": chains.charts,
         "chart_frames": chains.chart_frames,
-        "gravity": np.array(model.gravity.linear),
         "tip_body": np.array([last[joint] for joint in holders], dtype=np.int64),
         "tip_offset": np.array(offsets).reshape(-1, 3),
-        "tip_force": np.zeros((len(tips), 3)),
-        "loaded": False,
         "carriers": np.array([last[joint] for joint in carriers], dtype=np.int64),
         "directions": np.array(directions).reshape(-1, 3),
         "carried": np.ascontiguousarray(body.supports[:, joint_of - 1]),
@@ -189,13 +223,11 @@ def _of_body(body: RigidBody, chains: Chains) -> dict[str, Any]:
 
 
 def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
-    """Return the numbers of the laws, and the states and contacts among the rows."""
+    """Return the states and contacts among the rows."""
     rows = mechanism.rows
     ends = np.cumsum([0, *(table.count for table in rows)])
     state, touch = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    parameters = np.zeros((max((len(table.law.parameters) for table in rows), default=0), count))
     for table, own, begin, end in zip(rows, mechanism.states, ends[:-1], ends[1:], strict=True):
-        parameters[: len(table.parameters), begin : end : table.law.arms] = table.parameters
         stateful = np.arange(begin, end)
         if table.law.arms > 1:
             touch[begin:end] = 2
@@ -204,7 +236,6 @@ def _of_states(mechanism: Mechanism, count: int) -> dict[str, Any]:
         if table.states:
             state[stateful] = np.arange(own.start, own.stop)
     return {
-        "parameters": parameters,
         "state": state,
         "state_row": np.flatnonzero(state >= 0)[np.argsort(state[state >= 0])],
         "touch": touch,

@@ -7,9 +7,11 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
+_OWN: Remembered[Any] = Remembered()
 
 
 def flat(table: Any) -> Any:
@@ -48,6 +50,11 @@ def of_finger(settings: _Settings, name: str) -> _Settings:
 
     A table of another ``kind`` replaces, rather than completes.
     """
+    found: _Settings = _OWN.of((settings, name), lambda: _of_finger(settings, name))
+    return found
+
+
+def _of_finger(settings: _Settings, name: str) -> _Settings:
     whole = settings.model_copy(update={"fingers": None})
     own: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
     if own is None:

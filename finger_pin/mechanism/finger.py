@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,8 @@ import pinocchio as pin
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array
+from finger_pin.description.remembering import Remembered
+from finger_pin.description.routing import Array, Routing
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
@@ -31,6 +33,9 @@ from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings, same_but_for_path
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
+
+# Parts of fingers, and their tables of rows.
+_PARTS: Remembered[Any] = Remembered(1024)
 
 
 class Finger:
@@ -88,19 +93,35 @@ class Finger:
         for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
             if joint.nv != 1:
                 raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
-        self.tendons = Tendons.from_description(description)
-        self.routing = self.tendons.routing
+        self.routing = Routing.from_description(description)
+        self.tendons: Tendons = _PARTS.of(
+            (self.routing, description.tendon_friction, description.passive_tendon),
+            lambda: Tendons.from_description(description),
+        )
         self._excursions = Excursions(self.routing, description, self.paths)
-        self.actuators = Actuators.from_description(description, self.routing)
-        self.joint_friction = JointFriction.from_description(description, self.routing.loads)
-        self.stroke_limiter = StrokeLimiter.from_description(description)
-        self.springs = JointSprings.from_description(description)
+        self.actuators: Actuators = _PARTS.of(
+            (self.routing, *description.actuators, None, *description.actuators.values()),
+            lambda: Actuators.from_description(description, self.routing),
+        )
+        friction, limits, each = description.joint_friction, description.stroke_limiter, description.joints.values()
+        # Most changes of numbers leave most parts as they were.
+        self.joint_friction: JointFriction = _PARTS.of(
+            (self.routing, friction), lambda: JointFriction.from_description(description, self.routing.loads)
+        )
+        self.stroke_limiter: StrokeLimiter = _PARTS.of(
+            (limits, *each), lambda: StrokeLimiter.from_description(description)
+        )
+        self.springs: JointSprings = _PARTS.of(("springs", *each), lambda: JointSprings.from_description(description))
         self.visuals: pin.GeometryModel | None = None
         joints, motors = self.routing.joints, self.actuators.names
         width = len(joints) + self.routing.passive + len(motors)
         of_tree = tree_rows(description, self.paths, width) if self.paths else ()
-        self.further = (*self.springs.hysteresis_rows(joints, width), *of_tree, *rows)
-        drives = [*self.actuators.tendon_rows(width), *(table for table in rows if table.pulls)]
+        held = _PARTS.of(
+            (self.springs, "hysteresis", joints, width), lambda: self.springs.hysteresis_rows(joints, width)
+        )
+        self.further = (*held, *of_tree, *rows)
+        stretched = _PARTS.of((self.actuators, "tendons", width), lambda: self.actuators.tendon_rows(width))
+        drives = [*stretched, *(table for table in rows if table.pulls)]
         self.pulled = self.tendons.pulled(drives)
         mechanism = Mechanism(
             self.rigid_body,
@@ -122,15 +143,17 @@ class Finger:
     def _tables(self, drives: Sequence[Rows], width: int) -> list[Rows]:
         """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
         joints, actuated = self.routing.joints, self.routing.actuated
-        pulling = self.tendons.rows(drives, len(self.actuators.names))
+        number = len(self.actuators.names)
+        pulling: list[Rows] = _PARTS.of((self.tendons, *drives, number), lambda: self.tendons.rows(drives, number))
         if self.paths:
             pulling = [along_paths(self.description, self.paths, table) for table in pulling]
+        friction, limiter, springs, motors = self.joint_friction, self.stroke_limiter, self.springs, self.actuators
         return [
             *pulling,
-            self.joint_friction.rows(joints, self.pulled, actuated, width),
-            self.stroke_limiter.rows(joints, width),
-            self.springs.rows(joints, width),
-            *self.actuators.rotor_rows(width),
+            _PARTS.of((friction, *drives, width), lambda: friction.rows(joints, self.pulled, actuated, width)),
+            _PARTS.of((limiter, joints, width), lambda: limiter.rows(joints, width)),
+            _PARTS.of((springs, joints, width), lambda: springs.rows(joints, width)),
+            *_PARTS.of((motors, "rotors", width), lambda: motors.rotor_rows(width)),
             *(table for table in self.further if not table.pulls),
         ]
 

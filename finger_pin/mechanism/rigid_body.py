@@ -104,8 +104,9 @@ class RigidBody:
         twin = copy.copy(self)
         vars(twin).pop("_afloat", None)
         twin.model = pin.Model(self.model)
+        held = twin.model.inertias
         for joint, inertia in enumerate(inertias, start=1):
-            twin.model.inertias[joint] = inertia
+            held[joint] = inertia
         twin.model.gravity.linear[:] = gravity
         return twin
 

@@ -28,6 +28,7 @@ from finger_pin.mechanism.state import State
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
 _CONTACTS: Remembered[Rows] = Remembered()
+_SPREAD: Remembered[Rows] = Remembered(1024)
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
@@ -136,7 +137,11 @@ class Surroundings:
         """
         joints, bodies, lumps = int(mechanism.body.model.nv), int(self.body.model.nv), len(mechanism.lumps)
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
-        rows = [table.spread(places, bodies + lumps) for table in mechanism.rows]
+        width = bodies + lumps
+        rows = [
+            _SPREAD.of((table, places.tobytes(), width), partial(table.spread, places, width))
+            for table in mechanism.rows
+        ]
         lumps_of = mechanism.lumps, mechanism.inertia
         guided = np.full(bodies + lumps, -1)
         guided[bodies - len(self.world) : bodies] = np.arange(len(self.world))

@@ -75,17 +75,20 @@ def simulate_many(
     run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | Lost] = {}
+    texts = [""] * len(runs)
     with CtrlC() as interrupted, Crew(executor, workers) as crew:
         crew.compile(runs[0])
         for index, result in crew.do(run, runs, interrupted):
             if isinstance(result, Lost) and isinstance(result.error, InputError):
                 raise result.error
             found[index] = result
+            # Here this thread would wait for the others.
+            texts[index] = to_toml(runs[index])
             if progress is not None:
                 progress(len(found), len(runs))
     reached = f"after {len(found)} of {len(runs)} runs"
     unfinished = Lost("not finished: interrupted", Interrupted(math.nan, None, reached))
-    stacked = _stack(runs, [found.get(index, unfinished) for index in range(len(runs))])
+    stacked = _stack(runs, [found.get(index, unfinished) for index in range(len(runs))], texts)
     if interrupted.pressed:
         raise Interrupted(math.nan, stacked, reached)
     if (stacked["failure"] != "").all():
@@ -144,7 +147,7 @@ def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | 
     refuse_unknown("variables", keep, known)
 
 
-def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost]) -> xr.Dataset:
+def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost], texts: Sequence[str]) -> xr.Dataset:
     found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
     longest = max(found.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
     times = runs[0].sample_times()
@@ -157,11 +160,15 @@ def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost]) -> xr
         sizes = [len(labels[dim]) if dim in labels else first.sizes[dim] for dim in dims[1:]]
         values = np.full((len(runs), len(times), *sizes), np.nan)
         for row, variable in having.items():
+            own, count = {dim: variable[dim].values.tolist() for dim in dims[1:] if dim in labels}, len(variable)
+            if all(labels[dim] == given for dim, given in own.items()):
+                values[row, :count] = variable.values
+                continue
             places = [
-                [labels[dim].index(label) for label in variable[dim].values] if dim in labels else range(size)
+                [labels[dim].index(label) for label in own[dim]] if dim in own else range(size)
                 for dim, size in zip(dims[1:], sizes, strict=True)
             ]
-            values[np.ix_([row], range(variable.sizes["time"]), *places)] = variable.values
+            values[np.ix_([row], range(count), *places)] = variable.values
         attributes = dict(first.attrs)
         missing = [row for row in found if row not in having]
         if missing:
@@ -172,7 +179,8 @@ def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost]) -> xr
         stacked[name] = (("run",), np.array(numbers), {"long_name": name})
     failures = [result.reason if isinstance(result, Lost) else result.attrs["failure"] for result in results]
     stacked["failure"] = (("run",), np.array(failures), {"long_name": "failure"})
-    stacked["scenario"] = (("run",), np.array([to_toml(run) for run in runs]), {"long_name": "resolved scenario, TOML"})
+    described = [text or to_toml(run) for text, run in zip(texts, runs, strict=True)]
+    stacked["scenario"] = (("run",), np.array(described), {"long_name": "resolved scenario, TOML"})
     shared = {key: value for key, value in longest.attrs.items() if key.startswith("version_")}
     return xr.Dataset(
         stacked,

@@ -8,7 +8,7 @@ names below.
 from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, numbers, put
 from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely
 from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
-from finger_pin.core.jit.tables import bound, bound_at, call, copied, fits, indices, numbered, refill, taken
+from finger_pin.core.jit.tables import alike, bound, bound_at, call, copied, fits, indices, numbered, refill, taken
 
 __all__ = [
     "IndexTable",
@@ -19,6 +19,7 @@ __all__ = [
     "Unit",
     "Vector",
     "address_of",
+    "alike",
     "bound",
     "bound_at",
     "cache_place",

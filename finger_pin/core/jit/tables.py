@@ -57,6 +57,19 @@ def indices(table: tuple[Any, ...]) -> bytes:
     return b"".join(found)
 
 
+def alike(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Return whether two tables that fit have the same integers."""
+    for own, new in zip(table, other, strict=True):
+        if own is new:
+            continue
+        if isinstance(own, tuple):
+            if not alike(own, new):
+                return False
+        elif isinstance(own, np.ndarray) and own.dtype == np.int64 and not np.array_equal(own, new):
+            return False
+    return True
+
+
 def fits(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
     """Return whether the numbers of another table have room in the arrays of one, and all else is the same."""
     for own, new in zip(table, other, strict=True):
