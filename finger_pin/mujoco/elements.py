@@ -27,7 +27,7 @@ from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, 
 def tendon(
     m: Any, d: Any, at: Any, of: Any, kinds: Any, e: Any, force: Any, held: Any, along: Any, about: Any, reactions: Any
 ) -> Any:
-    """Return speed, tension, normal force, largest friction and turn of a tendon: (14). See `lanes`."""
+    """Return speed, tension, normal force, largest friction and turn of a tendon: (14). See `vectorised_law`."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
     pull = along[tendon] + spring(m, d, at, of, tendon)

@@ -28,8 +28,24 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STIFFNESS,
     TURN,
 )
+from finger_pin.mujoco.constraint_rows import row_forces, write_rows
 from finger_pin.mujoco.elements import mass, pin, tendon
-from finger_pin.mujoco.lanes import (
+from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
+from finger_pin.mujoco.memory import (
+    compiled,
+    flags,
+    integer,
+    integer_in,
+    integers,
+    number,
+    numbers,
+    numbers_at,
+    scratch,
+    size,
+    words,
+    zeros,
+)
+from finger_pin.mujoco.vectorised_law import (
     BEARS,
     BENDS,
     BRISTLE,
@@ -47,22 +63,6 @@ from finger_pin.mujoco.lanes import (
     exerted,
     moved_on,
 )
-from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
-from finger_pin.mujoco.memory import (
-    compiled,
-    flags,
-    integer,
-    integer_in,
-    integers,
-    number,
-    numbers,
-    numbers_at,
-    scratch,
-    size,
-    words,
-    zeros,
-)
-from finger_pin.mujoco.rows import row_forces, write_rows
 
 # The floor that keeps (9a) finite where nothing is pressed, N: higher ones are friction that users have asked for.
 _NUMERICAL = 1e-4

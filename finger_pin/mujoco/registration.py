@@ -14,7 +14,7 @@ from numba import cfunc, types
 from finger_pin.exceptions import InputError
 from finger_pin.laws import bristle, capstan
 from finger_pin.mechanism.exchange import mujoco_friction as table
-from finger_pin.mujoco import elementary, elements, kernel, lanes, loads, memory, rows
+from finger_pin.mujoco import constraint_rows, elements, kernel, loads, memory, vector_functions, vectorised_law
 from finger_pin.mujoco.layout import layout
 
 _CALLBACKS = (
@@ -38,7 +38,8 @@ class _Plugin(ctypes.Structure):
 
 def _fingerprint() -> str:
     """Return a hash of the files that callbacks come from: numba sees one of them, not those that it calls."""
-    modules = (kernel, elements, elementary, lanes, loads, memory, rows, table, bristle, capstan)
+    functions = (vector_functions, vectorised_law, constraint_rows)
+    modules = (kernel, elements, *functions, loads, memory, table, bristle, capstan)
     texts = (Path(str(each.__file__)).read_bytes() for each in modules)
     return hashlib.sha256(b"".join(texts)).hexdigest()
 

@@ -19,9 +19,9 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     PLUGIN,
     PluginFriction,
 )
-from finger_pin.mujoco.choice import JOINT, TENDON_KEYS, choose
 from finger_pin.mujoco.frictions import frictions
 from finger_pin.mujoco.registration import register
+from finger_pin.mujoco.selection import JOINT, TENDON_KEYS, choose
 
 Keys = Mapping[str, Mapping[str, Any]]
 

@@ -24,8 +24,8 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STRIBECK,
     VISCOUS,
 )
-from finger_pin.mujoco.elementary import angle, compiled_law, exponential
 from finger_pin.mujoco.memory import compiled
+from finger_pin.mujoco.vector_functions import angle, compiled_law, exponential
 
 #: How many frictions a block has, and how many numbers it is.
 WIDTH = 8

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from finger_pin.mujoco.elementary import angle, exponential
+from finger_pin.mujoco.vector_functions import angle, exponential
 
 
 def test_the_exponential_is_numpy_s_to_the_last_digits_and_nothing_or_not_a_number_where_numpy_s_is():
