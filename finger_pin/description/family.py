@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.description.overriding import from_here, override
+from finger_pin.description.overriding import from_here, override, refuse_other
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.reading import Table, resolve_signals
 from finger_pin.description.recordings.series import Series
@@ -44,6 +44,9 @@ class Family:
         """
         self.scenario, self.keys = scenario, tuple(keys)
         self._names = [_split(key) for key in self.keys]
+        for name, _ in self._names:
+            if name not in ("finger.base", "hand.base"):
+                refuse_other(name, hand=scenario.hand is not None, finger=scenario.hand is None)
         spelled = _spelled(scenario)
         self._places = [list(_places(name.split("."), scenario, spelled)) for name, _ in self._names]
         self._spelled = spelled

@@ -45,10 +45,7 @@ def override(overrides: Table, table: Table, folder: Path) -> None:
             table.pop(other, None)
         _apply(given, table)
     for key in (*whole, *overrides):
-        if key.startswith("finger.") and "hand" in table:
-            raise InputError(key, "there is a hand; keys of its fingers begin with hand.fingers.NAME.finger")
-        if key.startswith("hand.") and "finger" in table:
-            raise InputError(key, 'there is one finger; hand = "ub_hand" puts a hand in its place')
+        refuse_other(key, hand="hand" in table, finger="finger" in table)
     if "hand" in table:
         table["hand"] = resolve_hand(table["hand"], folder)
         _apply(_spelt_out(whole, table), table)
@@ -81,6 +78,14 @@ def _each(key: str, table: Table) -> list[str]:
     if not inner:
         raise InputError(key, "there is nothing that the star could stand for")
     return [found for name in inner for found in _each(f"{head}{name}{tail}", table)]
+
+
+def refuse_other(key: str, *, hand: bool, finger: bool) -> None:
+    """Raise where a key is of a finger and there is a hand, or the other way round."""
+    if key.startswith("finger.") and hand:
+        raise InputError(key, "there is a hand; keys of its fingers begin with hand.fingers.NAME.finger")
+    if key.startswith("hand.") and finger:
+        raise InputError(key, 'there is one finger; hand = "ub_hand" puts a hand in its place')
 
 
 def _apply(overrides: Mapping[str, Any], table: Table) -> None:

@@ -152,6 +152,20 @@ def test_what_is_wrong_is_refused_in_one_line(keys, values, said):
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("scenario", "key", "said"),
+    [
+        ("hand", "finger.tendon_friction.coulomb", "there is a hand; keys of its fingers begin with hand.fingers"),
+        ("fig6", "hand.fingers.index.scale", "there is one finger"),
+    ],
+)
+def test_a_key_of_a_finger_is_none_of_a_hand_and_the_other_way_round(scenario, key, said):
+    with pytest.raises(InputError, match=said):
+        fp.prepare(scenario, [key])
+    with pytest.raises(InputError, match=said):
+        fp.Simulator("ub" if scenario == "fig6" else "ub_hand").set_parameters({key: 0.1})
+
+
 def test_a_variable_that_the_result_does_not_have_is_refused():
     with pytest.raises(InputError, match="did you mean joint_position"):
         fp.prepare("fig6", record=["joint_positon"])
