@@ -53,3 +53,21 @@ def test_states_that_are_off_by_small_angles_and_rates_differ_by_them():
         each.advance(end)
     now = Moment(part.time, part.x, part.attitude, part.memory, part.drift)
     np.testing.assert_allclose(difference(part, now, other)[places], off[places], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("faster", "lost"), [(0.0, False), (60.0, True)])
+def test_an_error_is_beyond_bounds_if_a_tenth_of_it_grows_too_and_not_if_it_is_large_and_stays(faster, lost):
+    """A ball in flight is off by 0.1 m, and by a velocity, m/s, with which a tenth of that grows to 0.09 m."""
+    scenario = impact_scenario("drops", 0)
+    part = next(each for each in Setup.of(scenario).stepper(scenario.simulation).parts if len(each.objects))
+    part.advance(1e-3)
+    width, height = len(part.tables.parents) + len(part.tables.lumps), part.objects[2]
+    part.drift[height], part.drift[width + height] = 0.1, faster
+    twin = Twin(part)
+    for _ in range(128):
+        part.advance(part.time + 1e-4)
+    linear = part.drift.copy()
+    twin.look()
+    assert twin.lost == lost
+    np.testing.assert_allclose(part.drift[part.objects], linear[part.objects], rtol=1e-6, atol=1e-9)
+    assert part.drift[height] == pytest.approx(0.1 + faster * 128e-4, rel=1e-3)

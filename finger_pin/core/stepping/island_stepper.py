@@ -252,8 +252,8 @@ class Part:
         twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
         return twin
 
-    def copy(self) -> Part:
-        """Return an independent part that goes on bit by bit alike."""
+    def copy(self, judged: bool | None = None) -> Part:
+        """Return an independent part that goes on bit by bit alike; its error is estimated, if not told, as here."""
         bound = self._bound
         return Part(
             self.island,
@@ -266,7 +266,7 @@ class Part:
             bound.rtol,
             bound.atol.copy(),
             bound.memory.copy(),
-            self.judged,
+            self.judged if judged is None else judged,
         )
 
 

@@ -24,9 +24,9 @@ _MOST = 8
 # it was less than so large a share of that, or from so many looks ago; if it was more than another share then: of what
 # was less, most has been added by the steps themselves since.
 _LARGE, _LARGEST, _SMALL, _LEAST, _LOOKS = 3e3, 3e-2, 1.0 / 30.0, 1.0 / 300.0, 4
-# It grows beyond all bounds if it is larger than the largest at so many looks in a row, has grown before each, and is
-# no less than such a share of what the linearised flow makes of it.
-_GROWN, _SHARE = 2, 0.5
+# Of an error beyond the largest such a share is followed, which is what a run at tighter tolerances has left of it: the
+# error is beyond all bounds where the share, too, grows beyond the largest.
+_LEFT = 0.1
 
 
 class Moment(NamedTuple):
@@ -40,14 +40,13 @@ class Moment(NamedTuple):
 
 
 class Twin:
-    """Follows the error of an island."""
+    """Follows the error of an island.
 
-    _grown = 0
+    Attributes:
+        lost: Whether the error has grown beyond all bounds: it is followed no more.
+    """
 
-    @property
-    def lost(self) -> bool:
-        """Whether the error has grown beyond all bounds."""
-        return self._grown >= _GROWN
+    lost = False
 
     def __init__(self, part: Part) -> None:
         """Begin at an island's present state."""
@@ -68,7 +67,6 @@ class Twin:
                 self._follow()
             self._seen = [self._now()]
             return
-        self._grown = 0
         if size < _SMALL * self._large:
             self._seen = self._seen[-1:]
 
@@ -77,11 +75,17 @@ class Twin:
         return Moment(part.time, *(each.copy() for each in (part.x, part.attitude, part.memory, part.drift)))
 
     def _follow(self) -> None:
-        """Replace the error by the difference to a motion that starts off by that of the first moment seen."""
+        """Replace the error by the difference to a motion that starts off by that of the first moment seen.
+
+        Of an error beyond the largest it starts off by a share that is not, and what is apart is that share of it.
+        """
         part, (begin, *later) = self._part, self._seen
-        twin = part.copy()
+        share = 1.0
+        while _LARGEST < share * _size(part, begin.drift) < np.inf:
+            share *= _LEFT
+        twin = part.copy(judged=False)
         twin.knots = part.knots
-        twin.restart(begin.x + begin.drift, begin.attitude, begin.time)
+        twin.restart(begin.x + share * begin.drift, begin.attitude, begin.time)
         twin.memory[core.STEP] = begin.memory[core.STEP]
         sums, error, time = begin.memory[[core.DRIFT, core.OBJECT_DRIFT]], begin.drift, begin.time
         # What takes so much longer is no neighbour any more.
@@ -89,13 +93,12 @@ class Twin:
         for moment in later:
             if twin.advance(moment.time, room)[0] != core.DONE:
                 return
-            other = difference(part, moment, twin)
+            other = difference(part, moment, twin) / share
             means = [max(_mean(each[places]) for each in (error, other)) for places in (part.joints, part.objects)]
             sums, time, error = sums + (moment.time - time) * np.minimum(means, 1.0), moment.time, other
-        was, found, linear = (_size(part, each) for each in (begin.drift, error, part.drift))
-        grows = found > max(_LARGEST, was, _SHARE * linear)
-        self._grown = self._grown + 1 if grows else 0
-        if found < linear:
+        found = _size(part, error)
+        self.lost = share < 1.0 and share * found > _LARGEST
+        if found < _size(part, part.drift):
             part.drift[:], part.memory[[core.DRIFT, core.OBJECT_DRIFT]], part.memory[core.BEHIND] = error, sums, 0.0
 
 
