@@ -16,7 +16,6 @@ from finger_pin.core.tables import Tables
 from finger_pin.core.threads import in_threads
 from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
-from finger_pin.laws.contact import CONTACT
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import GUIDES
 
@@ -71,19 +70,16 @@ class Room(NamedTuple):
 class Models:
     """Models of the same tables under given inputs: memory for threads, with or without forces at tips."""
 
-    def __init__(
-        self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool, books: int
-    ) -> None:
+    def __init__(self, tables: Tables, laws: Sequence[Law | ContactLaw], channels: int, moved: bool) -> None:
         """Keep tables and inputs.
 
         Args:
-            tables: Of a mechanism or an island.
+            tables: Of a mechanism.
             laws: Of their groups of rows.
             channels: Number of inputs.
             moved: Whether the base moves.
-            books: Number of energies and powers that are booked.
         """
-        self.tables, self.books = tables, books
+        self.tables = tables
         self._laws, self._channels, self._moved = laws, channels, moved
         self._known: dict[tuple[bool, int], BoundModel] = {}
 
@@ -107,38 +103,20 @@ class Models:
             model.renew(tables._replace(loaded=loaded), model.model.control)
 
 
-def book_many(
-    models: Models, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
-) -> tuple[Array, Array]:
-    """Return energies and powers at states of the core, shape (m, books), and J^T F, shape (m, N).
+def fill(
+    models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
+) -> None:
+    """Fill a room with the signals of states of the core.
 
     Args:
-        models: Of the mechanism or island.
+        models: Of the mechanism.
+        room: What is filled.
         states: Shape (m, size), of the core.
         attitudes: Of free bodies, shape (m, f, 4).
         commands: Inputs, shape (m, u).
         forces: At the tips, shape (m, t, 3), N.
         base: Motion of the base, as for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
     """
-    count, work = len(states), models.model().model.work
-    room = Room(
-        packed=states,
-        rates=np.zeros((0, states.shape[1])),
-        rows=np.zeros((len(work.rows), 0, work.rows.shape[1])),
-        first=0,
-        torques=np.zeros((count, len(work.torque))),
-        externals=np.zeros((count, len(work.torque))),
-        booked=np.zeros((count, models.books)),
-        touches=np.zeros((0, models.tables.touching // CONTACT.arms, 9)),
-    )
-    fill(models, room, states, attitudes, commands, np.ascontiguousarray(forces), base)
-    return room.booked, room.externals
-
-
-def fill(
-    models: Models, room: Room, states: Array, attitudes: Array, commands: Array, forces: Array, base: Array | None
-) -> None:
-    """Fill a room with the signals of states of the core, as for `book_many`."""
     bases = path_motions(base, len(states), int(models.tables.guided.max(initial=-1)) + 1)
     loaded, count = bool(np.any(forces)), len(states)
 

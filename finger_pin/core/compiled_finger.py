@@ -39,9 +39,8 @@ class CompiledMechanism:
         self.mechanism = mechanism
         self.charts = Charts.of(mechanism)
         self.tables = build_tables(mechanism)
-        laws, books = [table.law for table in mechanism.rows], mechanism.books
-        count = len(books.stored) + len(books.powers)
-        self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved, count)
+        laws = [table.law for table in mechanism.rows]
+        self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved)
         self._motions: dict[int, tuple[Motions, NDArray[np.uint8]]] = {}
 
     def renew(self, mechanism: Mechanism) -> bool:

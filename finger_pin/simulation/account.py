@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.stepping.textbook import Apart, Trajectory
+from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.simulation.energy import Flows, energies, powers
@@ -160,16 +159,12 @@ def _parts(loop: ClosedLoop, trajectory: Trajectory) -> list[_Part]:
     found: list[_Part] = []
     for island in trajectory.islands:
         ends = island.times
-        found.append((np.append(ends[ends < reached], reached), partial(_powers_apart, loop, island)))
+        found.append((np.append(ends[ends < reached], reached), island.powers))
 
     def powers(times: Array) -> Array:
         return loop.powers(times, trajectory.interpolate(times))
 
     return found or [(trajectory.breakpoints, powers)]
-
-
-def _powers_apart(loop: ClosedLoop, island: Apart, times: Array) -> Array:
-    return island.powers(times, loop.force(times), loop.base(times))
 
 
 def _works(power: Callable[[Array], Array], begin: Array, length: Array, times: Array, count: int) -> Array:

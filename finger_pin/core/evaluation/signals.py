@@ -12,7 +12,7 @@ from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.jit import Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, call_filling, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.broad_phase import arrive, glide, list_awake, settle, wake
+from finger_pin.core.stepping.broad_phase import arrive, glide, list_awake, set_asleep, settle, wake
 from finger_pin.core.tables import END, FIRST
 
 
@@ -81,7 +81,7 @@ STATES, MOTIONS = Kind(States), Kind(Motions)
 
 
 @compiled
-def _book(tables: Any, work: Any, totals: Any) -> None:
+def book(tables: Any, work: Any, totals: Any) -> None:
     """Sum up stored energies and powers of all rows after an evaluation."""
     for c in range(totals.size):
         totals[c] = 0.0
@@ -98,19 +98,32 @@ def _book(tables: Any, work: Any, totals: Any) -> None:
             continue
         call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
         for i in range(tables.books.shape[1]):
-            if tables.books[g, i] >= 0:
+            entry = tables.books[g, i]
+            if entry >= 0:
+                total = totals[entry]
                 for k in range(begin, end):
-                    totals[tables.books[g, i]] += work.powers[i, k]
+                    total += work.powers[i, k]
+                totals[entry] = total
 
 
 @compiled
-def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: Any) -> None:
-    """Wake the contacts that may have closed since the state before the m-th."""
+def rouse(tables: Any, work: Any) -> None:
+    """Wake all contacts, of which nothing is known."""
+    for k in range(tables.touching):
+        work.paths.asleep[k] = 0
+    for e in range(work.paths.path.size):
+        work.paths.path[e] = 0.0
+    list_awake(tables, work.paths)
+
+
+@compiled
+def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, after: Any) -> None:
+    """Wake the contacts that may have closed since a state, from its quaternions and numbers and from those of now."""
     for f in range(tables.charts.size):
         # What a free body has turned by: its angles count from its attitude.
-        first, second, cosine = attitudes[m - 1, f], attitudes[m, f], 0.0
+        cosine = 0.0
         for r in range(4):
-            cosine += first[r] * second[r]
+            cosine += first[f, r] * second[f, r]
         before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
     glide(before, after, tables.parents.size, work.paths)
     wake(tables, work.paths)
@@ -118,9 +131,17 @@ def _wake(tables: Any, work: Any, attitudes: Any, m: int, before: Any, after: An
     for k in range(tables.touching):
         # Bent bristles tell of a contact that was closed meanwhile.
         if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
-            first = k - k % 3
-            for each in range(first, first + 3):
-                work.paths.asleep[each] = 0
+            set_asleep(k - k % 3, 0, work.paths.asleep)
+    list_awake(tables, work.paths)
+
+
+@compiled
+def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
+    """Let contacts that are far apart at a state sleep, and keep it, for `wake_since`."""
+    arrive(tables, work.paths)
+    settle(tables, work.rows, work.paths, state[2 * work.torque.size :])
+    for c in range(state.size):
+        before[c] = state[c]
 
 
 @compiled
@@ -157,17 +178,21 @@ def _set(many: Any, model: Any, m: int) -> None:
 @compiled
 def _evaluate(many: Any, model: Any, m: int) -> None:
     """Evaluate the state that is set."""
-    tables, work = model.tables, model.work
     if many.rates.shape[0] > 0 or many.bases.shape[0] > 0:
         call_at(model.evaluate, many.model, 0.0)
-        return
-    # Powers do not need the acceleration, and only some rows need to know where bodies are.
-    for i in range(many.commands.shape[1]):
-        work.command[i] = many.commands[m, i]
+    else:
+        model.work.command[:] = many.commands[m]
+        exert_alone(model, many.model, 0.0)
+
+
+@compiled
+def exert_alone(model: Any, address: int, time: float) -> None:
+    """Fill what the rows do where inputs are known: for powers, which do not need the acceleration."""
+    tables, width = model.tables, model.work.torque.size
+    # Only some rows need to know where bodies are.
     if tables.loaded or tables.paths.columns.size > 0:
-        width = work.torque.size
-        move(tables, model.state[:width], model.state[width : 2 * width], work)
-    call_at(model.exert, many.model, 0.0)
+        move(tables, model.state[:width], model.state[width : 2 * width], model.work)
+    call_at(model.exert, address, time)
 
 
 @compiled
@@ -186,20 +211,20 @@ def _keep(many: Any, model: Any, m: int) -> None:
     for j in range(many.torques.shape[1]):
         many.torques[m, j] = work.torque[j]
         many.externals[m, j] = work.external[j]
-    _book(tables, work, many.booked[m])
+    book(tables, work, many.booked[m])
 
 
 @compiled
-def _book_moved(many: Any, model: Any, m: int) -> None:
-    """Book the power of a base that moves, or of what moves coordinates along paths."""
-    work, width, last = model.work, many.torques.shape[1], many.booked.shape[1] - 1
-    if model.power != 0 and many.bases.shape[0] > 0:
-        call_at(model.power, many.model, 0.0)
-        many.booked[m, last] = work.base_power[0]
+def book_moved(model: Any, address: int, moving: bool, totals: Any) -> None:
+    """Book the power of a base that moves, or of what moves coordinates along paths, after a whole evaluation."""
+    work, width, last = model.work, model.work.torque.size, totals.size - 1
+    if model.power != 0 and moving:
+        call_at(model.power, address, 0.0)
+        totals[last] = work.base_power[0]
     if work.guide.size > 0:
         for j in range(width):
             if model.tables.guided[j] >= 0:
-                many.booked[m, last] -= work.torque[j] * many.states[m, width + j]
+                totals[last] -= work.torque[j] * model.state[width + j]
 
 
 @Unit
@@ -210,26 +235,18 @@ def evaluate_many(address: int, _time: float) -> int:
     tables, work, before = model.tables, model.work, model.rate
     # Signals have the gaps of all contacts; for powers alone those far apart sleep from state to state.
     sleepy = tables.touching > 0 and many.rows.shape[1] == 0 and many.bases.shape[0] == 0
-    for k in range(tables.touching):
-        work.paths.asleep[k] = 0
-    for e in range(work.paths.path.size):
-        work.paths.path[e] = 0.0
-    list_awake(tables, work.paths)
+    rouse(tables, work)
     for m in range(many.states.shape[0]):
         _set(many, model, m)
         if sleepy and m > 0:
-            _wake(tables, work, many.attitudes, m, before, model.state)
-            list_awake(tables, work.paths)
+            wake_since(tables, work, many.attitudes[m - 1], many.attitudes[m], before, model.state)
         _set_base(many.bases, m, tables, work)
         place_bodies(tables, many.attitudes[m])
         _evaluate(many, model, m)
         _keep(many, model, m)
         if sleepy:
-            arrive(tables, work.paths)
-            settle(tables, work.rows, work.paths, model.state[2 * work.torque.size :])
-            for c in range(many.states.shape[1]):
-                before[c] = model.state[c]
-        _book_moved(many, model, m)
+            let_sleep(tables, work, model.state, before)
+        book_moved(model, many.model, many.bases.shape[0] > 0, many.booked[m])
     return 1
 
 

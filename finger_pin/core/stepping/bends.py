@@ -9,16 +9,10 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.interpolation import begin_anew, between
+from finger_pin.core.stepping.interpolation import begin_step, within
 
 # How near a change of sign is found, of the step; after so many evaluations at most.
 _NEAR, _MOST = 1e-6, 40
-
-
-@compiled
-def begin_of(b: Any, step: int) -> Any:
-    """Return the time at which a step begins."""
-    return b.begin if step == 0 else b.ends[step - 1]
 
 
 @compiled
@@ -26,12 +20,8 @@ def state_at(b: Any, step: int, time: float, out: Any) -> None:
     """Fill the state at a time of a step, or of a later one."""
     while step < b.ends.size - 1 and time > b.ends[step]:
         step += 1
-    first = begin_of(b, step)
-    for c in range(b.before.size):
-        b.before[c] = b.start[c] if step == 0 else b.states[step - 1, c]
-    if step > 0:
-        begin_anew(b.charts, b.width, b.before)
-    between(b.before, b.states[step], b.dense[step], (time - first) / (b.ends[step] - first), out)
+    begin_step(b, step)
+    within(b, step, time, out)
 
 
 @compiled

@@ -18,9 +18,9 @@ from finger_pin.core.evaluation.charts import place_bodies, turn_small
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.bends import begin_of, cross, hold_all, last_before, look, rate_at, state_at, turned_after
+from finger_pin.core.stepping.bends import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.broad_phase import list_awake
-from finger_pin.core.stepping.interpolation import Between
+from finger_pin.core.stepping.interpolation import Between, begin_of
 from finger_pin.core.stepping.radau import copy, curvature, relax
 
 # Entries of the memory.

@@ -6,9 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.evaluation.inputs import inputs
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled
-from finger_pin.core.model import MODEL
 
 
 class Between(NamedTuple):
@@ -45,45 +43,17 @@ class Between(NamedTuple):
     turned: Layers
 
 
-class Commands(NamedTuple):
-    """Times and states of an island, and its inputs there.
-
-    Attributes:
-        model: Address of a bound `Model`.
-        times: Shape (k,), s.
-        states: Shape (k, size).
-        found: Filled with inputs, shape (k, u).
-    """
-
-    model: int
-    times: Vector
-    states: Matrix
-    found: Matrix
-
-
-BETWEEN, COMMANDS = Kind(Between), Kind(Commands)
+BETWEEN = Kind(Between)
 
 
 @Unit
 def interpolate_many(address: int, _time: float) -> int:
     """Fill the states of a `Between` at an address; there must be a step."""
     b = bound_at(address, BETWEEN)
-    ends, states, found, before, last = b.ends, b.states, b.found, b.before, b.ends.size - 1
-    step, known = 0, -1
+    step = -1
     for k in range(b.times.size):
-        at = b.times[k]
-        while step > 0 and at < ends[step - 1]:
-            step -= 1
-        while step < last and at >= ends[step]:
-            step += 1
-        begin = b.begin if step == 0 else ends[step - 1]
-        if step != known:
-            known = step
-            for c in range(before.size):
-                before[c] = b.start[c] if step == 0 else states[step - 1, c]
-            if step > 0:
-                begin_anew(b.charts, b.width, before)
-        between(before, states[step], b.dense[step], (at - begin) / (ends[step] - begin), found[k])
+        step = step_at(b, b.times[k], step)
+        within(b, step, b.times[k], b.found[k])
         for f in range(b.charts.size):
             for c in range(4):
                 b.turned[k, f, c] = b.attitude[f, c] if step == 0 else b.attitudes[step - 1, f, c]
@@ -91,14 +61,52 @@ def interpolate_many(address: int, _time: float) -> int:
 
 
 @compiled
+def begin_of(b: Any, step: int) -> Any:
+    """Return the time at which a step begins."""
+    return b.begin if step == 0 else b.ends[step - 1]
+
+
+@compiled
+def step_at(b: Any, time: float, known: int) -> Any:
+    """Return the step that a time is in, sought from one that is known, -1 for none; fill the state at its begin."""
+    step, last = max(known, 0), b.ends.size - 1
+    while step > 0 and time < b.ends[step - 1]:
+        step -= 1
+    while step < last and time >= b.ends[step]:
+        step += 1
+    if step != known:
+        begin_step(b, step)
+    return step
+
+
+@compiled
+def begin_step(b: Any, step: int) -> None:
+    """Fill the state at the begin of a step."""
+    for c in range(b.before.size):
+        b.before[c] = b.start[c] if step == 0 else b.states[step - 1, c]
+    if step > 0:
+        begin_anew(b.charts, b.width, b.before)
+
+
+@compiled
+def within(b: Any, step: int, time: float, out: Any) -> None:
+    """Fill the state at a time within a step, which has begun."""
+    begin = begin_of(b, step)
+    between(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
+
+
+@compiled
 def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None:
     """Fill the state after a share of a step, from the states at its ends and its row of ``dense``."""
-    last = dense.shape[0] - 1
+    last, rest = dense.shape[0] - 1, 1.0 - share
+    # Whole rows at a time, so that the compiler can use vector instructions.
     for c in range(before.size):
-        bend = dense[last, c]
-        for row in range(last - 1, -1, -1):
-            bend = dense[row, c] + share * bend
-        out[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
+        out[c] = dense[last, c]
+    for row in range(last - 1, -1, -1):
+        for c in range(before.size):
+            out[c] = dense[row, c] + share * out[c]
+    for c in range(before.size):
+        out[c] = rest * before[c] + share * (after[c] + rest * out[c])
 
 
 @compiled
@@ -124,15 +132,3 @@ def begin_anew(charts: Any, width: int, x: Any) -> None:
         x[width + i + 1] = db * np.cos(c) - da * np.cos(b) * np.sin(c)
         x[width + i + 2] = da * np.sin(b) + dc
         x[i], x[i + 1], x[i + 2] = 0.0, 0.0, 0.0
-
-
-@Unit
-def command_many(address: int, _time: float) -> int:
-    """Fill the inputs of the `Commands` at an address."""
-    commands = bound_at(address, COMMANDS)
-    model = bound_at(commands.model, MODEL)
-    width = model.work.torque.size
-    for k in range(commands.times.size):
-        state = commands.states[k]
-        inputs(model.control, commands.times[k], state[:width], state[width : 2 * width], commands.found[k])
-    return 1

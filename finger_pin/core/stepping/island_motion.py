@@ -7,10 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from finger_pin.core.bound_models import Models, book_many
-from finger_pin.core.jit import call
-from finger_pin.core.stepping.interpolation import BETWEEN, COMMANDS, Between, Commands, command_many, interpolate_many
+from finger_pin.core.bound_models import FEW
+from finger_pin.core.jit import call, copied
+from finger_pin.core.model import BoundModel
+from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
 from finger_pin.core.stepping.island_stepper import Part, Record
+from finger_pin.core.stepping.powers import POWERS, Powers, power_many
+from finger_pin.core.threads import in_threads
+from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 
@@ -42,14 +46,18 @@ class IslandMotion:
 
     def interpolate(self, at: Array) -> tuple[Array, Array]:
         """Return states at times, shape (m, size), and the quaternions from which angles count, shape (m, f, 4)."""
-        record, tables = self.record, self.part.tables
         at = np.array(at, dtype=float)
-        found, turned = np.empty((len(at), len(self.start))), np.empty((len(at), *self.attitude.shape))
-        if not len(record.times):
-            found[:], turned[:] = self.start, self.attitude
-            return found, turned
-        width = len(tables.parents) + len(tables.lumps)
-        between = Between(
+        between = self._between(at, len(at))
+        if len(self.record.times):
+            call(interpolate_many, between, BETWEEN)
+        else:
+            between.found[:], between.turned[:] = self.start, self.attitude
+        return between.found, between.turned
+
+    def _between(self, times: Array, kept: int = 0) -> Between:
+        """Return the steps and times, with room for so many states."""
+        record, tables = self.record, self.part.tables
+        return Between(
             begin=self.begin,
             start=self.start,
             attitude=self.attitude,
@@ -58,39 +66,42 @@ class IslandMotion:
             attitudes=record.attitudes,
             dense=record.dense,
             charts=tables.charts,
-            width=width,
+            width=len(tables.parents) + len(tables.lumps),
             before=np.zeros_like(self.start),
-            times=at,
-            found=found,
-            turned=turned,
+            times=times,
+            found=np.empty((kept, len(self.start))),
+            turned=np.empty((kept, *self.attitude.shape)),
         )
-        call(interpolate_many, between, BETWEEN)
-        return found, turned
 
-    def powers(self, times: Array, force: Array, base: Array | None) -> Array:
+    def powers(self, times: Array) -> Array:
         """Return powers of its rows and of the forces at its tips, shape (m, powers + 1), W, in the order of the books.
 
-        Its inputs are those that the core computes itself.
+        Inputs, forces and the motion of the base are those that the core computes itself.
 
         Args:
-            times: Shape (m,), s.
-            force: At all tips, shape (t, 3) or (m, t, 3), of one tip (3,) or (m, 3), N.
-            base: As for `Mechanism.evaluate`, shape (m, 12 or more); None at rest.
+            times: Shape (m,), s; there must be a step.
         """
-        part, (states, attitudes) = self.part, self.interpolate(times)
-        commands = np.empty((len(times), len(part.control.tension)))
-        call(command_many, Commands(part.model.address, np.array(times), states, commands), COMMANDS)
-        tips = len(self.mechanism.body.tips)
-        # Of one tip, forces over time have no axis of their own for it.
-        given = force.reshape(-1, 1, 3) if tips == 1 else force
-        forces = np.broadcast_to(given, (len(times), tips, 3))[:, part.island.tips]
-        booked, external = book_many(self._models, states, attitudes, commands, forces, base)
-        width, bodies = external.shape[1], len(part.tables.parents)
-        fingertip = np.sum(external[:, :bodies] * states[:, width : width + bodies], axis=1)
-        return np.column_stack([booked[:, len(self.mechanism.books.stored) :], fingertip])
+        books, count = self.mechanism.books, len(times)
+        found = np.empty((count, len(books.powers) + 1))
+        parts = 1 if count < FEW else 2
+        while len(self._models) < parts:
+            self._models.append(self._bound())
+
+        def fill(thread: int) -> None:
+            own = slice(thread * count // parts, (thread + 1) * count // parts)
+            between, booked = self._between(np.array(times[own])), np.zeros(len(books.stored) + len(books.powers))
+            call(power_many, Powers(self._models[thread].address, between, booked, found[own]), POWERS)
+
+        in_threads(fill, range(parts))
+        return found
+
+    def _bound(self) -> BoundModel:
+        """Return a model of the island with its inputs."""
+        part = self.part
+        work = build_work(part.tables, part.laws, len(part.control.tension))
+        return BoundModel(copied(part.tables), copied(part.control), work)
 
     @cached_property
-    def _models(self) -> Models:
-        part = self.part
-        count = len(self.mechanism.books.stored) + len(self.mechanism.books.powers)
-        return Models(part.tables, part.laws, len(part.control.tension), self.mechanism.moved, count)
+    def _models(self) -> list[BoundModel]:
+        """Models that have served, one for each thread."""
+        return []

@@ -40,7 +40,7 @@ class Apart(Protocol):
     def times(self) -> Array:
         """Ends of its steps with the start first, s."""
 
-    def powers(self, times: Array, force: Array, base: Array | None) -> Array:
+    def powers(self, times: Array) -> Array:
         """Return its powers at times, and that of the forces at its tips, shape (m, powers + 1), W."""
 
 

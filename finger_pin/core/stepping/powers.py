@@ -1,0 +1,81 @@
+"""Powers along the steps of an island, compiled: the account needs no accelerations, and nothing else of a state."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from finger_pin.core.evaluation.charts import place_bodies
+from finger_pin.core.evaluation.inputs import inputs
+from finger_pin.core.evaluation.signals import book, book_moved, exert_alone, let_sleep, rouse, wake_since
+from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call_at, compiled
+from finger_pin.core.model import MODEL
+from finger_pin.core.stepping.interpolation import Between, step_at, within
+
+
+class Powers(NamedTuple):
+    """The steps of an island, and what is filled at the k times of their `Between`.
+
+    Attributes:
+        model: Address of a bound `Model` with the island's inputs.
+        between: The steps, of which there must be one.
+        booked: Scratch, energies and powers of the rows, shape (books,).
+        powers: Filled with the powers, and that of the forces at the tips, shape (k, powers + 1).
+    """
+
+    model: int
+    between: Between
+    booked: Vector
+    powers: Matrix
+
+
+POWERS = Kind(Powers)
+
+
+@compiled
+def _attitude(b: Any, step: int) -> Any:
+    """Return the quaternions from which angles count in a step."""
+    return b.attitude if step == 0 else b.attitudes[step - 1]
+
+
+@compiled
+def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
+    """Fill powers of the rows, the last of what is booked, and that of the forces at the tips."""
+    count, width = out.size - 1, work.torque.size
+    for i in range(count):
+        out[i] = booked[booked.size - count + i]
+    out[count] = 0.0
+    if tables.loaded:
+        for j in range(tables.parents.size):
+            out[count] += work.external[j] * state[width + j]
+
+
+@Unit
+def power_many(address: int, _time: float) -> int:
+    """Fill the `Powers` at an address."""
+    asked = bound_at(address, POWERS)
+    b, model = asked.between, bound_at(asked.model, MODEL)
+    tables, work, state = model.tables, model.work, model.state
+    width, step, last = work.torque.size, -1, -1
+    moving = model.power != 0 or work.guide.size > 0
+    rouse(tables, work)
+    for k in range(b.times.size):
+        time, last = b.times[k], step
+        step = step_at(b, time, step)
+        within(b, step, time, state)
+        if step != last:
+            place_bodies(tables, _attitude(b, step))
+        if moving:
+            call_at(model.evaluate, asked.model, time)
+        else:
+            # Contacts far apart sleep from state to state; what is left in ``rate`` is the state before.
+            if tables.touching > 0 and k > 0:
+                wake_since(tables, work, _attitude(b, last), _attitude(b, step), model.rate, state)
+            inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
+            exert_alone(model, asked.model, time)
+        book(tables, work, asked.booked)
+        if moving:
+            book_moved(model, asked.model, True, asked.booked)
+        elif tables.touching > 0:
+            let_sleep(tables, work, state, model.rate)
+        _keep(tables, work, state, asked.booked, asked.powers[k])
+    return 1
