@@ -14,6 +14,7 @@ from finger_pin.control.palm import PalmPath
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
+from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
@@ -28,6 +29,9 @@ from finger_pin.references.signal import Signal
 _NO_FORCE = ForceSignal()
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
+
+# Nothing of a finger changes in a run: those of a scenario that is run again share it.
+_FINGERS: Remembered[Finger] = Remembered(4)
 
 _Acting = tuple[Array, Array, Array | None]
 
@@ -115,7 +119,8 @@ class ClosedLoop:
                 or are not finite, or tensions are negative.
         """
         start, scenarios = scenario.simulation.start_time, scenario.parts()
-        finger = finger or Finger(scenario.finger, objects=scenario.environment.objects)
+        parts = scenario.finger, scenario.environment
+        finger = finger or _FINGERS.of(parts, lambda: Finger(scenario.finger, objects=scenario.environment.objects))
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),

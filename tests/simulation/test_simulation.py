@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import finger_pin as fp
+from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.description.scenario import METHODS
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
@@ -245,3 +246,12 @@ def test_ctrl_c_in_python_keeps_what_was_computed(late):
         assert presses and float(caught.value.result.time[-1]) == pytest.approx(caught.value.time, abs=1e-3)
         assert (caught.value.time > 0.29) == late
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_runs_of_a_scenario_share_its_finger_and_what_surrounds_it_makes_another():
+    around = fp.load_scenario("press")
+    alone = around.model_copy(update={"environment": around.environment.model_copy(update={"objects": None})})
+    fingers = [ClosedLoop.from_scenario(scenario).finger for scenario in (alone, around, alone)]
+    assert fingers[0] is fingers[2]
+    assert fingers[0].surroundings is None
+    assert fingers[1].surroundings is not None
