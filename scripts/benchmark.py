@@ -30,6 +30,7 @@ STAGES = {
     "mujoco-friction": "mujoco_friction",
     "learning": "learning",
     "prepared": "prepared",
+    "identification": "identification",
     "many-runs": "many",
     "main-job": "processes",
 }

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from benchmarks import learning, mujoco_friction, prepared
+from benchmarks import identification, learning, mujoco_friction, prepared
 from benchmarks.targets import Target
 from benchmarks.work_precision import OURS
 from finger_pin.views.plots.lines import series
@@ -32,6 +32,7 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
         ("mujoco-friction", mujoco_friction.lines),
         ("learning", learning.lines),
         ("prepared", _prepared),
+        ("identification", identification.lines),
         ("many-runs", _many),
         ("main-job", _main_job),
     ):

@@ -62,6 +62,8 @@ def targets(stages: Mapping[str, Any]) -> list[Target]:
         found += _hand(stages["hand"])
     if stages.get("prepared"):
         found += _prepared(stages["prepared"])
+    if stages.get("identification"):
+        found += _identification(stages["identification"])
     if stages.get("learning"):
         found += _learning(stages["learning"])
     if stages.get("many-runs"):
@@ -117,6 +119,13 @@ def _mujoco(study: Mapping[str, Any]) -> Iterator[Target]:
             label = f"MuJoCo, {words}, {measure} error {study['limit']:g} rad"
             yield target(f"{label}: Python loop", min(row["loop_over_ours"] for row in mine), ">=", 4.0, "x")
             yield target(f"{label}: rollout", min(row["rollout_over_ours"] for row in mine), ">=", 1.0, "x")
+
+
+def _identification(study: Mapping[str, Any]) -> Iterator[Target]:
+    yield target("six numbers of fig6 identified from three starts", study["fit"]["wall"], "<=", 15.0, "s")
+    slopes = study["slopes"]
+    for count, aim in (("1", 1.3), ("3", 1.9), ("6", 2.8)):
+        yield target(f"slopes by {count} numbers, in runs", slopes[count] / slopes["run"], "<=", aim, "x")
 
 
 def _prepared(study: Mapping[str, Any]) -> Iterator[Target]:

@@ -190,6 +190,10 @@ def stages():
             "reset": {"Reach": 2e-3},
         },
         "prepared": prepared,
+        "identification": {
+            "slopes": {"run": 0.01, "1": 0.02, "3": 0.018, "6": 0.04},
+            "fit": {"duration": 8.0, "wall": 12.0, "processor": 20.0, "searches": 3, "searches_alike": 2},
+        },
         "many-runs": {"duration": 8.0, "cores": 2, "times": {"9 runs, 1 processes": 3.0}, "speed_up": 1.9}
         | {"speed_up_without_start": None},
         "main-job": job | {"later": 3.0, "later_processor_time": 3.0, "later_memory": 2**21},
@@ -221,9 +225,12 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["hand, two threads, integration"] is True
     assert verdicts["prepared run of 10 ms with another number, beside its steps, at most"] is True
     assert verdicts["a simulator's step of 20 ms at 1e-3 rad"] is False
+    assert verdicts["six numbers of fig6 identified from three starts"] is True
+    assert verdicts["slopes by 3 numbers, in runs"] is True and verdicts["slopes by 6 numbers, in runs"] is False
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out
     assert "pass" in output and "FAIL" in output and "Rodas5P" in output
+    assert "2 of 3 searches end at the best" in output and "2 for 1, 1.8 for 3, 4 for 6 numbers" in output
 
 
 def test_a_stage_whose_needs_are_missing_is_left_out(load, tmp_path, monkeypatch, capsys):
