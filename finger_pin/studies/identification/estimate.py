@@ -19,8 +19,9 @@ _ROUNDS, _STEPS, _FAILS = 5, 40, 3
 _GAIN, _EXACT = 1e-3, 1e-9
 # Damping at first and at the least, of the information; how it falls and rises (Levenberg, Marquardt).
 _DAMPING, _LESS, _MORE = 1e-3, 0.2, 30.0
-# What a motion's own errors may hide of what a step gains: mostly, and at the most.
-_FEIGNED, _MOST_FEIGNED = 0.05, 1.0
+# What a motion's own errors may hide of what a step gains: mostly, at the most, and of every sample where it is far
+# from what was recorded.
+_FEIGNED, _MOST_FEIGNED, _BY_SAMPLE = 0.05, 1.0, 1e-3
 # Parts of what a step promises: from what gain on it is taken, and up to what error of it the slopes serve again.
 _TAKEN, _SERVED = 0.05, 0.3
 #: What a squared residual u counts for where outliers are to count less, and how fast that grows.
@@ -118,6 +119,8 @@ def _descend(
     fresh, damping, failed = slopes is None, _DAMPING, 0
     slopes = problem.slopes(z) if slopes is None else list(slopes)
     enough, feigned = (_GAIN, _FEIGNED) if any(signal.ordered for signal in problem.signals) else (_EXACT, 0.0)
+    count = float(sum(w * len(e) for w, e in zip(shares, residuals, strict=True)))
+    hidden = _MOST_FEIGNED if problem.finely else max(_MOST_FEIGNED, _BY_SAMPLE * count)
     for _ in range(_STEPS):
         noise = _noise(problem, residuals) if scale is None else scale
         met, inner, pull = _normal(problem, residuals, slopes, shares, noise, loss)
@@ -132,8 +135,8 @@ def _descend(
             z, residuals, failed, damping = z + move, there, 0, max(damping * _LESS, _DAMPING)
         elif fresh:
             failed, damping = failed + 1, damping * _MORE
-        if failed > (_FAILS if promised > _MOST_FEIGNED else 0):
-            return z, residuals, slopes, promised <= _MOST_FEIGNED
+        if failed > (_FAILS if promised > hidden else 0):
+            return z, residuals, slopes, promised <= hidden
         if not taken and promised < feigned:
             return z, residuals, slopes, True
         if not served and (taken or not fresh):

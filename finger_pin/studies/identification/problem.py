@@ -106,6 +106,7 @@ class Problem:
         stop: Asked before every evaluation.
         evaluations: Number of scenarios computed.
         best: The least objective so far, and where.
+        finely: Whether the errors of what is computed are smaller than the scenario asks.
     """
 
     scenario: Scenario
@@ -118,6 +119,7 @@ class Problem:
     stop: Callable[[], bool] = lambda: False
     evaluations: int = 0
     best: tuple[float, Array] = (math.inf, np.zeros(0))
+    finely: bool = False
 
     def __post_init__(self) -> None:
         """Check that every key allows its bounds; numbers of the recordings' own join the parameters."""
@@ -231,7 +233,7 @@ class Problem:
         Where thousands of samples tell a number, it jumps by as much as a quarter of what ends an interval.
         """
         twin = self.alone()
-        twin._slopes = None
+        twin._slopes, twin.finely = None, True
         for model in twin.models:
             model.refine()
         return twin
