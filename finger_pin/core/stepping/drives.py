@@ -49,7 +49,7 @@ class Driven(NamedTuple):
     Attributes:
         drives: The loops.
         stretch: Address of the bound `Stretch`.
-        advance: Address of `rosenbrock.advance`.
+        advance: Address of `adaptive.advance`.
     """
 
     drives: Drives
@@ -86,7 +86,7 @@ def _sample(drives: Any, x: Any, tension: Any) -> None:
 
 @Unit
 def advance_driven(address: int, end: float) -> int:
-    """Advance as `rosenbrock.advance` does, and sample at every multiple of the period on the way, both ends included.
+    """Advance as `adaptive.advance` does, and sample at every multiple of the period on the way, both ends included.
 
     The end and a sample there may differ by rounding.
     """

@@ -16,6 +16,7 @@ from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.jit import Unit, bound, copied, fits
 from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
 from finger_pin.core.stepping.islands import Island
@@ -128,7 +129,7 @@ class Part:
         self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
         self._blocks: list[NDArray[np.uint8]] = []
         self._at = 0
-        self._advance = core.advance
+        self._advance = advance
 
     def room(self, count: int) -> Record:
         """Return room for so many steps."""
@@ -167,7 +168,7 @@ class Part:
             return
         room = (record.times, record.states, record.attitudes, record.dense)
         stretch = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
-        self._placed, self._blocks, self._advance = placed, [stretch], core.advance
+        self._placed, self._blocks, self._advance = placed, [stretch], advance
         if self.drives is not None:
             driven = Driven(self.drives, stretch.ctypes.data, self._advance.address)
             self._blocks.append(bound(driven, DRIVEN))

@@ -34,7 +34,7 @@ KNOTTED = Kind(Knotted)
 
 @Unit
 def advance_knotted(address: int, end: float) -> int:
-    """Advance as `rosenbrock.advance` does, by steps that end at knots.
+    """Advance as `adaptive.advance` does, by steps that end at knots.
 
     At a knot itself the value after a jump counts: a step that ends there must not see it, and ends just before.
     """
