@@ -188,6 +188,21 @@ def test_windows_of_one_motion_are_held_out_in_turn_where_laws_are_compared():
     assert capstan > 1.5
 
 
+@pytest.mark.parametrize("wrong", [{"finger.nothing": 1.0}, {DRAG: (0.5, 0.1)}])
+def test_a_law_to_compare_that_is_wrong_is_refused_before_any_search(wrong):
+    begun = []
+    with pytest.raises(fp.InputError, match="identify.compare.other"):
+        fp.identify(
+            "canal",
+            parameters=BOUNDS,
+            recordings={"pull": MOTION},
+            compare={"other": wrong},
+            data={"pull": ramp(np.random.default_rng(5), 0.15, 0.5)},
+            progress=lambda *words: begun.append(words),
+        )
+    assert not begun
+
+
 def test_windows_begin_before_what_is_compared_so_that_no_sample_but_the_first_is_lost():
     data = ramp(np.random.default_rng(4), 0.15, 0.5)
     settings = RecordingSettings.model_validate({**MOTION, "window": 1.0})
@@ -241,3 +256,11 @@ def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
     assert (found.deviation[0] < found.deviation[1]).all() and (found.deviation < [0.0375, 0.25]).all()
     with pytest.raises(fp.InputError, match="at least one"):
         fp.propose("canal", {}, **given)
+    for entry, value, message in (
+        ("outputs", {}, "outputs: must have at least one"),
+        ("outputs", {"tendon_tension.T1": 0.0}, "outputs.tendon_tension.T1: must be above 0"),
+        ("parameters", {COULOMB: (0.2, 0.05)}, f"parameters.{COULOMB}: must be the least"),
+        ("known", {DRAG: 0.1, "finger.mass": 1.0}, "known.finger.mass: is none of the parameters"),
+    ):
+        with pytest.raises(fp.InputError, match=message):
+            fp.propose("canal", candidates, **{**given, entry: value}, overrides=overrides)

@@ -15,13 +15,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from finger_pin.core.evaluation.charts import place_bodies, turn_small
-from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, compiled
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.bends import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.broad_phase import list_awake
 from finger_pin.core.stepping.interpolation import Between, begin_of
-from finger_pin.core.stepping.radau import copy, curvature, relax
+from finger_pin.core.stepping.radau import copy, curvature, node, relax
 
 # Entries of the memory.
 STEP, TIME, SPLIT, LENGTH, MEMORY_SIZE = range(5)
@@ -113,34 +112,6 @@ COLLOCATION = Kind(Collocation)
 
 
 @compiled
-def _node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
-    """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
-    count, size = col.derivative.shape
-    for k in range(count):
-        if col.changed[k] != 0:
-            rate_at(col.changed[k], time, col.state)
-            other = bound_at(col.changed[k], MODEL)
-            for c in range(size):
-                col.given[a, k, c] = (other.rate[c] - model.rate[c]) / col.changes[k]
-    call_at(model.linearise, col.model, time)
-    if call_at(model.condense, col.model, 1.0 / (h * col.sweep[a, a])) == 0:
-        return False
-    resolvent = col.resolvents[a]
-    if model.linear.blocks.touches.size == 0:
-        for i in range(size):
-            for c in range(size):
-                resolvent[c, i] = model.linear.solution[i, c]
-        return True
-    for c in range(size + 1):
-        col.right[c] = 0.0
-    for c in range(size):
-        col.right[c] = 1.0
-        solve(model.linear, col.right, resolvent[c])
-        col.right[c] = 0.0
-    return True
-
-
-@compiled
 def _place(col: Any, step: int) -> None:
     """Place free bodies of all models by their attitudes at the begin of a step."""
     b = col.motion
@@ -215,7 +186,7 @@ def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: 
         else:
             state_at(col.motion, step, time, col.state)
             rate_at(col.model, time, col.state)
-        if not _node(col, model, a, time, h):
+        if not node(col, model, a, time, h):
             return SINGULAR
     relax(col, h)
     return 0

@@ -13,7 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Legendre
 
-from finger_pin.core.jit import compiled
+from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.jit import bound_at, call_at, compiled
+from finger_pin.core.model import MODEL
+from finger_pin.core.stepping.bends import rate_at
 
 _COUNT = 4
 #: Nodes c, of a step: zeros of P_s - P_(s-1) on it.
@@ -47,6 +50,34 @@ def copy(source: Any, target: Any) -> None:
     for r in range(source.shape[0]):
         for c in range(source.shape[1]):
             target[r, c] = source[r, c]
+
+
+@compiled
+def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
+    """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
+    count, size = col.derivative.shape
+    for k in range(count):
+        if col.changed[k] != 0:
+            rate_at(col.changed[k], time, col.state)
+            other = bound_at(col.changed[k], MODEL)
+            for c in range(size):
+                col.given[a, k, c] = (other.rate[c] - model.rate[c]) / col.changes[k]
+    call_at(model.linearise, col.model, time)
+    if call_at(model.condense, col.model, 1.0 / (h * col.sweep[a, a])) == 0:
+        return False
+    resolvent = col.resolvents[a]
+    if model.linear.blocks.touches.size == 0:
+        for i in range(size):
+            for c in range(size):
+                resolvent[c, i] = model.linear.solution[i, c]
+        return True
+    for c in range(size + 1):
+        col.right[c] = 0.0
+    for c in range(size):
+        col.right[c] = 1.0
+        solve(model.linear, col.right, resolvent[c])
+        col.right[c] = 0.0
+    return True
 
 
 @compiled

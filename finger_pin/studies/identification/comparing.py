@@ -64,8 +64,7 @@ def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> La
     """
     folds = _folds(problem)
     rows = []
-    others = ((name, _other(problem, name, each)) for name, each in settings.compare.items())
-    for name, law in [(OWN, problem), *others]:
+    for name, law in [(OWN, problem), *other_laws(problem, settings).items()]:
         best = found if law is problem else _best(law, found.weights, _places(law, problem, found.z))
         size = float(sum(w * len(e) for e, w in zip(best.residuals, found.weights, strict=True)))
         value = minus_twice_likelihood(best.residuals, found.weights, law.groups) + law.asked * math.log(size)
@@ -73,6 +72,15 @@ def compare_laws(problem: Problem, settings: IdentifySettings, found: Fit) -> La
         out = _held_out(law, best, found, folds)
         rows.append((name, law.asked, value, _scaled_rms(best.residuals, found.noise), out, values))
     return LawComparison(*(list(column) for column in zip(*rows, strict=True)))
+
+
+def other_laws(problem: Problem, settings: IdentifySettings) -> dict[str, Problem]:
+    """Return the problem under each of the other laws, by name.
+
+    Raises:
+        InputError: If an entry of a law is wrong.
+    """
+    return {name: _other(problem, name, each) for name, each in settings.compare.items()}
 
 
 def _other(problem: Problem, name: str, law: Mapping[str, Any]) -> Problem:

@@ -18,6 +18,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.studies.fingerprint import finger_digest
+from finger_pin.studies.identification.comparing import other_laws
 from finger_pin.studies.identification.estimate import LOSSES, fit
 from finger_pin.studies.identification.ledger import Ledger, digest
 from finger_pin.studies.identification.motions import RecordedMotion, windows
@@ -101,6 +102,7 @@ def identify(
     scenario = described_by(scenario, own)
     taken = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
     problem = build_problem(scenario, settings, taken, own)
+    other_laws(problem, settings)  # Before any work: an entry that is wrong in them is refused now.
     problem.stop = _latched(stop or (lambda: False))
     asked = digest(scenario, settings, taken, (starts, seed, loss, *([] if own is None else [finger_digest(own)])))
     with Ledger(None if output is None else Path(output), asked, restart) as ledger:

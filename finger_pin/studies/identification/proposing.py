@@ -49,12 +49,12 @@ def propose(
         would leave, together with what is known.
 
     Raises:
-        InputError: If there are no candidates, or one or an output names nothing that there is.
+        InputError: If there are no candidates, parameters or outputs, or one names nothing that there is; if bounds are
+            not in order, or a noise or what is known is not positive.
     """
     import xarray as xr
 
-    if not candidates:
-        raise InputError("candidates", "must have at least one entry")
+    _check(candidates, parameters, outputs, known or {})
     keys = list(parameters)
     low, high = np.array(list(parameters.values()), dtype=float).T
     # The least that is known: a parameter lies within its bounds.
@@ -84,6 +84,27 @@ def propose(
         },
         {"candidate": order, "parameter": keys},
     )
+
+
+def _check(
+    candidates: Mapping[str, Any],
+    parameters: Mapping[str, Sequence[float]],
+    outputs: Mapping[str, float],
+    known: Mapping[str, float],
+) -> None:
+    for entry, table in (("candidates", candidates), ("parameters", parameters), ("outputs", outputs)):
+        if not table:
+            raise InputError(entry, "must have at least one entry")
+    for key, bounds in parameters.items():
+        if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
+            raise InputError(f"parameters.{key}", "must be the least and the greatest value", bounds)
+    for entry, numbers in (("outputs", outputs), ("known", known)):
+        for key, value in numbers.items():
+            if not 0.0 < value < np.inf:
+                raise InputError(f"{entry}.{key}", "must be above 0", value)
+    for key in known:
+        if key not in parameters:
+            raise InputError(f"known.{key}", f"is none of the parameters {', '.join(parameters)}")
 
 
 def _slopes(run: RunArrays, output: str) -> Array:
