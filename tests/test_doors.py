@@ -288,6 +288,6 @@ def test_numbers_of_objects_that_a_finger_of_ones_own_has_not_are_refused():
 
 def test_numbers_of_a_hand_are_refused_where_another_one_was_given():
     key = "hand.fingers.left.finger.tendon_friction.coulomb"
-    other = fp.Hand(fp.load_scenario("pinch", {key: 0.3}).hand)
+    other = fp.Hand(fp.load_scenario("pinch", {key: 0.3}).finger)
     with pytest.raises(fp.InputError, match="hand"):
         fp.prepare("pinch", [key], finger=other).run([0.2])

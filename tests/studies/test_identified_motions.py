@@ -191,7 +191,7 @@ def test_windows_of_one_motion_are_held_out_in_turn_where_laws_are_compared():
 @pytest.mark.parametrize("wrong", [{"finger.nothing": 1.0}, {DRAG: (0.5, 0.1)}])
 def test_a_law_to_compare_that_is_wrong_is_refused_before_any_search(wrong):
     begun = []
-    with pytest.raises(fp.InputError, match="identify.compare.other"):
+    with pytest.raises(fp.InputError, match=r"identify\.compare\.other"):
         fp.identify(
             "canal",
             parameters=BOUNDS,

@@ -11,7 +11,7 @@ from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
 
 A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
-UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "supplied")
+UNITS = ("(°)", "(N)", "(mN m)", "(mJ)", "(s)", "(mm)", "(mm/s)", "/ intake")
 
 
 @pytest.fixture(scope="module", params=SIZES.values(), ids=SIZES.keys())

@@ -49,7 +49,7 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
 
     (a) Every stored energy that is not zero throughout, mJ. (b) What has been supplied, mJ, and on top of each other
     what has been lost; with the change of the stored energy this must reach what was supplied. (c) What the
-    account cannot explain, as a part of the most that came in: what was supplied, or taken from store.
+    account cannot explain, as a part of the intake: the most that was supplied, or taken from store.
 
     Args:
         result: Dataset of `simulate`, of any finger.
@@ -66,7 +66,7 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
     title(strips[0], "(a) stored energy")
     for axes, energy in zip(strips, shown, strict=True):
         trace(axes, time, _MILLI * energy.values, color=BLUE, linewidth=thin())
-    labels = ["energy (mJ)", "|residual| / came in"]
+    labels = ["energy (mJ)", "|residual| / intake"]
     above, below = stack(right, labels, heights=[2.2, 1.0])
     total = np.sum([each.values for each in stored.values()], axis=0)
     _balance(above, time, supplied, lost, total)
@@ -104,7 +104,7 @@ def _residual(axes: Axes, result: xr.Dataset, scale: float) -> None:
         axes.set_ylim(1e-4 * worst, 10.0 * worst)
         share = np.maximum(share, 1e-6 * worst)
     trace(axes, time, share, color=BLUE, linewidth=thin(0.65))
-    title(axes, f"(c) unexplained: at most {_scientific(worst)} {'of what came in' if scale else 'J'}")
+    title(axes, f"(c) unexplained: at most {_scientific(worst)} {'of the intake' if scale else 'J'}")
     if not scale:
         axes.set_ylabel("|residual| (J)")
 
