@@ -1,5 +1,7 @@
 """Identification from motions: frictions that made-up recordings hide, how sure they are, clear refusals."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -256,11 +258,11 @@ def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
     assert (found.deviation[0] < found.deviation[1]).all() and (found.deviation < [0.0375, 0.25]).all()
     with pytest.raises(fp.InputError, match="at least one"):
         fp.propose("canal", {}, **given)
-    for entry, value, message in (
-        ("outputs", {}, "outputs: must have at least one"),
-        ("outputs", {"tendon_tension.T1": 0.0}, "outputs.tendon_tension.T1: must be above 0"),
-        ("parameters", {COULOMB: (0.2, 0.05)}, f"parameters.{COULOMB}: must be the least"),
-        ("known", {DRAG: 0.1, "finger.mass": 1.0}, "known.finger.mass: is none of the parameters"),
+    for entry, value, named in (
+        ("outputs", {}, "outputs"),
+        ("outputs", {"tendon_tension.T1": 0.0}, "outputs.tendon_tension.T1"),
+        ("parameters", {COULOMB: (0.2, 0.05)}, f"parameters.{COULOMB}"),
+        ("known", {DRAG: 0.1, "finger.mass": 1.0}, "known.finger.mass"),
     ):
-        with pytest.raises(fp.InputError, match=message):
+        with pytest.raises(fp.InputError, match=f"^{re.escape(named)}"):
             fp.propose("canal", candidates, **{**given, entry: value}, overrides=overrides)
