@@ -93,7 +93,7 @@ class Interrupted(_Whole, KeyboardInterrupt):
     """
 
     def __init__(self, time: float, result: xr.Dataset | None = None, reached: str = "") -> None:
-        """Keep the part that was computed, and say how far it goes."""
+        """Keep the computed part and its end time."""
         self.time = time
         self.result = result
         super().__init__(f"interrupted {reached or f'at t = {time:.6g} s'}")
@@ -113,7 +113,7 @@ class StudyError(FingerPinError):
 
 
 def toml_like(value: Any) -> str:
-    """Return a value as a person would write it in a TOML file, cut where it is long."""
+    """Return a value as a person would write it in a TOML file, shortened if long."""
     return _shorten(_toml_like(value, 4), 80)
 
 

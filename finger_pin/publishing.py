@@ -1,4 +1,4 @@
-"""Publication of a set of files in the place of another, at one instant for every reader, even if a process is killed.
+"""Atomic replacement of a set of files: one instant for every reader, even if a process is killed.
 
 The new set is complete in a hidden folder inside the one that it is for, beside hard links to the earlier set, and a
 symbolic link ``now`` says which of the two is valid. While files change places every name in the folder leads through
@@ -98,7 +98,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _link(source: Path, target: Path) -> None:
-    """Give a file a second name; copy it where there is no such thing."""
+    """Give a file a second name, or copy it on systems without them."""
     try:
         os.link(source.resolve(), target)
     except OSError:

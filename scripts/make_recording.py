@@ -9,6 +9,8 @@ from intervals import Made, motion
 from scipy.integrate import solve_ivp
 
 COULOMB, DRAG, DELAY, TURN = 0.12, 0.4, 0.03, np.pi / 2.0
+# Of the pressing finger: least and greatest tensions, N, and where its joints start, rad.
+RAMPS, POSTURE = ((3.0, 9.0), (1.3, 3.2), (1.0, 1.0)), (0.7, 0.2)
 
 
 def to_and_fro() -> Made:
@@ -59,7 +61,62 @@ def winding() -> Made:
     return {"time_s": time, "current_A": current(time), "angle_rad": step * np.round((found.y[0] + noise) / step) + 0.0}
 
 
-MADE = {"to_and_fro": to_and_fro, "weights": weights, "winding": winding}
+def pressing() -> Made:
+    """Return six seconds of a planar finger of two links whose pad rests against a load cell, its tendons ramped."""
+    lengths, masses, pad, reach = (0.045, 0.032), (0.0101, 0.0056), 0.0075, 0.032 - 0.0075
+    inertias = [
+        m * (length**2 / 12.0 + (w / 2.0) ** 2 / 4.0)
+        for m, length, w in zip(masses, lengths, (0.017, 0.015), strict=True)
+    ]
+    arms = np.array([[0.006, 0.0], [0.002, 0.0055], [-0.008, -0.0055]])
+    turns, bends = np.array([0.3, 0.4, 0.4]), np.array([0.0, 1.0, 1.0])
+    coulomb, bristles, viscous, bearing, gravity = 0.14, 5e4, 1.0, 1e-3, 9.81
+    height, stiffness, damping, sticking, sideways, lag = 0.055, 1e3, 2.0, 0.8, 7e3, 1e-3
+
+    def tension(time: Any) -> Any:
+        return np.stack([np.interp(time, [1.0, 3.0, 4.0, 6.0], [low, high, high, low]) for low, high in RAMPS])
+
+    def pushed(state: np.ndarray) -> tuple[float, float, np.ndarray, float]:
+        """Return the forces along and across the cell, the lever arms of both, and how fast the pad's bristle bends."""
+        angle, rate, bend = state[:2], state[2:4], state[7]
+        sines, cosines = np.sin(np.cumsum(angle)), np.cos(np.cumsum(angle))
+        depth = lengths[0] * sines[0] + reach * sines[1] + pad - height
+        lever = pad - depth / 2.0
+        across = np.array([lengths[0] * cosines[0] + reach * cosines[1], reach * cosines[1]])
+        along = -np.array([lengths[0] * sines[0] + reach * sines[1] + lever, reach * sines[1] + lever])
+        normal = max(stiffness * max(depth, 0.0) * (1.0 + damping * across @ rate), 0.0)
+        wanted = bend + lag * along @ rate
+        share = min(1.0, sticking * normal / max(sideways * abs(wanted), 1e-12))
+        return share * sideways * wanted, normal, np.stack([along, across]), (share * wanted - bend) / lag
+
+    def rate(time: float, state: np.ndarray) -> np.ndarray:
+        angle, speed, friction = state[:2], state[2:4], state[4:7]
+        given, sliding = tension(time), arms @ speed
+        delivered = np.maximum(given - friction - viscous * sliding, 0.0)
+        share = np.tanh(coulomb * (turns + bends * angle[0]) / 2.0)
+        level = np.maximum(share * (given + np.maximum(given - friction, 0.0)), 1e-4)
+        side, normal, levers, bending = pushed(state)
+        first, second = masses[0], masses[1]
+        near, far, turned = lengths[0] / 2.0, lengths[1] / 2.0, lengths[0] * lengths[1] / 2.0 * second
+        own, joined = inertias[1] + second * far**2, turned * np.cos(angle[1])
+        mass = np.array([[inertias[0] + first * near**2 + second * lengths[0] ** 2, 0.0], [0.0, 0.0]]) + own
+        mass += joined * np.array([[2.0, 1.0], [1.0, 0.0]])
+        swing = turned * np.sin(angle[1]) * np.array([-speed[1] * (2.0 * speed[0] + speed[1]), speed[0] ** 2])
+        tip = second * far * np.cos(angle[0] + angle[1])
+        weight = gravity * np.array([(first * near + second * lengths[0]) * np.cos(angle[0]) + tip, tip])
+        torque = arms.T @ delivered - bearing * speed - swing - weight - levers.T @ np.array([side, normal])
+        bristle = bristles * (sliding - friction * np.abs(sliding) / level)
+        return np.concatenate([speed, np.linalg.solve(mass, torque), bristle, [bending]])
+
+    time, start = np.arange(0.0, 6.5, 0.02), np.array([*POSTURE, *np.zeros(6)])
+    found = solve_ivp(rate, (0.0, time[-1]), start, "Radau", time, rtol=1e-7, atol=1e-10, max_step=0.02)
+    force = np.array([pushed(state)[1] for state in found.y.T])
+    noise = np.random.default_rng(37).normal(0.0, 4e-3, time.size)
+    pulls = dict(zip(["proximal_N", "distal_N", "extensor_N"], tension(time), strict=True))
+    return {"time_s": time, **pulls, "cell_N": force + 0.05 + noise}
+
+
+MADE = {"to_and_fro": to_and_fro, "weights": weights, "winding": winding, "pressing": pressing}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,9 +1,12 @@
 """Shared fixtures: the paper's finger, networks made on the spot, and the few expensive runs."""
 
+import importlib
+import sys
+
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.scenario import METHODS
+from finger_pin.description.simulation_settings import METHODS
 
 
 @pytest.fixture(scope="session")
@@ -58,6 +61,17 @@ def fig6_runs():
 def fig6():
     """The main job, all of it."""
     return fp.simulate(fp.load_scenario("fig6"))
+
+
+@pytest.fixture
+def script(request, monkeypatch):
+    """The module of a test's `SCRIPT`, for commands that end before anything runs."""
+    path = request.module.SCRIPT
+    monkeypatch.syspath_prepend(str(path.parent))
+    monkeypatch.setattr(sys, "argv", [str(path)])
+    sys.modules.pop(path.stem, None)
+    yield importlib.import_module(path.stem)
+    sys.modules.pop(path.stem, None)
 
 
 @pytest.fixture

@@ -10,12 +10,7 @@ from finger_pin.analysis.equilibrium import Equilibrium, equilibrium
 from finger_pin.analysis.inverse_kinematics import TipPosture, inverse_kinematics
 from finger_pin.analysis.locking import CriticalFriction, critical_friction
 from finger_pin.analysis.locking_map import SelfLockingMap, self_locking_map
-from finger_pin.analysis.locking_margin import (
-    SelfLockingMargin,
-    locking_advice,
-    quick_margin,
-    self_locking_margin,
-)
+from finger_pin.analysis.locking_margin import SelfLockingMargin, locking_advice, quick_margin, self_locking_margin
 from finger_pin.analysis.pin_wrench import PinWrench, pin_wrench
 from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.reaction import JointReactions, ReactionDifference, fingertip_loads, joint_reactions

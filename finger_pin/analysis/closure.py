@@ -1,4 +1,4 @@
-"""Force closure that depends on the posture, for tendons whose paths run through space."""
+"""Force closure at a posture and over postures, for tendons whose paths run through space."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ClosureRange(BriefRepr):
         return np.asarray(self.positions[np.argmin(self.margin)])
 
     def __str__(self) -> str:
-        """Return a sentence: whether there is force closure, and the posture where it is least or lost."""
+        """Return a sentence on force closure, with the posture of its least margin or of its loss."""
         where = ", ".join(f"{name} {angle:.3g}" for name, angle in zip(self.joints, self.worst, strict=True))
         if self.holds:
             return f"force closure everywhere, tensions differ at most {1 / self.margin.min():.3g}-fold, at {where}"
@@ -142,7 +142,7 @@ def locking_over_range(finger: FingerLike, samples: int = 64) -> tuple[CriticalF
 
 
 def _closure(finger: Finger, position: Array) -> tuple[ForceClosure, float]:
-    """Return the internal tensions at a posture, and their margin: with its sign where there is one balance alone."""
+    """Return the internal tensions at a posture, and their margin, signed if there is one balance alone."""
     closure = ForceClosure.of(finger.coupling_at(position), finger.routing.tendons)
     balances = closure.null_space
     if balances.shape[1] != 1:

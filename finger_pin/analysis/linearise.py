@@ -122,7 +122,7 @@ def _built(scenario: Scenario) -> Finger:
 
 
 def _slopes(of: Callable[[Array], Array], at: Array, steps: Array, least: Array | None = None) -> Array:
-    """Return the derivatives of a vector by a vector, shape (k, n); to one side where ``at`` is the least allowed."""
+    """Return the derivatives of a vector by a vector, shape (k, n); one-sided at the least value allowed."""
     columns = []
     for k, step in enumerate(steps):
         moved = at + np.outer(_OFFSETS, step * (np.arange(len(at)) == k))

@@ -187,7 +187,7 @@ class FrictionLoop:
         return growth
 
     def command_to_move(self, position: Array, weights: Array, sliding: Array, minimum: Array, weight: Array) -> Array:
-        """Return f_hat, shape (m, t), N, in slow motion with passive tendons as planned; infinite where it locks.
+        """Return f_hat, shape (m, t), N, in slow motion with passive tendons as planned; infinite on self-locking.
 
         The balance H_c2^T f = M s R + G in the demand tau differs from tau itself by friction alone, so tau is
         corrected by its residual until that vanishes, which it does as fast as powers of the loop's gain.

@@ -21,7 +21,7 @@ from finger_pin.mechanism.finger_like import FingerLike, as_finger
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SelfLockingMap(BriefRepr):
-    """Critical coefficients over the angles of two joints, or of one where no other is free.
+    """Critical coefficients over the angles of two joints, or of the only free one.
 
     Attributes:
         joints: Names of the joints.

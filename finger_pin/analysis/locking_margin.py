@@ -164,7 +164,7 @@ def quick_margin(scenario: Scenario, reference: LoopReference | None = None) -> 
 
 
 def locking_advice(margin: float) -> str:
-    """Return the warning about a narrow margin, in one line; empty where it is wide."""
+    """Return the warning about a narrow margin, in one line; empty for a wide one."""
     if not margin < CLOSE_TO_LOCKING:
         return ""
     if margin < 1.0:

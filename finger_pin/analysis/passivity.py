@@ -13,7 +13,7 @@ from finger_pin.laws.bristle import passive_micro_damping
 
 
 def micro_damping_advice(finger: FingerDescription) -> str:
-    """Return the warning about micro-damping that can drive motion, in one line; empty where it cannot."""
+    """Return the warning about micro-damping that can drive motion, in one line; empty if it cannot."""
     tendons, joints = finger.tendon_friction, finger.joint_friction
     # The normal force of a tendon is a factor of both coefficients: their ratio counts.
     ratio = expand(tendons.stiction_ratio, len(finger.tendons))

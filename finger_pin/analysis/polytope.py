@@ -56,7 +56,7 @@ class ForcePolytope(BriefRepr):
         return float(np.max(self.vertices @ np.asarray(direction, dtype=float)))
 
     def triangles(self) -> Any:
-        """Return indices of vertices, shape (., 3): triangles on the surface, or on the set itself where it is flat.
+        """Return indices of vertices, shape (., 3): triangles on the surface, or on a flat set itself.
 
         On a surface their corners run counter-clockwise as seen from outside. There are none where the set is a line.
         """
@@ -117,7 +117,7 @@ def force_polytope(
     """
     finger = as_finger(finger)
     if friction is Friction.HINDERING:
-        raise InputError("friction", "must be none or helping; what hinders has a direction", friction.value)
+        raise InputError("friction", "must be none or helping; hindering friction has a direction", friction.value)
     theta, bounds = posture(finger, position), command_bounds(finger, minimum_tension, maximum_tension)
     statics = TipStatics.of(finger, theta, friction)
     left, values, _ = np.linalg.svd(statics.jacobian)

@@ -82,7 +82,7 @@ def largest_force(
 
 
 def _most(finger: Finger, theta: Array, along: Array, friction: Friction, slip: Slip | None, bounds: Any) -> float:
-    """Return the largest force along a direction in one way to slip, N; minus infinity where it cannot be."""
+    """Return the largest force along a direction for one pattern of slip, N; minus infinity if there is none."""
     statics = TipStatics.of(finger, theta, friction, slip)
     extra = (statics.jacobian.T @ along)[:, None]
     if slip is not None:
@@ -130,7 +130,7 @@ def tension_for_force(
 def _least(
     finger: Finger, theta: Array, wanted: Array, friction: Friction, slip: Slip | None, bounds: Any
 ) -> RequiredTension | None:
-    """Return the tensions with the least maximum in one way to slip; None where it cannot be."""
+    """Return the tensions with the least maximum for one pattern of slip, or None."""
     statics = TipStatics.of(finger, theta, friction, slip)
     demand = statics.jacobian.T @ wanted
     if slip is not None:

@@ -195,7 +195,7 @@ def posture(finger: Finger, position: Sequence[float] | Array) -> Array:
 def command_bounds(
     finger: Finger, minimum: float | tuple[float, ...], limit: float | tuple[float, ...]
 ) -> list[tuple[float | None, float | None]]:
-    """Return least and greatest f^a of every actuated tendon, None where there is no limit."""
+    """Return least and greatest f^a of every actuated tendon; None for no limit."""
     count = finger.routing.actuated
     low, high = expand(minimum, count), expand(limit, count)
     if not (np.all(low >= 0.0) and np.all(high > low)):

@@ -58,7 +58,7 @@ class TransmissionEfficiency(BriefRepr):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TransmissionInMotion(BriefRepr):
-    """Delivered over commanded tension along a simulation; shapes (m, t), not a number where nothing is commanded.
+    """Delivered over commanded tension along a simulation; shapes (m, t); not a number without a command.
 
     Attributes:
         curvature: phi, rad.

@@ -1,4 +1,4 @@
-"""All commands together: one parser of command lines, and one place where exceptions become exit codes."""
+"""All commands together: one parser of command lines, and the exit codes of exceptions."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from functools import wraps
+from itertools import pairwise
 from typing import Any
 
 import typer
@@ -61,7 +62,7 @@ def run(name: str | None = None, arguments: Sequence[str] | None = None) -> int:
 
 
 def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] | None = None) -> int:
-    """Run a command line for one function, or for any command where none is given; return the exit code."""
+    """Run a command line for one function, by default for any command; return the exit code."""
     program = "finger-pin" if function is None else f"{function.__name__}.py"
     given = list(sys.argv[1:] if arguments is None else arguments)
     app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=False, rich_markup_mode=None)
@@ -72,7 +73,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
             given if given or function else ["--help"], prog_name=program, standalone_mode=False
         )
     except typer.TyperException as error:
-        complain(program, _usage(error))
+        complain(program, _usage(error, given))
         return WRONG_INPUT
     return int(code or DONE)
 
@@ -90,12 +91,7 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
             problem: BaseException = error
             code, text = INTERRUPTED, str(error) or "interrupted"
         except FingerPinError as error:
-            kinds = {
-                InputError: WRONG_INPUT,
-                IntegrationError: FAILED,
-                StudyError: FAILED,
-                Unsuccessful: FAILED,
-            }
+            kinds = {InputError: WRONG_INPUT, IntegrationError: FAILED, StudyError: FAILED, Unsuccessful: FAILED}
             code = next((kinds[kind] for kind in type(error).__mro__ if kind in kinds), NOT_WRITTEN)
             problem, text = error, str(error)
         except OSError as error:
@@ -108,12 +104,17 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
     return told
 
 
-def _usage(error: typer.TyperException) -> str:
-    """Return the message about a wrong command line, with the options that there are where one is not."""
+def _usage(error: typer.TyperException, given: Sequence[str]) -> str:
+    """Return the message about a wrong command line: the option, its value and the allowed ones, or all options."""
     option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
     text = str(error.format_message()) if hasattr(error, "format_message") else str(error)
+    if isinstance(error, typer.BadParameter) and error.param is not None:
+        names = error.param.opts
+        values = [after for name, after in pairwise(given) if name in names]
+        values += [value for name, equals, value in (each.partition("=") for each in given) if equals and name in names]
+        return f"{names[0]} = {', '.join(values)}: {error.message.removeprefix('Value error, ').rstrip('.')}"
     if context is None or not text.startswith("No such option"):
         return text
-    names = [name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"]
-    near = "".join(f"; did you mean {each}?" for each in get_close_matches(option, [*names, "--help"], n=1))
-    return f"{option}: no such option; there are {', '.join(names)}{near}"
+    there = [name for each in context.command.params for name in (*each.opts, *each.secondary_opts) if name[:1] == "-"]
+    near = "".join(f"; did you mean {each}?" for each in get_close_matches(str(option), [*there, "--help"], n=1))
+    return f"{option}: no such option; there are {', '.join(there)}{near}"

@@ -36,7 +36,7 @@ def conclusions(
         Literal["a", "b", "c"] | None,
         typer.Option(
             help="a: tendon friction depends on the posture; b: joint friction depends on the sum of the tensions; "
-            "c: force closure sets the passive tendon's tension.",
+            "c: force closure sets the passive tendon's tension."
         ),
     ] = None,
     output: Output = Path("results/conclusions"),

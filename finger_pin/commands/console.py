@@ -124,7 +124,7 @@ def noted(note: str) -> Iterator[None]:
 
 
 def talks(quiet: bool) -> bool:
-    """Return whether to show progress; where not, the package's log is kept silent up to errors."""
+    """Return whether to show progress; without it the package's log is kept silent up to errors."""
     shown = sys.stderr.isatty() and not quiet
     if not shown:
         logging.getLogger("finger_pin").setLevel(logging.ERROR)

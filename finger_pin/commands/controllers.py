@@ -52,7 +52,7 @@ def controllers(output: Output = Path("results/controllers"), format: Format = N
 
 
 def runs(shown: bool) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield every case with its result; if asked, show how far it is."""
+    """Yield every case with its result; show the progress if asked."""
     from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.simulate import simulate
     from finger_pin.studies.comparison import CASES

@@ -10,12 +10,14 @@ import typer
 from finger_pin.commands.console import print_text, talks
 from finger_pin.commands.options import Format, Output, number, numbers
 
+# Of degrees, rad.
+_ROUNDING = 1e-9
+
 
 def force_capability(
     finger: Annotated[str, typer.Argument(metavar="FINGER", help="Name, or path of a .toml file.")] = "ub",
     posture: Annotated[
-        str | None,
-        typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range."),
+        str | None, typer.Option(metavar="DEG,DEG,...", help="Joint angles; default a third of each range.")
     ] = None,
     limit: Annotated[
         str, typer.Option(metavar="N|servos", help="Greatest tension, or servos for that of the finger's motors.")
@@ -48,6 +50,10 @@ def force_capability(
     if len(angles) != len(joints):
         allowed = f"must be {len(joints)} angles with commas between, one per joint ({', '.join(joints)})"
         raise fp.InputError("--posture", allowed, degrees)
+    for joint, angle, low, high in zip(joints, angles, limiter.lower, limiter.upper, strict=True):
+        if not low - _ROUNDING <= angle <= high + _ROUNDING:
+            allowed = f"{joint} must be from {np.rad2deg(low):.4g} to {np.rad2deg(high):.4g} deg, the joint's range"
+            raise fp.InputError("--posture", allowed, degrees)
     needed = {each: tension_for_force(built, angles, wish, friction=each) for each in Friction}
     polytope = force_polytope(built, angles, most)
     figures = {

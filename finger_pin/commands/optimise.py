@@ -58,8 +58,7 @@ def optimise(
     seed: Annotated[int | None, typer.Option(metavar="S", help="Of the search; default 0.")] = None,
     settings: Settings = [],  # noqa: B006
     output: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Where results go; default results/optimise-<scenario, goals>."),
+        Path | None, typer.Option(metavar="DIR", help="Where results go; default results/optimise-<scenario, goals>.")
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,

@@ -32,10 +32,7 @@ def self_locking(
     found = self_locking_map(fp.Finger(finger))
     text = summarize_locking(loaded, found)
     output.mkdir(parents=True, exist_ok=True)
-    figures = {
-        "critical_friction": plot_critical_friction(finger),
-        "map": plot_self_locking_map(found),
-    }
+    figures = {"critical_friction": plot_critical_friction(finger), "map": plot_self_locking_map(found)}
     if np.isfinite(margin.margin):
         with warnings.catch_warnings():
             # Runs on both sides are the point.

@@ -167,7 +167,7 @@ def draw(
 def listing() -> str:
     """Return the names that the command line takes, with a line about each."""
     from finger_pin.description.loading import list_fingers, list_hands, list_motors, list_scenarios
-    from finger_pin.description.scenario import METHODS
+    from finger_pin.description.simulation_settings import METHODS
 
     tables = {
         "Scenarios": list_scenarios(),

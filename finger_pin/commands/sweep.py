@@ -147,7 +147,7 @@ def build_design(kind: str, over: list[str], samples: int | None, seed: int) -> 
 
 
 def summary(result: xr.Dataset) -> str:
-    """Return the ranges of the metrics, how many runs there are, and why runs failed."""
+    """Return the ranges of the metrics, the number of runs, and the reasons of failures."""
     status = result["status"].values.ravel()
     counts = [f"{(status == kind).sum()} {kind}" for kind in ("done", "failed", "missing") if (status == kind).any()]
     rows = [("", "least", "greatest", "")]

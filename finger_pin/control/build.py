@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from finger_pin.control.proportional import ProportionalController
 from finger_pin.control.routed import RoutedController
 from finger_pin.control.tendon_feedforward import TendonFeedforward
 from finger_pin.control.torque import TorqueLaw
+from finger_pin.description.by_finger import of_finger
+from finger_pin.description.caching import Remembered
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.scenario import Scenario
@@ -30,6 +33,8 @@ from finger_pin.description.validation import Numbers, expand
 from finger_pin.exceptions import ClosureWarning, InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.signal import Signal
+
+_PAPERS: Remembered[LoopController] = Remembered()
 
 
 def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> LoopController:
@@ -49,6 +54,15 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     """
     scenario = load_scenario(scenario)
     routing = finger.routing if finger is not None else Routing.from_description(scenario.finger)
+    given, fingers = scenario.controller, () if scenario.hand is None else tuple(scenario.hand.fingers)
+    papers = all((of_finger(given, name) if given.fingers else given).is_paper for name in fingers or ("",))
+    if papers and routing.force_closure().holds:
+        # Of its finger the paper's knows the routing alone.
+        return _PAPERS.of((given, routing, *fingers), partial(_built, scenario, routing, finger))
+    return _built(scenario, routing, finger)
+
+
+def _built(scenario: Scenario, routing: Routing, finger: Finger | None) -> LoopController:
     parts = scenario.parts()
     if len(parts) > 1:
         return joined_controller([build_controller(part) for part in parts.values()], routing)
@@ -84,7 +98,7 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
 
 
 def _routed(scenario: Scenario, finger: Finger) -> RoutedController:
-    """Return the controller of a finger whose arms depend on the posture; warn where it loses force closure."""
+    """Return the controller of a finger whose arms depend on the posture; warn of lost force closure."""
     settings, size = scenario.controller, len(finger.routing.joints)
     closure = closure_over_range(finger)
     if not closure.holds:
@@ -109,7 +123,7 @@ def _distribution(scenario: Scenario, finger: Finger) -> TensionDistribution:
 
 
 def _static(finger: Finger, gravity: bool, springs: bool) -> Callable[[Array], Array] | None:
-    """Return the torque added to tau^d that holds the finger where it is: G, the torque of the springs, or both."""
+    """Return the static torque added to tau^d: G, the torque of the springs, or both."""
     if not springs or not finger.springs.present:
         return finger.rigid_body.gravity_torque if gravity else None
     if gravity:

@@ -14,7 +14,7 @@ from finger_pin.control.palm import PalmPath
 from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
-from finger_pin.description.remembering import Remembered
+from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
@@ -32,6 +32,8 @@ _SHORTEST = 1e-4
 
 # Nothing of a finger changes in a run: those of a scenario that is run again share it.
 _FINGERS: Remembered[Finger] = Remembered(4)
+# Likewise of signals, which runs that are prepared share.
+_KNOTS: Remembered[Array] = Remembered(16)
 
 _Acting = tuple[Array, Array, Array | None]
 
@@ -118,7 +120,7 @@ class ClosedLoop:
             InputError: If the finger has other joints or tendons than the scenario's, samples have the wrong shape
                 or are not finite, or tensions are negative.
         """
-        start, scenarios = scenario.simulation.start_time, scenario.parts()
+        start, acting = scenario.simulation.start_time, scenario.environments()
         parts = scenario.finger, scenario.environment
         finger = finger or _FINGERS.of(parts, lambda: Finger(scenario.finger, objects=scenario.environment.objects))
         for kind, own, described in (
@@ -127,7 +129,6 @@ class ClosedLoop:
         ):
             if own != tuple(described):
                 raise InputError(f"finger.{kind}", f"must be the scenario's: {', '.join(described)}", ", ".join(own))
-        acting = {name: part.environment for name, part in scenarios.items()}
         alone = len(acting) == 1
         loop = cls(
             finger=finger,
@@ -193,7 +194,10 @@ class ClosedLoop:
         guided = [each and each.signal for each in (self.palm, self.guides)]
         other = [each for each in (self.varying_force, *guided) if each]
         signals = (*self.reference.signals(), *self.controller.signals(), *other)
-        return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
+        return _KNOTS.of(
+            (*signals, tolerance),
+            lambda: np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)])),
+        ).copy()
 
     def longest_step(self, tolerance: float) -> float:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class Bindings:
-    """Compiled code bound to one finger after the other; it stays where they differ in numbers alone.
+    """Compiled code bound to one finger after the other, kept if they differ in numbers alone.
 
     Of each finger the work is done when the next one comes.
 
@@ -70,7 +70,7 @@ class Bindings:
 
 
 def compiled_control(loop: ClosedLoop) -> Control | None:
-    """Return a loop's controller, reference and varying force as arrays, or None where the first two are Python."""
+    """Return a loop's controller, reference and varying force as arrays, or None if the first two are Python."""
     if len(loop.finger.actuators.positioned) == loop.finger.mechanism.channels:
         # Nothing of what the controller plans goes to the finger at once.
         return sampled_control(loop)

@@ -1,4 +1,4 @@
-"""The controller of a loop: its commands, and its answers to those who run it."""
+"""The controller of a loop: its commands, and its answers to whatever runs it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class LoopController(ABC):
         return None
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return the functions of time that it follows: steps end where they bend."""
+        """Return the functions of time that it follows; steps end at their knots."""
         return ()
 
     def without_memory(self) -> LoopController | None:

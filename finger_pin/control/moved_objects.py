@@ -1,4 +1,4 @@
-"""Objects that are moved along prescribed paths, under any load."""
+"""Prescribed motions of objects, which no load changes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Guides:
 
     @classmethod
     def of(cls, finger: Finger, start: float, tolerance: float) -> Guides | None:
-        """Return the paths of the objects around a finger from a time on, s; None where none is moved.
+        """Return the paths of the moved objects around a finger from a time on, s, or None.
 
         The tolerance is that of `Signal.from_settings`.
         """
@@ -48,7 +48,7 @@ class Guides:
         )
 
     def place(self, finger: Finger, x: Array) -> Array:
-        """Return a packed state with the objects where their paths begin."""
+        """Return a packed state with the objects at the beginnings of their paths."""
         state = finger.layout.unpack(x)
         assert state.object_pose is not None and state.object_velocity is not None
         value, rate = (each.reshape(-1, 6)[:, :3] for each in self.signal.at(0.0))

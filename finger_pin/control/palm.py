@@ -54,7 +54,7 @@ class PalmPath:
         return at[..., :3], np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
     def put(self, finger: Finger, x: Array) -> Array:
-        """Return a packed state with the world where the palm sees it at the start."""
+        """Return a packed state with the world's placement at the start, seen from the palm."""
         if self.carries:
             state = finger.layout.unpack(x)
             assert state.world_position is not None and state.world_velocity is not None

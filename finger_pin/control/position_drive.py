@@ -36,7 +36,7 @@ class DriveSignals(Protocol):
 
     @property
     def compiled(self) -> Drives | None:
-        """The loops as arrays that work the voltages out; None where these are given."""
+        """The loops as arrays, for the voltages; None if these are given."""
 
     def planned(self, time: Array | float, reference: ReferenceSignals, control: ControlSignals) -> ControlSignals:
         """Return the commands as they are recorded."""

@@ -67,7 +67,7 @@ class TendonFeedforward:
         return np.concatenate([command, planned[..., actuated:]], axis=-1)
 
     def strand_matrix(self, position: Array, desired_velocity: Array) -> Array:
-        """Return W, shape (..., s, t): the strands' tensions are W f_hat where the plan f_hat is delivered."""
+        """Return W, shape (..., s, t): the strands' tensions are W f_hat for a delivered plan f_hat."""
         routing = self.tendons.routing
         plain = undivided(routing)
         rows = np.arange(routing.actuated, len(plain))

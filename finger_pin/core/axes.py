@@ -60,7 +60,7 @@ class Subset:
         self.new[axis][indices] = np.arange(len(indices))
 
     def keep_entries(self, table: NamedTuple, axis: str) -> None:
-        """Keep the entries of all places that are kept where they begin."""
+        """Keep the entries of all kept places, from their beginnings."""
         starts = [(getattr(table, name), each.axes[0]) for name, each in _fields(table) if each.starts == axis]
         ranges = [np.arange(start[k], start[k + 1]) for start, places in starts for k in self.kept[places]]
         self.keep(axis, np.concatenate([np.zeros(0, dtype=np.int64), *ranges]), int(starts[-1][0][-1]))

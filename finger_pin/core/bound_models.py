@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.core.buffers import build_work
 from finger_pin.core.control import held_control
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
 from finger_pin.core.jit import call, copied
 from finger_pin.core.model import BoundModel
 from finger_pin.core.tables import Tables
-from finger_pin.core.threads import in_threads
-from finger_pin.core.work import build_work
+from finger_pin.core.threads import in_threads, threads
 from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
 from finger_pin.mechanism.mechanism import GUIDES
@@ -124,7 +124,7 @@ def fill(
         asked = room.states(part, model.address, states, commands, forces, bases, attitudes)
         call(evaluate_many, asked, STATES)
 
-    if count < FEW:
+    if count < FEW or threads() < 2:
         fill_part(models.model(loaded), slice(None))
     else:
         half = count // 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,7 +21,7 @@ from finger_pin.core.evaluation.rigid_body import (
 )
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.rigid_body import FREE_JOINTS
+from finger_pin.mechanism.rigid_body import FREE_JOINTS, RigidBody
 from finger_pin.mechanism.solids import WORLD
 
 # Less of a unit axis is rounding.
@@ -54,7 +54,7 @@ class Chains(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """One coordinate of a joint: whether it slides, and its axis in the frame of the joint."""
+    """One coordinate of a joint: its kind, sliding or turning, and its axis in the frame of the joint."""
 
     kind: int
     axis: Array
@@ -132,3 +132,26 @@ def _frame_along(axis: tuple[float, float, float]) -> Array:
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
     return np.column_stack([first, np.cross(axis, first), axis])
+
+
+def tree_arrays(body: RigidBody, chains: Chains) -> dict[str, Any]:
+    """Return the tree of rigid bodies, its tips, and the loads of joints as pins."""
+    model, last, turns = body.model, chains.last, chains.turns
+    joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
+    tips = [model.frames[tip] for tip in body.tips]
+    holders = [int(tip.parentJoint) for tip in tips]
+    carriers = [body.carriers[joint] for joint in joint_of]
+    offsets = [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
+    directions = [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(carriers, joint_of, strict=True)]
+    return {
+        "parents": chains.parents,
+        "roots": chains.roots,
+        "kinds": chains.kinds,
+        "charts": chains.charts,
+        "chart_frames": chains.chart_frames,
+        "tip_body": np.array([last[joint] for joint in holders], dtype=np.int64),
+        "tip_offset": np.array(offsets).reshape(-1, 3),
+        "carriers": np.array([last[joint] for joint in carriers], dtype=np.int64),
+        "directions": np.array(directions).reshape(-1, 3),
+        "carried": np.ascontiguousarray(body.supports[:, joint_of - 1]),
+    }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, rows_of
-from finger_pin.core.evaluation.charts import Charts
+from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
 from finger_pin.core.jit import alike, bound, fits
@@ -41,10 +41,10 @@ class CompiledMechanism:
         self.tables = build_tables(mechanism)
         laws = [table.law for table in mechanism.rows]
         self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved)
-        self._motions: dict[int, tuple[Motions, NDArray[np.uint8]]] = {}
+        self._motions: dict[int, tuple[Motions, NDArray[np.uint8], int]] = {}
 
     def renew(self, mechanism: Mechanism) -> bool:
-        """Take the numbers of another mechanism in place, if only numbers differ; return whether."""
+        """Take the numbers of another mechanism in place; return False if more than numbers differ."""
         if mechanism is self.mechanism:
             return True
         own, tables = self.mechanism, build_tables(mechanism)
@@ -88,7 +88,7 @@ class CompiledMechanism:
             first=0,
             torques=np.zeros((count, width)),
             externals=np.zeros((count, width)),
-            booked=np.zeros((count, len(mechanism.books.stored) + len(mechanism.books.powers))),
+            booked=np.zeros((count, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             touches=np.zeros((kept, self.tables.touching // CONTACT.arms, 9)),
         )
 
@@ -119,7 +119,7 @@ class CompiledMechanism:
             found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE][..., stateful], shown)
             begin = end
         return Evaluation(
-            mechanism.books,
+            mechanism.energies,
             found,
             room.torques[at],
             room.externals[at],
@@ -133,10 +133,10 @@ class CompiledMechanism:
     def powers(
         self, x: Array, command: Array, force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return the powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, (m, N)."""
+        """Return the powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, (m, N)."""
         room = self.room(len(x), booked_only=True)
         self.fill(room, x, command, force, base)
-        return room.booked[:, len(self.mechanism.books.stored) :], room.externals
+        return room.booked[:, len(self.mechanism.energies.stored) :], room.externals
 
     def fill(self, room: Room, x: Array, command: Array, force: Array | None = None, base: Array | None = None) -> None:
         """Fill a room with the signals of packed states, shape (size,) or (m, size)."""
@@ -159,28 +159,30 @@ class CompiledMechanism:
 
         With a base that moves, energies are those of the motion in the world, where the base has no height.
         """
-        count, alone = len(np.atleast_2d(position)), np.ndim(position) == 1
+        alone = position.ndim == 1
+        count = 1 if alone else len(position)
         # A few postures after the other are asked for in loops: what is bound once serves them all.
         kept = count < FEW and base is None
         found = self._motions.get(count) if kept else None
-        motions, block = found or self._bound_motions(count, base)
+        motions, block, address = found or self._bound_motions(count, base)
         if kept:
-            self._motions[count] = motions, block
+            self._motions[count] = motions, block, address
         motions.positions[:], motions.velocities[:] = position, velocity
-        motion_many(block.ctypes.data)
+        motion_many(address)
         at = 0 if alone else slice(None)
         tips = motions.tips[at] if motions.tips.shape[1] != 1 else motions.tips[at][..., 0, :]
         return Motion(tips.copy(), motions.kinetic[at].copy(), motions.potential[at].copy())
 
-    def _bound_motions(self, count: int, base: Array | None) -> tuple[Motions, NDArray[np.uint8]]:
-        """Return room for postures, and the block that compiled code finds it by."""
+    def _bound_motions(self, count: int, base: Array | None) -> tuple[Motions, NDArray[np.uint8], int]:
+        """Return room for postures, the block that compiled code finds it by, and its address."""
         tables = self.tables
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
         motions = Motions(
             self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, path_motions(base, count, 0)
         )
-        return motions, bound(motions, MOTIONS)
+        block = bound(motions, MOTIONS)
+        return motions, block, int(block.ctypes.data)
 
 
 class CompiledFinger:
@@ -197,7 +199,7 @@ class CompiledFinger:
         self.mechanism = CompiledMechanism(finger.mechanism)
 
     def renew(self, finger: Finger) -> bool:
-        """Take the numbers of another finger in place, if only numbers differ; return whether."""
+        """Take the numbers of another finger in place; return False if more than numbers differ."""
         if not self.mechanism.renew(finger.mechanism):
             return False
         if finger.rigid_body is not self.finger.rigid_body:
@@ -222,7 +224,7 @@ class CompiledFinger:
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
+        """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
         return self.mechanism.powers(x, command, fingertip_force, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:

@@ -45,15 +45,16 @@ class CompiledFingers:
         self._guided = int(tables.guided.max(initial=-1)) + 1
         self._bases = np.zeros((count, 15 + self._guided))
         # By whether there are forces at the tips, and whether the base moves.
-        self._blocks: dict[tuple[bool, bool], list[NDArray[np.uint8]]] = {}
+        self._blocks: dict[tuple[bool, bool], list[tuple[NDArray[np.uint8], int]]] = {}
         # Whether tendons have other arms than the first one's, and whether tips are elsewhere than the mover's.
         self._differs = np.array([self._differences(each) for each in fingers])
 
     def replace(self, index: int, finger: CompiledFinger) -> None:
-        """Put another finger in the place of one."""
-        self._fingers[index], self._first = finger, self._fingers[0]
-        for kind, blocks in self._blocks.items():
-            blocks[index] = self._bound(index, *kind)
+        """Put another finger in the place of one, or the same with other numbers."""
+        if finger is not self._fingers[index]:
+            self._fingers[index], self._first = finger, self._fingers[0]
+            for kind, blocks in self._blocks.items():
+                blocks[index] = self._bound(index, *kind)
         if index:
             self._differs[index] = self._differences(finger)
         else:
@@ -62,17 +63,22 @@ class CompiledFingers:
     def _differences(self, finger: CompiledFinger) -> tuple[bool, bool]:
         pair, joints = (finger, self._first), len(finger.finger.routing.joints)
         rows = [[table for table in each.finger.mechanism.rows if table.group in each.finger.pulling] for each in pair]
-        alike = all(np.array_equal(own.arm, other.arm) for own, other in zip(*rows, strict=True))
-        tables = [each.mechanism.tables for each in (finger, self._mover)]
-        bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]
-        return not alike or any(table.routed for table in rows[0]), not all(map(np.array_equal, *bodies))
+        pairs = zip(*rows, strict=True)
+        alike = all(own.arm is other.arm or np.array_equal(own.arm, other.arm) for own, other in pairs)
+        at_home = finger is self._mover
+        if not at_home:
+            tables = [each.mechanism.tables for each in (finger, self._mover)]
+            bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in tables]
+            at_home = all(map(np.array_equal, *bodies))
+        return not alike or any(table.routed for table in rows[0]), not at_home
 
-    def _bound(self, index: int, loaded: bool, moved: bool) -> NDArray[np.uint8]:
-        """Return the block by which compiled code finds a finger, its state, and the arrays of its signals."""
+    def _bound(self, index: int, loaded: bool, moved: bool) -> tuple[NDArray[np.uint8], int]:
+        """Return a block with a finger, its state, and the arrays of its signals, and its address."""
         model = self._fingers[index].mechanism.models.model(loaded)
         bases = self._bases if moved else self._bases[:0]
         given = (self._states, self._commands, self._forces, bases, self._attitudes)
-        return bound(self._room.states(slice(index, index + 1), model.address, *given), STATES)
+        block = bound(self._room.states(slice(index, index + 1), model.address, *given), STATES)
+        return block, int(block.ctypes.data)
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -91,8 +97,8 @@ class CompiledFingers:
         kind = loaded, base is not None
         if kind not in self._blocks:
             self._blocks[kind] = [self._bound(index, *kind) for index in range(len(self._fingers))]
-        for block in self._blocks[kind]:
-            evaluate_many(block.ctypes.data)
+        for _, address in self._blocks[kind]:
+            evaluate_many(address)
         found = mechanism.found(self._room)
         signals = self._first.finger.signals(x, command, fingertip_force, found)
         if not self._differs[:, 0].any():
@@ -106,9 +112,9 @@ class CompiledFingers:
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
+        """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
         self.evaluate(x, command, fingertip_force, base)
-        stored = len(self._first.finger.mechanism.books.stored)
+        stored = len(self._first.finger.mechanism.energies.stored)
         return self._room.booked[:, stored:], self._room.externals
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:

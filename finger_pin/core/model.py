@@ -10,6 +10,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from finger_pin.core.buffers import Work, take_numbers
 from finger_pin.core.control import Control
 from finger_pin.core.evaluation import blocks, condensation, contacts, dynamics, linearisation, path_derivatives, paths
 from finger_pin.core.evaluation.inputs import move_base
@@ -17,7 +18,6 @@ from finger_pin.core.evaluation.linearisation import Linear, build_linear
 from finger_pin.core.evaluation.rigid_body import base_power, bias_rate, move
 from finger_pin.core.jit import Kind, Unit, Vector, bound, bound_at, refill
 from finger_pin.core.tables import Tables
-from finger_pin.core.work import Work, take_numbers
 
 
 class Model(NamedTuple):
@@ -86,13 +86,16 @@ class BoundModel:
         units += [unit.address if moved else 0 for unit in (_carry, _sway, _power)]
         self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
         self._block = bound(self.model, MODEL)
+        # Of tables what changes in place is copied wherever it is handed over.
+        self._filled: Tables | None = None
         self.address = int(self._block.ctypes.data)
 
     def renew(self, tables: Tables, control: Control) -> None:
         """Take the numbers of other tables and another control, which fit, into the arrays that are bound."""
         own = self.model
-        refill(own.tables, tables)
+        refill(own.tables, tables, self._filled)
         refill(own.control, control)
+        self._filled = tables
         take_numbers(own.work, tables)
         linearisation.take_numbers(own.linear, tables)
 

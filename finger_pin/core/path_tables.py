@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains
+from finger_pin.core.collision.motion_bounds import Carrying, levers
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.core.motion_bounds import Carrying, levers
 from finger_pin.mechanism.pieces import Leg, Piece
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.axes import along
-from finger_pin.core.chains import Chains, read_chains, weighed
-from finger_pin.core.evaluation.law_code import SIGNALS, addresses
+from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
+from finger_pin.core.evaluation.law_code import addresses, kink_column
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
 from finger_pin.core.path_tables import Paths, reached, read_paths
-from finger_pin.description.remembering import Remembered
+from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import Form, RigidBody
@@ -29,7 +29,7 @@ class Tables(NamedTuple):
     """A mechanism with n bodies, N coordinates, K rows in G groups, and t tips.
 
     A joint of several coordinates is a chain of bodies with one each, of which the last has the mass; the
-    three that turn a free body start from its attitude (`charts`).
+    three that turn a free body start from its attitude (`attitude_charts`).
 
     Attributes:
         parents: Of the bodies, -1 for the base, shape (n,).
@@ -50,7 +50,7 @@ class Tables(NamedTuple):
         groups: First and last + 1 row of each, whether it has inputs from earlier rows, or loads, and the column of
             its rows' kink, -1 for none, shape (G, 5).
         laws: Addresses of value, slopes and account, shape (G, 3).
-        books: Accounts of stored energy and powers of each group, -1 for none, shape (G, 1 + most powers).
+        energies: Of stored energy and powers of each group, places in `Energies` or -1, shape (G, 1 + most powers).
         parameters: Shape (most parameters, K).
         offset: Shape (K,).
         arm_start: First index of the row's arm in the following, shape (K + 1,).
@@ -95,7 +95,7 @@ class Tables(NamedTuple):
     directions: Annotated[Matrix, along("body", "x")]
     groups: IndexTable
     laws: Annotated[IndexTable, along("group", "c")]
-    books: Annotated[IndexTable, along("group", "c")]
+    energies: Annotated[IndexTable, along("group", "c")]
     parameters: Annotated[Matrix, along("c", "row")]
     offset: Annotated[Vector, along("row")]
     arm_start: Annotated[Indices, along("row", starts="arm")]
@@ -127,6 +127,7 @@ _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
 _PATHS: Remembered[Paths] = Remembered()
 _WIRED: Remembered[dict[str, Any]] = Remembered()
 _FORMS: WeakKeyDictionary[Form, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
+_WEIGHED: WeakKeyDictionary[RigidBody, Array] = WeakKeyDictionary()
 
 
 def build_tables(mechanism: Mechanism) -> Tables:
@@ -150,14 +151,16 @@ def _read(mechanism: Mechanism) -> Tables:
     body, rows = mechanism.body, mechanism.rows
     if body.form not in _FORMS:
         chains = read_chains(body.model)
-        _FORMS[body.form] = chains, _of_form(body, chains)
+        _FORMS[body.form] = chains, tree_arrays(body, chains)
     chains, placed = _FORMS[body.form]
     # Inertias and parameters of laws change from run to run; how rows are wired seldom does.
-    wired = _WIRED.of((body.form, *map(_content, rows)), partial(_of_rows, mechanism, chains))
+    wired = _WIRED.of((body.form, *(table.form.content for table in rows)), partial(_of_rows, mechanism, chains))
+    if body not in _WEIGHED:
+        _WEIGHED[body] = weighed(chains, body.model)
     return Tables(
         guided=mechanism.guided,
         lumps=mechanism.inertia,
-        bodies=weighed(chains, body.model),
+        bodies=_WEIGHED[body],
         gravity=np.array(body.model.gravity.linear),
         tip_force=np.zeros((len(body.tips), 3)),
         loaded=False,
@@ -165,14 +168,6 @@ def _read(mechanism: Mechanism) -> Tables:
         **placed,
         **wired,
     )
-
-
-def _content(table: Rows) -> tuple[Any, ...]:
-    """Return everything that a table of rows holds but the parameters of its law, to be compared by value."""
-    arrays = (table.arm, table.measure, table.offset, table.channels, table.pins, table.bends, table.curvature_offset)
-    weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in (table.inputs, table.loads)]
-    named = (table.group, table.law, table.paths, table.stored, table.powers)
-    return *named, *table.arm.shape, *weighted, *(each.tobytes() for each in arrays)
 
 
 def _parameters(rows: Sequence[Rows]) -> Array:
@@ -191,34 +186,11 @@ def _of_rows(mechanism: Mechanism, chains: Chains) -> dict[str, Any]:
     paths = _PATHS.of((legs, mechanism.body.form), lambda: read_paths([path for each in legs for path in each], chains))
     return {
         "laws": np.array([addresses(table.law) for table in rows], dtype=np.int64).reshape(-1, 3),
-        "books": _books(mechanism),
+        "energies": _energies(mechanism),
         "paths": paths,
         **_of_states(mechanism, count),
         **_of_wiring(mechanism, count),
         **_of_arms(mechanism, reached(paths, count, mechanism.coordinates)),
-    }
-
-
-def _of_form(body: RigidBody, chains: Chains) -> dict[str, Any]:
-    """Return the tree of rigid bodies, its tips, and the loads of joints as pins."""
-    model, last, turns = body.model, chains.last, chains.turns
-    joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in model.joints[1:]])
-    tips = [model.frames[tip] for tip in body.tips]
-    holders = [int(tip.parentJoint) for tip in tips]
-    carriers = [body.carriers[joint] for joint in joint_of]
-    offsets = [turns[joint].T @ tip.placement.translation for joint, tip in zip(holders, tips, strict=True)]
-    directions = [turns[at].T @ body.proximal_axes[joint] for at, joint in zip(carriers, joint_of, strict=True)]
-    return {
-        "parents": chains.parents,
-        "roots": chains.roots,
-        "kinds": chains.kinds,
-        "charts": chains.charts,
-        "chart_frames": chains.chart_frames,
-        "tip_body": np.array([last[joint] for joint in holders], dtype=np.int64),
-        "tip_offset": np.array(offsets).reshape(-1, 3),
-        "carriers": np.array([last[joint] for joint in carriers], dtype=np.int64),
-        "directions": np.array(directions).reshape(-1, 3),
-        "carried": np.ascontiguousarray(body.supports[:, joint_of - 1]),
     }
 
 
@@ -266,13 +238,7 @@ def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
                 starts[-1].append(len(terms))
     channel = np.concatenate([np.zeros(0), *(table.channels for table in rows)]).astype(np.int64)
     groups = [
-        (
-            begin,
-            end,
-            bool(table.inputs),
-            bool(table.loads) or np.any(table.pins >= 0),
-            SIGNALS + table.law.signals.index(table.law.kink) if table.law.kink else -1,
-        )
+        (begin, end, bool(table.inputs), bool(table.loads) or np.any(table.pins >= 0), kink_column(table.law))
         for table, begin, end in zip(rows, ends[:-1], ends[1:], strict=True)
     ]
     return {
@@ -288,7 +254,7 @@ def _of_wiring(mechanism: Mechanism, count: int) -> dict[str, Any]:
 
 
 def _of_arms(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return arms, measures and bends, entry by entry where any is not zero or paths lead."""
+    """Return the entries of arms, measures and bends that are not zero, or depend on paths."""
     rows, none = mechanism.rows, np.zeros((0, mechanism.coordinates))
     arm, measure, bends = (
         np.concatenate([none, *(getattr(table, name) for table in rows)]) for name in ("arm", "measure", "bends")
@@ -310,14 +276,14 @@ def _of_arms(mechanism: Mechanism, routed: NDArray[np.bool_]) -> dict[str, Any]:
     }
 
 
-def _books(mechanism: Mechanism) -> NDArray[np.int64]:
-    stored, powers = ([each.name for each in one] for one in (mechanism.books.stored, mechanism.books.powers))
+def _energies(mechanism: Mechanism) -> NDArray[np.int64]:
+    stored, powers = ([each.name for each in one] for one in (mechanism.energies.stored, mechanism.energies.powers))
     wide = 1 + max((len(table.powers) for table in mechanism.rows), default=0)
-    books = np.full((len(mechanism.rows), wide), -1, dtype=np.int64)
-    for row, table in zip(books, mechanism.rows, strict=True):
+    energies = np.full((len(mechanism.rows), wide), -1, dtype=np.int64)
+    for row, table in zip(energies, mechanism.rows, strict=True):
         row[0] = stored.index(table.stored.name)
         row[1 : 1 + len(table.powers)] = [len(stored) + powers.index(each.name) for each in table.powers]
-    return books
+    return energies
 
 
 def _sparse(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

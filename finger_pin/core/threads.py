@@ -18,13 +18,18 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def threads() -> int:
+    """Return the number of threads that `in_threads` uses at most: one beside others."""
+    return usable_cores() if threading.current_thread() is threading.main_thread() else 1
+
+
 def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[_Found]:
     """Return the results of a task that holds no lock of Python, done for all items side by side, in their order.
 
     Only what the main thread does is spread: who runs many at once has no core to spare.
     """
-    workers = min(len(items), usable_cores())
-    if workers < 2 or threading.current_thread() is not threading.main_thread():
+    workers = min(len(items), threads())
+    if workers < 2:
         return [task(item) for item in items]
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(task, items))

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.remembering import Remembered
+from finger_pin.description.caching import Remembered
 from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)

@@ -97,7 +97,7 @@ class SamplingSettings(Description):
 
 
 class ControllerSettings(Description):
-    """The paper's controller (19)-(22), with compensations and limits where a table or entry asks for them.
+    """The paper's controller (19)-(22), with the compensations and limits that a table or entry asks for.
 
     With ``kind = "tensions"`` the tensions are given over time instead. In a file, ``file`` then names a CSV file: its
     columns are ``time`` and actuated tendons, and become samples of ``tensions``.
@@ -202,12 +202,7 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
         raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")
 
 
-_NOT_ROUTED = (
-    "tendon_friction_feedforward",
-    "joint_friction_compensation",
-    "passive_tension_loop",
-    "distribution",
-)
+_NOT_ROUTED = ("tendon_friction_feedforward", "joint_friction_compensation", "passive_tension_loop", "distribution")
 # What only the controller (19)-(22) has.
 _CLOSED_LOOP = (
     "gain",

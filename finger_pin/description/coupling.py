@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from finger_pin.description.remembering import Remembered
+from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array, Routing
 from finger_pin.exceptions import InputError
 

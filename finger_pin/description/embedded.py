@@ -1,4 +1,4 @@
-"""The scenario within a result, for those who draw it: the finger or hand, and the objects around it."""
+"""The scenario within a result, for its pictures: the finger or hand, and the objects around it."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.hand import HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.scenario import Scenario
+from finger_pin.description.scenario import EnvironmentSettings, Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
+
+_WRITTEN: Remembered[dict[str, str]] = Remembered(4)
 
 
 class Embedded(NamedTuple):
@@ -29,8 +32,13 @@ class Embedded(NamedTuple):
 
 def embedded(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a result of a scenario from which `described` reads."""
-    kind, own = ("finger", scenario.finger) if scenario.hand is None else ("hand", scenario.hand)
-    objects = {name: _plain(each) for name, each in (scenario.environment.objects or {}).items()}
+    own, around = scenario.hand or scenario.finger, scenario.environment
+    return _WRITTEN.of((own, around), lambda: _written(own, around))
+
+
+def _written(own: Description, around: EnvironmentSettings) -> dict[str, str]:
+    kind = "hand" if isinstance(own, HandSettings) else "finger"
+    objects = {name: _plain(each) for name, each in (around.objects or {}).items()}
     return {kind: json.dumps(_plain(own)), "objects": json.dumps(objects)}
 
 

@@ -193,7 +193,7 @@ def _found(owner: Any, path: Sequence[str]) -> Any:
 
 
 def _plain(value: Any, own: Any) -> Any:
-    """Return a value as TOML has it: arrays as lists; a whole number where there was one."""
+    """Return a value as TOML has it: arrays as lists, whole numbers as such."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if type(own) is int and isinstance(value, float) and value.is_integer():

@@ -7,22 +7,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial, reduce
+from functools import lru_cache, partial, reduce
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from finger_pin.description.actuators import Actuator
+from finger_pin.description.caching import Remembered
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.palm import PLACE, Palm
-from finger_pin.description.parameters import FingerDescription, Link, PassiveTendon, StrokeLimiterSettings, Tendon
-from finger_pin.description.remembering import Remembered
+from finger_pin.description.parameters import (
+    FingerDescription,
+    Joint,
+    Link,
+    PassiveTendon,
+    StrokeLimiterSettings,
+    Tendon,
+)
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import (
     IN_RADIANS,
     Description,
     Name,
+    Numbers,
     expand,
     problem,
     quantity,
@@ -32,9 +40,8 @@ from finger_pin.description.validation import (
 from finger_pin.exceptions import InputError
 
 _BUILT: Remembered[FingerDescription] = Remembered()
-_LINKS: Remembered[Link] = Remembered()
 _JOINED: Remembered[FingerDescription] = Remembered()
-# Tendons, actuators and tables of numbers of many fingers.
+# Joints, links, tendons, actuators and tables of numbers of many fingers.
 _TABLES: Remembered[Any] = Remembered(1024)
 _Table = TypeVar("_Table", bound=Description)
 
@@ -64,7 +71,7 @@ class PlacedFinger(Description):
     @property
     def rotation(self) -> Array:
         """From the finger's base frame to the palm's, shape (3, 3)."""
-        return rotation(*self.orientation)
+        return rotation(*self.orientation).copy()
 
 
 class HandSettings(Description):
@@ -172,6 +179,7 @@ def one_finger(description: FingerDescription) -> None:
         raise InputError("finger", allowed, hand.name)
 
 
+@lru_cache
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
     """Return the rotation of fixed angles, about x, then y, then z, shape (3, 3)."""
     (a, b, c), (d, e, f) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
@@ -202,12 +210,11 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
         }
         return tendon.model_copy(update={"crossings": crossings})
 
-    joints = {
-        name: joint.model_copy(
-            update={"link": joint.link and _LINKS.of((joint.link, scale), partial(scaled_link, joint.link))}
-        )
-        for name, joint in finger.joints.items()
-    }
+    def scaled_joint(joint: Joint) -> Joint:
+        link = joint.link and _TABLES.of((joint.link, scale), partial(scaled_link, joint.link))
+        return joint.model_copy(update={"link": link})
+
+    joints = {name: _TABLES.of((joint, scale), partial(scaled_joint, joint)) for name, joint in finger.joints.items()}
     tendons = {
         name: _TABLES.of((tendon, scale), partial(scaled_tendon, tendon)) for name, tendon in finger.tendons.items()
     }
@@ -247,10 +254,15 @@ def _kinds(part: FingerDescription, group: str) -> tuple[str, ...]:
 
 
 def _lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
-    order = np.argsort([kind for each in kinds for kind in each], kind="stable")
+    of_all = [kind for each in kinds for kind in each]
+    order = sorted(range(len(of_all)), key=of_all.__getitem__)
     found = {}
     for entry in type(tables[0]).model_fields:
         pairs = zip(tables, kinds, strict=True)
-        numbers = np.concatenate([expand(getattr(table, entry), len(own)) for table, own in pairs])
-        found[entry] = tuple(numbers[order].tolist())
+        numbers = [number for table, own in pairs for number in _each(getattr(table, entry), len(own))]
+        found[entry] = tuple([numbers[place] for place in order])
     return found
+
+
+def _each(value: Numbers, size: int) -> Sequence[float]:
+    return value if isinstance(value, tuple) else [float(value)] * size

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.hand import HandSettings
 from finger_pin.description.overriding import from_here, override
 from finger_pin.description.parameters import FingerDescription
@@ -28,7 +29,6 @@ from finger_pin.description.reading import (
 )
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.recordings.series import PACKED, Series, packed
-from finger_pin.description.remembering import Remembered
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, suggestion, validate
 from finger_pin.exceptions import InputError

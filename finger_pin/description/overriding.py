@@ -81,7 +81,7 @@ def _each(key: str, table: Table) -> list[str]:
 
 
 def refuse_other(key: str, *, hand: bool, finger: bool) -> None:
-    """Raise where a key is of a finger and there is a hand, or the other way round."""
+    """Raise for a key of a finger beside a hand, or the other way round."""
     if key.startswith("finger.") and hand:
         raise InputError(key, "there is a hand; keys of its fingers begin with hand.fingers.NAME.finger")
     if key.startswith("hand.") and finger:
@@ -138,6 +138,8 @@ def _fingers(table: Table) -> Table:
 def from_here(overrides: Mapping[str, Any], allowed: set[str]) -> Table:
     """Return overrides whose keys begin with an allowed one, with the path of a finger's file made absolute."""
     checked: Table = {}
+    if not isinstance(overrides, Mapping):
+        raise InputError("overrides", 'must be values by dotted key, such as {"controller.gain": 2.0}', overrides)
     for key, value in _placed(overrides):
         first, *rest = key.split(".")
         if first not in allowed:

@@ -61,5 +61,5 @@ class Palm(Description):
         return value
 
     def on_path(self, name: str) -> PathSignal:
-        """Return a coordinate of the path; zero where it is left out."""
+        """Return a coordinate of the path, by default zero."""
         return (self.path or {}).get(name, _AT_REST)

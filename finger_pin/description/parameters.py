@@ -124,7 +124,7 @@ class Joint(Description):
 
 
 class Crossing(Description):
-    """The crossing of a tendon over a joint: winding radius (3) and whether the joint bends its path (15)."""
+    """The crossing of a tendon over a joint: winding radius (3) and the bending of its path (15)."""
 
     radius: Annotated[float, real(-0.5, 0.5, hint=_MILLIMETRES)] = quantity(
         ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."
@@ -184,10 +184,7 @@ class PassiveTendon(Description):
         8.8e-6, unit="kg", source="estimate", doc="m_5, lumped mass."
     )
     hysteresis: Annotated[Numbers, reals(0.0, 0.9)] = quantity(
-        0.0,
-        unit="1",
-        source="the paper has none",
-        doc="h, part of its tension that a half holds against its stretch.",
+        0.0, unit="1", source="the paper has none", doc="h, part of its tension that a half holds against its stretch."
     )
 
 

@@ -88,7 +88,7 @@ def kind_of(name: str, folder: Path = Path()) -> str:
 
 
 def expand(name: str) -> Path:
-    """Return a path with the home folder in place of ~, or as it is where there is no such home."""
+    """Return a path with the home folder in place of ~, if there is such a home."""
     try:
         return Path(name).expanduser()
     except RuntimeError:
@@ -166,7 +166,7 @@ def resolve_finger(finger: Any, folder: Path, seen: tuple[Path, ...] = ()) -> An
 
 
 def with_motors(finger: Table, folder: Path) -> Table:
-    """Put the table of every motor of a finger where its name or path may stand; return the finger."""
+    """Replace names and paths of motors in a finger by their tables; return the finger."""
     for name, actuator in as_table(finger.get("actuators")).items():
         if isinstance(actuator, dict) and "motor" in actuator:
             actuator["motor"] = _resolve_motor(actuator["motor"], folder, f"finger.actuators.{name}.motor")
@@ -227,7 +227,7 @@ def _named(owner: str) -> Iterator[None]:
 
 
 def resolve_signals(table: Table, folder: Path) -> None:
-    """Put the columns of CSV files where a file may say them itself: as samples of signals by name."""
+    """Replace CSV files by their columns, as samples of signals by name."""
     for section, key, target in _SIGNAL_FILES:
         settings = table.get(section)
         if not isinstance(settings, dict) or key not in settings:
@@ -247,7 +247,7 @@ def resolve_signals(table: Table, folder: Path) -> None:
 
 
 def _share_times(table: Table) -> None:
-    """Put the times of its neighbour where a signal names one that has them."""
+    """Replace the name of a neighbour in a signal's times by that one's times."""
     inner = [("", table)]
     # Tables may be nested more deeply than calls.
     while inner:

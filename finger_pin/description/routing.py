@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.remembering import Remembered
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -19,39 +19,23 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from finger_pin.description.actuators import check_currents, check_sources
-from finger_pin.description.by_finger import error_of_finger, flat, flat_numbers, given, nested, of_finger
+from finger_pin.description.by_finger import error_of_finger, flat, given, nested, of_finger
+from finger_pin.description.caching import Remembered
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.signals import ForceSignal, JointReference, of_axes
+from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
 from finger_pin.description.tautness import Tautness
-from finger_pin.description.validation import (
-    IN_RADIANS,
-    MOST_ANGLE,
-    Description,
-    FullName,
-    Name,
-    choice,
-    expand,
-    problem,
-    quantity,
-    real,
-    suggestion,
-    vector,
-)
+from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
 from finger_pin.exceptions import InputError
 
-# The textbook path keeps to NumPy and Pinocchio; the others evaluate the compiled model.
-METHODS_IN_NUMPY = ("Radau", "BDF", "LSODA")
-METHODS = ("Rodas5P", "Rodas4", *METHODS_IN_NUMPY, "CVODE")
-MOST_SAMPLES = 5_000_000
-LEAST_RTOL, LEAST_ATOL_SCALE = 1e-12, 1e-15
 _Item = TypeVar("_Item")
 _PARTS: Remembered[dict[str, Scenario]] = Remembered()
+_CHECKED: Remembered[None] = Remembered()
 
 
 class ReferenceSettings(Description):
@@ -92,48 +76,6 @@ class EnvironmentSettings(Description):
     objects: dict[Name, Object] | None = Field(None, description="Objects that the finger may touch, by name.")
 
 
-class InitialSettings(Description):
-    """The start of the joints; the rest of the state follows: bristles relaxed, passive tendons taut in between."""
-
-    position: dict[FullName, Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)]] = quantity(
-        {}, unit="rad", source="chosen", doc="theta(0) by joint; a joint left out starts on its reference."
-    )
-    velocity: dict[FullName, Annotated[float, real(-1e4, 1e4)]] = quantity(
-        {}, unit="rad/s", source="chosen", doc="theta'(0) by joint; a joint left out starts at rest."
-    )
-
-    _flat = field_validator("position", "velocity", mode="before")(flat_numbers)
-    _nested = field_serializer("position", "velocity", mode="wrap")(nested)
-
-
-class SimulationSettings(Description):
-    """Duration, sample rate, integrator and tolerances of a run."""
-
-    duration: Annotated[float, real(0.0, 1e6, above=True)] = quantity(8.0, unit="s", source="chosen", doc="Length.")
-    sample_rate: Annotated[float, real(0.0, 1e7, above=True)] = quantity(
-        1000.0, unit="Hz", source="chosen", doc="Of the saved signals."
-    )
-    method: Annotated[str, choice(*METHODS)] = quantity("Rodas5P", unit="1", source="benchmark", doc="Integrator.")
-    rtol: Annotated[float, real(LEAST_RTOL, 0.1)] = quantity(
-        1e-6, unit="1", source="energy account", doc="Relative tolerance."
-    )
-    atol_scale: Annotated[float, real(LEAST_ATOL_SCALE, 0.1)] = quantity(
-        1e-6, unit="1", source="energy account", doc="Absolute tolerance over the scale of each kind of state."
-    )
-
-    start_time: Annotated[float, real(-1e6, 1e6)] = quantity(
-        0.0, unit="s", source="chosen", doc="Time of references, tensions and forces at t = 0."
-    )
-    initial: InitialSettings | None = Field(None, description="Where the joints start: at rest on their references.")
-
-    @model_validator(mode="after")
-    def _affordable(self) -> Self:
-        if self.duration * self.sample_rate > MOST_SAMPLES:
-            allowed = f"duration times sample_rate must be at most {MOST_SAMPLES} samples"
-            raise problem("sample_rate", allowed, self.sample_rate)
-        return self
-
-
 class Scenario(Description):
     """The whole input of a simulation.
 
@@ -169,12 +111,21 @@ class Scenario(Description):
         if self.finger is None:
             raise problem("finger", "is missing: a finger, or a hand")
         self._check_names()
+        fingers, finger = () if self.hand is None else tuple(self.hand.fingers), self.finger
+        tables = finger.joints, finger.tendons, finger.actuators
+        settings = self.controller, self.reference, finger.tree, finger.passive_tendon
+        # Other friction, for one, is nothing to what is checked.
+        named = (part for table in tables for part in (*table, *table.values(), None))
+        _CHECKED.of((*settings, fingers, *named), self._check_parts)
+        return self
+
+    def _check_parts(self) -> None:
+        """Refuse tables that do not fit each other, finger by finger."""
         for name, part in self.parts().items():
             try:
                 part._check()
             except PydanticCustomError as error:
                 raise error_of_finger(name, error) from None
-        return self
 
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -189,6 +140,13 @@ class Scenario(Description):
         Of a finger it is the scenario itself, under no name.
         """
         return dict(_PARTS.of((self,), self._parted))
+
+    def environments(self) -> dict[str, EnvironmentSettings]:
+        """Return the environments of the fingers of a hand, by name; of a finger its own, under no name."""
+        own = self.environment
+        if self.hand is None:
+            return {"": own}
+        return {name: of_finger(own, name) if own.fingers else own for name in self.hand.fingers}
 
     def _parted(self) -> dict[str, Scenario]:
         if self.hand is None:

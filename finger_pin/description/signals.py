@@ -11,15 +11,7 @@ import numpy as np
 from pydantic import model_validator
 
 from finger_pin.description.recordings.series import Series, series
-from finger_pin.description.validation import (
-    IN_RADIANS,
-    MOST_ANGLE,
-    Description,
-    choice,
-    problem,
-    quantity,
-    real,
-)
+from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE, Description, choice, problem, quantity, real
 
 #: The most points or samples of a signal in a file. Arrays in Python may be longer.
 MOST_POINTS = 1_000_000

@@ -14,7 +14,7 @@ from finger_pin.description.routing import Array, Routing
 
 @dataclass(frozen=True, eq=False)
 class Tautness:
-    """The least excess of all tensions over their minimum, where the springs help least.
+    """The least excess of all tensions over their minimum, in the posture of least help from the springs.
 
     At rest the tendons balance the springs, H_c^T f = k (theta - theta_0); gravity is left out. The torques that
     tensions of at least f0 exert are a convex set, and the torque of the springs is affine in the posture. So the
@@ -71,7 +71,7 @@ class Tautness:
         return self.spare >= 0.0 and bool(np.all(self.minimum + self.spare > 0.0))
 
     def __str__(self) -> str:
-        """Return a sentence: the excess of tension under the springs, and the posture where it is least."""
+        """Return a sentence: the least excess of tension under the springs, and its posture."""
         where = ", ".join(f"{name} {angle:.3g}" for name, angle in zip(self.joints, self.posture, strict=True))
         if self.spare == -np.inf:
             return f"no tensions hold it against its springs at {where} rad"

@@ -195,7 +195,7 @@ class TreeActuator(Description):
 
 
 class Tip(Description):
-    """The point whose motion is recorded, and where the fingertip force acts."""
+    """The point of the recorded motion and of the fingertip force."""
 
     body: Name | None = Field(None, description="Body that carries it; the base if left out.")
     position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")

@@ -23,6 +23,8 @@ Name = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z][A-Za-z0
 #: Of a joint or tendon, which begins with that of its finger and a dot where there is a hand.
 _FULL = r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"
 FullName = Annotated[str, StringConstraints(strict=True, pattern=_FULL, max_length=129)]
+# So many names a message lists; of more it lists so many that are near.
+_READABLE, _NEAR = 20, 5
 #: The largest angle of a joint, rad: two turns. Nearly every angle in degrees is beyond it.
 MOST_ANGLE = 12.5
 IN_RADIANS = " rad (is it in degrees?)"
@@ -130,10 +132,20 @@ def suggestion(name: Any, names: Iterable[str]) -> str:
     return f"; did you mean {near}?" if near else ""
 
 
+def choices(name: Any, names: Iterable[str]) -> str:
+    """Return the valid names as the end of a message: the nearest ones if there are too many to read."""
+    known = list(names)
+    shown = known if len(known) <= _READABLE else difflib.get_close_matches(str(name), known, _NEAR, cutoff=0.0)
+    rest = f" and {len(known) - len(shown)} more" if len(shown) < len(known) else ""
+    return f"{', '.join(shown)}{rest}{suggestion(name, known)}"
+
+
 def expand(value: Numbers, size: int) -> NDArray[np.float64]:
     """Return one number per item, shape (size,), from one number for all or one for each."""
     if isinstance(value, int | float):
         return np.full(size, float(value))
+    if len(value) == size:
+        return np.array(value, dtype=float)
     return np.broadcast_to(np.asarray(value, dtype=float), (size,)).copy()
 
 

@@ -41,7 +41,7 @@ class Waypoint(Description):
     )
 
     def holds(self, point: Waypoint) -> bool:
-        """Return whether a point that the same body carries lies inside of a wrap; False where another one does."""
+        """Return whether a point lies inside of a wrap of the same body; False for another body's."""
         if point.body != self.body:
             return False
         x, y, z, w = self.orientation

@@ -18,11 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.laws.law import Law, Row
+from finger_pin.laws.law import Law, Row, direction, magnitude
 
 
-def friction_coefficient(velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0) -> Any:
-    """Return M(v) = M^d + (M^c - M^d) exp(-(|v| / omega)^p), equation (9b), where p = 1.
+def friction_coefficient(
+    velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0, side: Any = 0.0
+) -> Any:
+    """Return M(v) = M^d + (M^c - M^d) exp(-(|v| / omega)^p), equation (9b) with p = 1.
 
     Args:
         velocity: Sliding velocity v.
@@ -30,19 +32,22 @@ def friction_coefficient(velocity: Any, kinetic: Any, static: Any, stribeck: Any
         static: M^c, stiction coefficient.
         stribeck: omega, Stribeck velocity.
         exponent: p, 1 or 2.
+        side: As in `Row`.
     """
-    ratio = np.abs(velocity) / stribeck
+    ratio = magnitude(velocity, side) / stribeck
     # ratio**exponent, exact for 1 and 2, without the cost of a power.
     power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
     return kinetic + (static - kinetic) * np.exp(-power)
 
 
-def friction_coefficient_slope(velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0) -> Any:
+def friction_coefficient_slope(
+    velocity: Any, kinetic: Any, static: Any, stribeck: Any, exponent: Any = 1.0, side: Any = 0.0
+) -> Any:
     """Return dM/dv of (9b)."""
-    ratio = np.abs(velocity) / stribeck
+    ratio = magnitude(velocity, side) / stribeck
     power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
     power_slope = (2.0 - exponent) + 2.0 * (exponent - 1.0) * ratio
-    return -np.sign(velocity) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
+    return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
 
 
 def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
@@ -53,22 +58,24 @@ def friction_level(normal: Any, coefficient: Any, floor: Any) -> Any:
     return np.maximum(normal * coefficient, floor)
 
 
-def stiction_rate(stiction: Any, velocity: Any, level: Any, stiffness: Any) -> Any:
+def stiction_rate(stiction: Any, velocity: Any, level: Any, stiffness: Any, side: Any = 0.0) -> Any:
     """Return F^s' = sigma_0 (v - F^s |v| / level), equation (9a)."""
-    return stiffness * (velocity - stiction * np.abs(velocity) / level)
+    return stiffness * (velocity - stiction * magnitude(velocity, side) / level)
 
 
-def stiction_rate_slopes(stiction: Any, velocity: Any, level: Any, stiffness: Any) -> tuple[Any, Any, Any]:
+def stiction_rate_slopes(
+    stiction: Any, velocity: Any, level: Any, stiffness: Any, side: Any = 0.0
+) -> tuple[Any, Any, Any]:
     """Return the derivatives of (9a) with respect to F^s, v and the level."""
-    speed = np.abs(velocity)
+    speed = magnitude(velocity, side)
     by_stiction = -stiffness * speed / level
-    by_velocity = stiffness * (1.0 - stiction * np.sign(velocity) / level)
+    by_velocity = stiffness * (1.0 - stiction * direction(velocity, side) / level)
     by_level = stiffness * stiction * speed / (level * level)
     return by_stiction, by_velocity, by_level
 
 
 def friction_force(stiction: Any, velocity: Any, viscous: Any, rate: Any = 0.0, lag: Any = 0.0) -> Any:
-    """Return F^f = F^s + lag F^s' + b v, equation (9c), where lag = 0.
+    """Return F^f = F^s + lag F^s' + b v, equation (9c) with lag = 0.
 
     Args:
         stiction: F^s.
@@ -116,9 +123,9 @@ def steady_force(velocity: Any, normal: Any, coefficient: Any, viscous: Any) -> 
 
 def _value(row: Row, p: Any) -> Any:
     kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
-    coefficient = friction_coefficient(row.speed, kinetic, static, stribeck, exponent)
+    coefficient = friction_coefficient(row.speed, kinetic, static, stribeck, exponent, row.side)
     level = friction_level(row.load, coefficient, floor)
-    rate = stiction_rate(row.state, row.speed, level, stiffness)
+    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
     return -loss, rate, loss, row.load, coefficient, level
 
@@ -126,10 +133,10 @@ def _value(row: Row, p: Any) -> Any:
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
     kinetic, static, stiffness, viscous, stribeck, floor, exponent, lag = p
     _, _, coefficient, level = signals
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness)
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
     by_level = by_level * (level > floor)
     by_speed = by_speed + by_level * row.load * friction_coefficient_slope(
-        row.speed, kinetic, static, stribeck, exponent
+        row.speed, kinetic, static, stribeck, exponent, row.side
     )
     return (0.0, -viscous, -1.0, -lag, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_level * coefficient, 0.0, 0.0)
 
@@ -144,13 +151,7 @@ def bristle_account(speed: Any, stiction: Any, rate: Any, level: Any, stiffness:
     )
 
 
-def _account(
-    row: Row,
-    p: Any,
-    force: Any,
-    rate: Any,
-    signals: Any,
-) -> Any:
+def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
     _, _, stiffness, viscous, _, _, _, lag = p
     return bristle_account(row.speed, row.state, rate, signals[3], stiffness, viscous, lag)
 
@@ -165,4 +166,5 @@ PIN_FRICTION = Law(
     signals=("friction", "normal_force", "coefficient", "level"),
     losses=("coulomb", "viscous", "micro_damping"),
     scale=1e-2,
+    kink="speed",
 )

@@ -26,7 +26,7 @@ from finger_pin.laws.bristle import (
     stiction_rate,
     stiction_rate_slopes,
 )
-from finger_pin.laws.law import Law, Row
+from finger_pin.laws.law import Law, Row, direction, magnitude
 
 # What integrators take for an instant, s: about a hundred times the resolution of time.
 _INSTANT = 1e-12
@@ -86,20 +86,20 @@ def sliding_tension(command: Any, coefficient: Any, speed: Any, viscous: Any, dr
     return np.maximum(0.0, left - way * np.maximum(0.0, floor - way * (command - left - lost)))
 
 
-def _level(normal: Any, sliding: Any, speed: Any, p: Any) -> Any:
+def _level(normal: Any, sliding: Any, row: Row, p: Any) -> Any:
     """Return F^n M + drag, or its floor."""
-    return friction_level(1.0, normal * sliding + p[8], np.maximum(p[5], _haste(p) * np.abs(speed)))
+    return friction_level(1.0, normal * sliding + p[8], np.maximum(p[5], _haste(p) * magnitude(row.speed, row.side)))
 
 
-def _rate_slopes(speed: Any, stiction: Any, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
+def _rate_slopes(row: Row, normal: Any, coefficient: Any, sliding: Any, level: Any, p: Any) -> Any:
     """Return the derivatives of F^s' by v, F^s, F^n and phi."""
     surface, ratio, stiffness, stribeck, floor, exponent = p[0], p[1], p[2], p[4], p[5], p[6]
-    own, by_speed, by_any = stiction_rate_slopes(stiction, speed, level, stiffness)
+    own, by_speed, by_any = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
     haste = _haste(p)
-    hasty = 1.0 * (level > floor) * (level <= haste * np.abs(speed))
-    by_speed = by_speed + hasty * by_any * haste * np.sign(speed)
+    hasty = 1.0 * (level > floor) * (level <= haste * magnitude(row.speed, row.side))
+    by_speed = by_speed + hasty * by_any * haste * direction(row.speed, row.side)
     by_level = by_any * (level > floor) * (1.0 - hasty)
-    slope = friction_coefficient_slope(speed, coefficient, ratio * coefficient, stribeck, exponent)
+    slope = friction_coefficient_slope(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
     # M is proportional to mu^d, which depends on the posture through the curvature.
     share = sliding / np.maximum(coefficient, 1e-300)
     by_curvature = by_level * normal * share * capstan_slope(surface, coefficient)
@@ -111,9 +111,9 @@ def _driven(row: Row, p: Any) -> Any:
     coefficient = capstan_coefficient(surface, row.curvature)
     pressing = delivered_tension(row.command, friction_force(row.state, row.speed, viscous))
     normal = np.abs(pressing) + np.abs(row.command)
-    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
-    level = _level(normal, sliding, row.speed, p)
-    rate = stiction_rate(row.state, row.speed, level, stiffness)
+    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
+    level = _level(normal, sliding, row, p)
+    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
     force = delivered_tension(row.command, loss) - acting * row.command
     return force, rate, loss, normal, coefficient, sliding, level, pressing
@@ -122,7 +122,7 @@ def _driven(row: Row, p: Any) -> Any:
 def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
     viscous, lag = p[3], p[7]
     loss, normal, coefficient, sliding, level, pressing = signals
-    by_speed, own, by_normal, by_curvature = _rate_slopes(row.speed, row.state, normal, coefficient, sliding, level, p)
+    by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
     pressed = by_normal * (pressing > 0.0)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
@@ -130,13 +130,7 @@ def _driven_slopes(row: Row, p: Any, signals: Any) -> Any:
     return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
 
 
-def _driven_account(
-    row: Row,
-    p: Any,
-    force: Any,
-    rate: Any,
-    signals: Any,
-) -> Any:
+def _driven_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
     stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
     slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
@@ -146,26 +140,20 @@ def _driven_account(
 def _passive(row: Row, p: Any) -> Any:
     surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _ = p
     coefficient = capstan_coefficient(surface, row.curvature)
-    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent)
-    level = _level(row.load, sliding, row.speed, p)
-    rate = stiction_rate(row.state, row.speed, level, stiffness)
+    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
+    level = _level(row.load, sliding, row, p)
+    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
     loss = friction_force(row.state, row.speed, viscous, rate, lag)
     return -loss, rate, loss, row.load, coefficient, sliding, level
 
 
 def _passive_slopes(row: Row, p: Any, signals: Any) -> Any:
     _, normal, coefficient, sliding, level = signals
-    by_speed, own, by_normal, by_curvature = _rate_slopes(row.speed, row.state, normal, coefficient, sliding, level, p)
+    by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
     return (0.0, -p[3], -1.0, -p[7], 0.0, 0.0, 0.0), (0.0, by_speed, own, by_normal, 0.0, by_curvature)
 
 
-def _passive_account(
-    row: Row,
-    p: Any,
-    force: Any,
-    rate: Any,
-    signals: Any,
-) -> Any:
+def _passive_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
     return bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
 
 
@@ -193,6 +181,7 @@ DRIVEN_TENDON = Law(
     supplies=("actuators",),
     losses=("coulomb", "viscous", "micro_damping", "slack"),
     scale=1.0,
+    kink="speed",
 )
 
 #: The friction of a passive tendon, which its halves load.
@@ -205,4 +194,5 @@ PASSIVE_FRICTION = Law(
     signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level"),
     losses=("coulomb", "viscous", "micro_damping"),
     scale=1.0,
+    kink="speed",
 )

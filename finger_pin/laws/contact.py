@@ -1,4 +1,4 @@
-"""Contact: a Hunt-Crossley normal force, and friction that sticks where it does not slide.
+"""The law of contact: a Hunt-Crossley normal force, and the friction of a bristle, which sticks.
 
 Normal, d = -gap: f_n = max(0, k d^p (1 + c d')) (Hunt and Crossley, J. Applied Mechanics 42, 1975).
 
@@ -35,7 +35,7 @@ from finger_pin.laws.law import ContactLaw, Touch
 
 
 def _normal(touch: Touch, p: Any) -> Any:
-    """Return d > 0 or 0, the spring force, the damping factor, and 1 where the contact pushes, else 0."""
+    """Return d > 0 or 0, the spring force, the damping factor, and 1 for a contact that pushes, else 0."""
     stiffness, damping, exponent = p[:3]
     depth = -touch.gap * ((touch.gap < 0.0) | (touch.side > 0.0))
     factor = 1.0 - damping * touch.speed

@@ -1,4 +1,4 @@
-"""An elastic tendon between a spool and the canal: it pulls with K e + D e' where it is stretched, and never pushes."""
+"""An elastic tendon between a spool and the canal: stretched it pulls with K e + D e', and it never pushes."""
 
 from __future__ import annotations
 

@@ -23,14 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.laws.bristle import (
-    bristle_account,
-    friction_force,
-    friction_level,
-    stiction_rate,
-    stiction_rate_slopes,
-)
-from finger_pin.laws.law import Law, Row
+from finger_pin.laws.bristle import bristle_account, friction_force, friction_level, stiction_rate, stiction_rate_slopes
+from finger_pin.laws.law import Law, Row, direction
 
 _EPSILON = 1e-4
 # Least level, N m: it keeps (9a) finite for a gearbox without dry friction.
@@ -38,7 +32,7 @@ _FLOOR = 1e-9
 
 
 def stribeck_share(speed: Any, stribeck: Any, exponent: Any) -> Any:
-    """Return exp(-(|v| / w)^p), smooth at rest, where it is 1."""
+    """Return exp(-(|v| / w)^p), smooth and 1 at rest."""
     square = (speed / stribeck) ** 2 + _EPSILON**2
     return np.exp(_EPSILON**exponent - square ** (0.5 * exponent))
 
@@ -49,9 +43,9 @@ def stribeck_share_slope(speed: Any, stribeck: Any, exponent: Any, share: Any) -
     return -share * exponent * square ** (0.5 * exponent - 1.0) * speed / (stribeck * stribeck)
 
 
-def loss_share(pull: Any, speed: Any, driving: Any, driven: Any) -> Any:
+def loss_share(pull: Any, speed: Any, driving: Any, driven: Any, side: Any = 0.0) -> Any:
     """Return the share of the tendons' torque T that gears lose, by the direction of power through them."""
-    way = np.sign(pull * speed)
+    way = np.sign(pull) * direction(speed, side)
     return 0.5 * ((1.0 + way) * driving + (1.0 - way) * driven)
 
 
@@ -59,20 +53,20 @@ def _value(row: Row, p: Any) -> Any:
     base, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     share = stribeck_share(row.speed, velocity, exponent)
     dry = base + by_load * row.load + (stribeck + stribeck_by_load * row.load) * share
-    lost = loss_share(row.command, row.speed, driving, driven) * np.abs(row.command)
+    lost = loss_share(row.command, row.speed, driving, driven, row.side) * np.abs(row.command)
     level = friction_level(1.0, dry + lost, _FLOOR)
     loss = friction_force(row.state, row.speed, viscous)
-    return -loss, stiction_rate(row.state, row.speed, level, stiffness), loss, share, level
+    return -loss, stiction_rate(row.state, row.speed, level, stiffness, row.side), loss, share, level
 
 
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
     _, by_load, stribeck, stribeck_by_load, velocity, exponent, viscous, stiffness, driving, driven = p
     _, share, level = signals
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness)
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, level, stiffness, row.side)
     by_level = by_level * (level > _FLOOR)
     steep = (stribeck + stribeck_by_load * row.load) * stribeck_share_slope(row.speed, velocity, exponent, share)
     pressed = by_level * (by_load + stribeck_by_load * share)
-    pulled = by_level * loss_share(row.command, row.speed, driving, driven) * np.sign(row.command)
+    pulled = by_level * loss_share(row.command, row.speed, driving, driven, row.side) * np.sign(row.command)
     return (0.0, -viscous, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed + by_level * steep, own, pressed, pulled, 0.0)
 
 
@@ -102,4 +96,5 @@ GEARBOX = Law(
     signals=("friction", "stribeck_share", "level"),
     losses=("coulomb", "viscous"),
     scale=1e-2,
+    kink="speed",
 )

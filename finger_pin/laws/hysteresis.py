@@ -12,25 +12,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.laws.bristle import (
-    bristle_energy,
-    coulomb_loss,
-    friction_level,
-    stiction_rate,
-    stiction_rate_slopes,
-)
+from finger_pin.laws.bristle import bristle_energy, coulomb_loss, friction_level, stiction_rate, stiction_rate_slopes
 from finger_pin.laws.law import Law, Row
 
 
 def _value(row: Row, p: Any) -> Any:
     share, stiffness, floor = p
     level = friction_level(row.load, share, floor)
-    return -row.state, stiction_rate(row.state, row.speed, level, stiffness), level
+    return -row.state, stiction_rate(row.state, row.speed, level, stiffness, row.side), level
 
 
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
     share, stiffness, floor = p
-    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, signals[0], stiffness)
+    own, by_speed, by_level = stiction_rate_slopes(row.state, row.speed, signals[0], stiffness, row.side)
     by_load = by_level * share * (signals[0] > floor)
     return (0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0), (0.0, by_speed, own, by_load, 0.0, 0.0)
 
@@ -49,6 +43,7 @@ HYSTERESIS = Law(
     signals=("level",),
     losses=("coulomb",),
     scale=1e-2,
+    kink="speed",
 )
 #: The stiffness of its bristles over the spring's own: how sharply the force turns where the motion does.
 STIFFER = 10.0

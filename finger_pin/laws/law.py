@@ -37,8 +37,18 @@ class Row(NamedTuple):
 
 
 def beyond(kink: Any, side: Any) -> Any:
-    """Return 1 where a row is on the positive side of its kink, or is held there; else 0."""
+    """Return 1 for a row on the positive side of its kink, or held there; else 0."""
     return 1.0 * (kink * (side == 0.0) + side > 0.0)
+
+
+def magnitude(value: Any, side: Any) -> Any:
+    """Return |x|, or x or -x for a row held on a side."""
+    return np.abs(value) * (side == 0.0) + side * value
+
+
+def direction(value: Any, side: Any) -> Any:
+    """Return the derivative of `magnitude`: the sign of x, or the side of a held row."""
+    return np.sign(value) * (side == 0.0) + side
 
 
 @dataclass(frozen=True)
@@ -57,8 +67,9 @@ class Law:
         supplies: Names of the powers that come in.
         losses: Names of the powers that are lost.
         scale: Typical magnitude of the state, for absolute tolerances; None for a law without a state, whose z' is 0.
-        kink: Name of the signal by whose sign the force bends so sharply that steps must not cross it unseen; empty
-            for none. On either side of it, value and slopes are smooth and heed ``Row.side``.
+        kink: Name of the signal by whose sign the force bends so sharply that steps must not cross it unseen, or
+            ``speed`` where the rate of the state bends with the sign of that; empty for none. On either side of it,
+            value and slopes are smooth and heed ``Row.side``.
     """
 
     name: str

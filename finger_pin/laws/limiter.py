@@ -60,13 +60,7 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
     return (-factor * gripping, -damping * past * gripping, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _account(
-    row: Row,
-    p: Any,
-    force: Any,
-    rate: Any,
-    signals: Any,
-) -> Any:
+def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
     stiffness, depth = p[2], signals[0]
     return limiter_energy(depth, stiffness), limiter_loss(-force, depth, row.speed, stiffness)
 

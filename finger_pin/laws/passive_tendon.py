@@ -30,13 +30,7 @@ def _slopes(row: Row, p: Any, signals: Any) -> Any:
     return (by_length, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _account(
-    row: Row,
-    p: Any,
-    force: Any,
-    rate: Any,
-    signals: Any,
-) -> Any:
+def _account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
     (stiffness,) = p
     return (half_energy(-row.length, stiffness),)
 

@@ -55,7 +55,7 @@ class LogUniform:
 
 @dataclass(frozen=True)
 class Normal:
-    """Numbers of a normal distribution, drawn again where they fall outside of ``low`` and ``high``."""
+    """Numbers of a normal distribution, drawn again if outside of ``low`` and ``high``."""
 
     mean: float
     deviation: float

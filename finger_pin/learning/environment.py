@@ -35,12 +35,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
     def __init__(
-        self,
-        scenario: ScenarioLike,
-        *,
-        finger: FingerLike | None = None,
-        render_mode: str | None = None,
-        **task: Any,
+        self, scenario: ScenarioLike, *, finger: FingerLike | None = None, render_mode: str | None = None, **task: Any
     ) -> None:
         """Prepare a scenario for episodes.
 
@@ -79,7 +74,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         Raises:
             InputError: Naming the argument, key or variable that is wrong.
         """
-        self.task, self.render_mode = Task(**task), read_render_mode(render_mode)
+        self.task, self.render_mode = Task.of(task), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, 1, finger)
         self.observation_space, self._actions = self._worlds.spaces()
         self.action_space = self._actions
@@ -92,7 +87,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         super().reset(seed=seed)
         self._begun = True
         self._worlds.begin((0,), [self.np_random])
-        observations, _ = self._worlds.observe(_ALONE)
+        observations, _ = self._worlds.observe(_ALONE, judged=False)
         return observations[0], {"drawn": dict(self._worlds.each[0].drawn)}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Variables of a result at one instant of worlds that go on: where a result has instants, there are the worlds."""
+"""Variables of a result at one instant of worlds that go on, with worlds in place of instants."""
 
 from __future__ import annotations
 
@@ -30,11 +30,15 @@ _OF_CONTROLLERS = ("joint_reference", "tracking_error", "joint_torque_command", 
 
 def instant(loop: ClosedLoop, time: float, x: Array) -> SampledMotion:
     """Return the signals of a state, shape (size,), at a time, s."""
-    return _motions(loop, np.array([time]), x[None], None)
+    return SampledMotion(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
 
 
-def _motions(loop: ClosedLoop, times: Array, x: Array, names: Sequence[str] | None) -> SampledMotion:
-    return SampledMotion(loop, Trajectory(_EVER, lambda _: x, _NOTHING), times, names)
+class Present(SampledMotion):
+    """Worlds at the states that they have reached, and all that follows from these."""
+
+    def __init__(self, loop: SideBySide, times: Array, x: Array) -> None:
+        """Take times, shape (w,), s, and packed states, shape (w, size)."""
+        self.loop, self.times, self.packed, self._accelerated = loop, times, x, loop.accelerated
 
 
 def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:
@@ -90,10 +94,6 @@ class SideBySide(ClosedLoop):
         """Whether all worlds have the same numbers."""
         return not isinstance(self.dynamics, CompiledFingers)
 
-    def at(self, times: Array, x: Array) -> SampledMotion:
-        """Return the signals of packed states, shape (w, size), at times (w,), s."""
-        return _motions(self, times, x, ["joint_acceleration"] if self.accelerated else [])
-
     def force(self, time: Array | float) -> Array:
         """Return F in all worlds, shape (3,) or (w, 3), of several fingers (f, 3) or (w, f, 3), N."""
         if self.shared:
@@ -101,7 +101,7 @@ class SideBySide(ClosedLoop):
         return np.array([loop.force(each) for loop, each in zip(self.loops, np.asarray(time), strict=True)])
 
     def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
-        """Return all signals at times (w,) and states (w, size); how the base moves counts for accelerations alone."""
+        """Return all signals at times (w,) and states (w, size); the base's motion counts for accelerations alone."""
         times, routing = np.asarray(time), self.finger.routing
         command = np.array([action.held for action in self.actions])
         tension = np.zeros((len(times), len(routing.tendons)))

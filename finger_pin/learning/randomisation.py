@@ -56,7 +56,7 @@ class Randomisation:
                     self.delay({DELAY: end}, 0.0)
             elif not key.startswith(_ACTING):
                 known = ", ".join([*_ACTING, _SENSOR, DELAY])
-                raise InputError("randomise", f"does not act on an episode; what does begins with {known}", key)
+                raise InputError("randomise", f"does not act on an episode; keys that do begin with {known}", key)
         other = (DELAY,)
         self.keys = tuple(key for key in self._distributions if key not in other and not key.startswith(_SENSOR))
 

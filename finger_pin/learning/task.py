@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.description.routing import Array
+from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.learning.distributions import Distribution
 from finger_pin.learning.sensors import Sensor
@@ -26,7 +27,7 @@ ACTIONS = ("tension", "motor_position", "tendon_length", "joint_position")
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A task on a scenario; arguments of `Environment`, where they are explained."""
+    """A task on a scenario; `Environment` explains its arguments."""
 
     reward: Function
     action: str = "tension"
@@ -40,6 +41,22 @@ class Task:
     draw: Callable[[np.random.Generator], Mapping[str, ArrayLike]] | None = None
     start: str | Callable[[np.random.Generator], ArrayLike] = "reference"
     randomise: Mapping[str, Distribution] | str | os.PathLike[str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Task:
+        """Return a task with entries by name.
+
+        Raises:
+            InputError: If there is no such entry, the reward is missing, or an entry is wrong.
+        """
+        names = [each.name for each in fields(cls)]
+        for name in given:
+            if name not in names:
+                known = ", ".join(["finger", "render_mode", *names])
+                raise InputError(name, f"no such argument; there are {known}{suggestion(name, names)}")
+        if "reward" not in given:
+            raise InputError("reward", "is missing: a function of the signals")
+        return cls(**given)
 
     def __post_init__(self) -> None:
         """Check the entries that do not depend on the scenario."""
@@ -65,7 +82,7 @@ class Task:
         if isinstance(self.start, str) and self.start not in ("reference", "random"):
             raise InputError("start", 'must be "reference", "random" or a function of a generator', self.start)
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Control periods of an episode."""
         return max(round(self.duration / self.period), 1)
@@ -75,7 +92,7 @@ class Task:
         given = self.observation
         return dict(given) if isinstance(given, Mapping) else {name: Sensor() for name in given}
 
-    @property
+    @cached_property
     def observed(self) -> tuple[str, ...]:
         """Names of the observed signals, in order, before those drawn for an episode."""
         return tuple(self._observed)
@@ -104,7 +121,7 @@ class Task:
             found[name] = value
         return found
 
-    @property
+    @cached_property
     def variables(self) -> tuple[str, ...]:
         """All variables that are computed after a step, observed ones first."""
         return tuple(dict.fromkeys([*self.sensors, *self.privileged]))

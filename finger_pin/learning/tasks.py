@@ -154,7 +154,7 @@ TASKS = {"Reach-v0": _reach, "Press-v0": _press, "Grasp-v0": _grasp}
 
 
 def make(name: str, render_mode: str | None = None, **task: Any) -> Environment:
-    """Return a task that ships, with other fields than its own where they are given."""
+    """Return a task that ships, with the given fields in place of its own."""
     return Environment(render_mode=render_mode, **{**TASKS[name](), **task})
 
 

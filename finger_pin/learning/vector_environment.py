@@ -49,7 +49,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InputError("num_envs", "must be a whole number above 0", num_envs)
-        self.task, self.num_envs, self.render_mode = Task(**task), int(num_envs), read_render_mode(render_mode)
+        self.task, self.num_envs, self.render_mode = Task.of(task), int(num_envs), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, self.num_envs, finger)
         self.single_observation_space, self._single = self._worlds.spaces()
         self.single_action_space = self._single
@@ -89,7 +89,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         begun = np.flatnonzero(mask)
         self._worlds.begin(begun.tolist(), self._randoms)
         if len(begun):
-            self._seen[begun] = self._worlds.observe(begun)[0]
+            self._seen[begun] = self._worlds.observe(begun, judged=False)[0]
         self._ended[mask] = False
         return self._seen.copy(), self._drawn(begun)
 

@@ -20,7 +20,7 @@ from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import suggestion
+from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.learning.action import Action
 from finger_pin.learning.instant import instant, known_variables
@@ -98,9 +98,8 @@ class World:
         known = known_variables(world.origin)
         for name in task.variables:
             if name not in known:
-                hint = suggestion(name, known)
                 entry = "observation" if name in task.sensors else "privileged"
-                raise InputError(entry, f"no such variable; there are {', '.join(known)}{hint}", name)
+                raise InputError(entry, f"no such variable; there are {choices(name, known)}", name)
         return world
 
     def twin(self) -> World:
@@ -230,7 +229,7 @@ class World:
         self.action.take(action, self.time)
 
     def next_end(self) -> float:
-        """Hold the inputs that act now, and return the time of their end, s; `RESTING` where the period is over."""
+        """Hold the inputs that act now, and return the time of their end, s; `RESTING` after the period."""
         end = (self._step + 1) * self.task.period
         if self.reason or self.now >= end:
             return RESTING

@@ -13,7 +13,7 @@ from finger_pin.core.stepping.batch import RESTING, Together
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.learning.instant import SideBySide, known_variables
+from finger_pin.learning.instant import Present, SideBySide, known_variables
 from finger_pin.learning.sensors import measurements
 from finger_pin.learning.task import Task
 from finger_pin.learning.world import World
@@ -67,7 +67,7 @@ class Worlds:
             InputError: If limits do not fit.
         """
         low, high = self.each[0].action.limited(self.task.limits)
-        seen = self.observe(np.arange(1))[0]
+        seen = self.observe(np.arange(1), judged=False)[0]
         return Box(-np.inf, np.inf, seen.shape[1:], np.float32), Box(low.astype(np.float32), high.astype(np.float32))
 
     def begin(self, places: Sequence[int], randoms: Sequence[np.random.Generator]) -> None:
@@ -115,15 +115,18 @@ class Worlds:
         for i in places:
             each[i].end_period()
 
-    def observe(self, places: _Places) -> tuple[NDArray[np.float32], dict[str, Array]]:
+    def observe(self, places: _Places, *, judged: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
+
+        Where no step is judged by them, signals are those alone that sensors read.
 
         Raises:
             InputError: If a function that is observed returns another shape, or what is not finite.
         """
         times = np.array([world.now for world in self.each])
-        motions = self._now.at(times, self._steppers.states())
-        signals = {name: np.array(each.value(motions)) for name, each in self._variables.items()}
+        motions = Present(self._now, times, self._steppers.states())
+        wanted = self._variables if judged else self.task.sensors
+        signals = {name: np.array(self._variables[name].value(motions)) for name in wanted}
         count = len(places)
         whole = count == len(self.each)
         told = {name: value if whole else value[places] for name, value in self._context.items()}

@@ -1,1 +1,1 @@
-"""Coordinates and rows: rigid body, tendons, frictions, limiters, how they are joined; URDF and MJCF. No time."""
+"""Coordinates and rows: rigid body, tendons, frictions, limiters and their wiring; URDF and MJCF. No time."""

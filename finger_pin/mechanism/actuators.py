@@ -21,7 +21,7 @@ from finger_pin.description.validation import expand
 from finger_pin.laws.elastic_tendon import ELASTIC_TENDON
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.motor import MOTOR
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Rows
 
@@ -124,7 +124,7 @@ class Actuators:
         return self.tendons[np.any(self.spools[:, self.holds] != 0.0, axis=1)]
 
     def angle(self, position: Array, tension: Array | None = None, excursion: Array | None = None) -> Array:
-        """Return theta_m, shape (..., m), rad, at which tendons have some tension, or come nearest where two share one.
+        """Return theta_m, shape (..., m), rad, for given tensions of the tendons, the nearest for two on one motor.
 
         Args:
             position: theta, shape (..., n), rad.

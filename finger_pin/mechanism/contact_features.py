@@ -87,7 +87,7 @@ def _on_plane(solid: Solid) -> list[ContactPart]:
 
 
 def _round(solid: Solid, faces: bool) -> list[ContactPart]:
-    """Return a sphere's or a capsule's axis, in two halves where it may lie on a face."""
+    """Return a sphere's or a capsule's axis, in two halves if it may lie on a face."""
     ends, radius = _axis(solid), solid.sizes[0]
     if solid.shape == "sphere" or not faces:
         return [ContactPart(ends, radius)]
@@ -116,7 +116,7 @@ def _edges(solid: Solid, rounding: float) -> list[ContactPart]:
 
 
 def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
-    """Return both rims of a cylinder, and three studs of each face, which keep it from spinning where it stands."""
+    """Return both rims of a cylinder, and three studs of each face, against spinning on the spot."""
     radius, half = solid.sizes[0], 0.5 * solid.sizes[1] - rounding
     found = []
     for side in (-half, half):

@@ -11,8 +11,8 @@ from finger_pin.description.routing import Array
 from finger_pin.description.surface import Surface
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
-from finger_pin.mechanism.books import Energy
 from finger_pin.mechanism.contact_features import ContactPart, contacts_of
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.pieces import Leg, Piece, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
@@ -81,7 +81,10 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
     """
     gaps = path_kinematics(body, q, contacts.paths, np.shape(contacts.arm)[1]).length[:: CONTACT.arms]
     if gaps.size and gaps.min() < -DEEPEST_START:
-        allowed = f"starts {-1e3 * gaps.min():.3g} mm deep in each other, at most {1e3 * DEEPEST_START:g} mm"
+        deep, most = -1e3 * float(gaps.min()), 1e3 * DEEPEST_START
+        # With as many digits as say that it is more.
+        told = next((each for each in (f"{deep:.3g}", f"{deep:.6g}") if float(each) > most), repr(deep))
+        allowed = f"starts {told} mm deep in each other, at most {most:g} mm"
         pair = contacts.names[int(np.argmin(gaps))]
         raise InputError(
             f"environment.objects: {pair}", f"{allowed}; move the object, or let the joints start elsewhere"
@@ -89,7 +92,7 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
 
 
 def law_numbers(one: Surface | None, other: Surface | None) -> tuple[float, ...]:
-    """Return the numbers of the law where two surfaces meet: of each the smaller; None leaves it to the other."""
+    """Return the numbers of the law between two surfaces: of each the smaller; None leaves it to the other."""
     surfaces = [each for each in (one, other) if each is not None] or [Surface()]
     number = {name: min(getattr(each, name) for each in surfaces) for name in Surface.model_fields}
     kinetic = number["friction"]

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.books import BASE, GUIDED, Books
+from finger_pin.mechanism.energies import BASE, GUIDED, Energies
 from finger_pin.mechanism.rows import RowSignals
 
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """Contacts in space, base frame; zero where they are open. Shapes (..., c, 3).
+    """Contacts in space, base frame; zero for open ones. Shapes (..., c, 3).
 
     Attributes:
         force: On the second body of the pair, N.
@@ -31,7 +31,7 @@ class Evaluation:
     """Everything at one state or at many; leading dimensions are kept.
 
     Attributes:
-        books: Its energies and powers.
+        energies: Its energies and powers.
         rows: Signals of the rows, by table.
         torque: Sum of A^T phi, shape (..., N).
         external: J^T F, shape (..., N).
@@ -39,11 +39,11 @@ class Evaluation:
         rate: Time derivative of the packed state, shape (..., size).
         base_power: Power of a base that moves, shape (..., 1), W.
         guided_power: Power of the guides that move coordinates along paths, shape (...,), W.
-        booked: Energies and powers in the order of the books, shape (..., books), J and W, where they are known.
+        booked: Energies and powers in the order of `Energies`, shape (..., energies), J and W, where they are known.
         touching: Contacts in space, where they are known.
     """
 
-    books: Books
+    energies: Energies
     rows: dict[str, RowSignals]
     torque: Array
     external: Array
@@ -56,7 +56,7 @@ class Evaluation:
 
     def account(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Return the energies that the rows store, J, and their powers, W, by name; shapes (...,)."""
-        stored, flows = ([each.name for each in entries] for entries in (self.books.stored, self.books.powers))
+        stored, flows = ([each.name for each in entries] for entries in (self.energies.stored, self.energies.powers))
         if self.booked is not None:
             columns = np.moveaxis(self.booked, -1, 0)
             return (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,30 +11,22 @@ import pinocchio as pin
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.remembering import Remembered
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.exchange.foreign_model import on_model
 from finger_pin.mechanism.exchange.urdf import build_rigid_body
 from finger_pin.mechanism.excursions import Excursions
+from finger_pin.mechanism.finger_parts import Parts
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.joint_friction import JointFriction
-from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals
 from finger_pin.mechanism.state import Layout
-from finger_pin.mechanism.stroke_limiter import StrokeLimiter
 from finger_pin.mechanism.surroundings import Surroundings, same_but_for_path
-from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree import along_paths, build_tree, tree_rows
-
-# Parts of fingers, and their tables of rows.
-_PARTS: Remembered[Any] = Remembered(1024)
+from finger_pin.mechanism.tree import build_tree, tree_rows
 
 
 class Finger:
@@ -93,40 +84,19 @@ class Finger:
         for name, joint in zip(self.rigid_body.joints, self.rigid_body.model.joints[1:], strict=True):
             if joint.nv != 1:
                 raise InputError(f"joint {name}", "a joint of a finger turns or slides", joint.shortname())
-        self.routing = Routing.from_description(description)
-        self.tendons: Tendons = _PARTS.of(
-            (self.routing, description.tendon_friction, description.passive_tendon),
-            lambda: Tendons.from_description(description),
-        )
+        parts = Parts.of(description)
+        self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
-        self.actuators: Actuators = _PARTS.of(
-            (self.routing, *description.actuators, None, *description.actuators.values()),
-            lambda: Actuators.from_description(description, self.routing),
-        )
-        friction, limits, each = description.joint_friction, description.stroke_limiter, description.joints.values()
-        # Most changes of numbers leave most parts as they were.
-        self.joint_friction: JointFriction = _PARTS.of(
-            (self.routing, friction), lambda: JointFriction.from_description(description, self.routing.loads)
-        )
-        self.stroke_limiter: StrokeLimiter = _PARTS.of(
-            (limits, *each), lambda: StrokeLimiter.from_description(description)
-        )
-        self.springs: JointSprings = _PARTS.of(("springs", *each), lambda: JointSprings.from_description(description))
         self.visuals: pin.GeometryModel | None = None
-        joints, motors = self.routing.joints, self.actuators.names
-        width = len(joints) + self.routing.passive + len(motors)
-        of_tree = tree_rows(description, self.paths, width) if self.paths else ()
-        held = _PARTS.of(
-            (self.springs, "hysteresis", joints, width), lambda: self.springs.hysteresis_rows(joints, width)
-        )
-        self.further = (*held, *of_tree, *rows)
-        stretched = _PARTS.of((self.actuators, "tendons", width), lambda: self.actuators.tendon_rows(width))
-        drives = [*stretched, *(table for table in rows if table.pulls)]
+        of_tree = tree_rows(description, self.paths, parts.width) if self.paths else ()
+        self.further = (*parts.hysteresis_rows(), *of_tree, *rows)
+        drives = parts.drives(rows)
         self.pulled = self.tendons.pulled(drives)
+        tables = parts.tables(description, self.paths, drives, self.pulled)
         mechanism = Mechanism(
             self.rigid_body,
-            self._tables(drives, width),
-            (*self.routing.passive_names, *motors),
+            [*tables, *(table for table in self.further if not table.pulls)],
+            (*self.routing.passive_names, *self.actuators.names),
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
             # Also where a tendon's input goes nowhere: the second one of a spool has none.
             self.routing.actuated,
@@ -139,23 +109,6 @@ class Finger:
         self.surroundings = around
         self.mechanism = mechanism if around is None else around.around(mechanism)
         self.layout = Layout.of(self.tendons, self.actuators, self.further, around)
-
-    def _tables(self, drives: Sequence[Rows], width: int) -> list[Rows]:
-        """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
-        joints, actuated = self.routing.joints, self.routing.actuated
-        number = len(self.actuators.names)
-        pulling: list[Rows] = _PARTS.of((self.tendons, *drives, number), lambda: self.tendons.rows(drives, number))
-        if self.paths:
-            pulling = [along_paths(self.description, self.paths, table) for table in pulling]
-        friction, limiter, springs, motors = self.joint_friction, self.stroke_limiter, self.springs, self.actuators
-        return [
-            *pulling,
-            _PARTS.of((friction, *drives, width), lambda: friction.rows(joints, self.pulled, actuated, width)),
-            _PARTS.of((limiter, joints, width), lambda: limiter.rows(joints, width)),
-            _PARTS.of((springs, joints, width), lambda: springs.rows(joints, width)),
-            *_PARTS.of((motors, "rotors", width), lambda: motors.rotor_rows(width)),
-            *(table for table in self.further if not table.pulls),
-        ]
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -260,7 +213,7 @@ class Finger:
     def exerted(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
-        """Return the same; who evaluates sooner without accelerations may leave them out here."""
+        """Return the same; an evaluation that is faster without accelerations may leave them out."""
         return self.evaluate(x, inputs, fingertip_force, base)
 
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
@@ -294,7 +247,7 @@ class Finger:
     def powers(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return powers of the rows, shape (m, powers), W, in the order of the books, and J^T F, shape (m, N)."""
+        """Return powers of the rows, shape (m, powers), W, in the order of `Energies`, and J^T F, shape (m, N)."""
         found = self.mechanism.evaluate(x, inputs, fingertip_force, base)
         return np.stack(list(found.account()[1].values()), axis=-1), found.external
 

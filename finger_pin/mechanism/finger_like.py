@@ -1,4 +1,4 @@
-"""Fingers from any argument: built, described, a name or a file; and in place of a scenario's own."""
+"""The kinds of argument that stand for a finger: one that is built, a description, a name, a file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FingerLike: TypeAlias = Finger | DescriptionLike
 
 
 def as_finger(finger: FingerLike, objects: Mapping[str, Object] | None = None) -> Finger:
-    """Return a finger that is given in any way, with objects around it where it is not built yet."""
+    """Return the `Finger` of any form of one; one that is built here gets the objects around it."""
     return finger if isinstance(finger, Finger) else Finger(finger, objects=objects)
 
 
@@ -27,7 +27,7 @@ def description_of(finger: FingerLike) -> FingerDescription:
 
 
 def own_finger(finger: FingerLike | None, scenario: Scenario) -> Finger | None:
-    """Return the finger that replaces the one of a scenario; None where none is given."""
+    """Return the replacement of a scenario's finger, or None."""
     return None if finger is None else as_finger(finger, scenario.environment.objects)
 
 
@@ -46,7 +46,7 @@ def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:
 
 
 def fitted(finger: Finger, known: Scenario, other: Scenario) -> Finger:
-    """Return a finger with the numbers of another scenario than the one that describes it; itself where they are alike.
+    """Return a finger with another scenario's numbers; itself if they are the same.
 
     Raises:
         InputError: If the other numbers are those of a hand, and the finger is another one.

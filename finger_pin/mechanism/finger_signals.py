@@ -167,10 +167,7 @@ class FingerSignals:
                 passive_acceleration=found.acceleration[..., bodies : bodies + passive_tendons],
             ),
             joints=JointForces(
-                reaction=pins["normal_force"],
-                friction=pins["friction"],
-                level=pins["level"],
-                stiction_rate=pins.rate,
+                reaction=pins["normal_force"], friction=pins["friction"], level=pins["level"], stiction_rate=pins.rate
             ),
             limiter_depth=limiter["depth"],
             limiter_torque=-limiter.force,

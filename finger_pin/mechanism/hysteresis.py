@@ -6,7 +6,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.laws.hysteresis import HYSTERESIS, STIFFER
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.rows import Rows
 
 #: Least levels of what tendons, N, and joints' springs, N m, hold, as those of their friction.

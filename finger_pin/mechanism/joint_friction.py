@@ -12,7 +12,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.laws.bristle import PIN_FRICTION
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.rows import Rows
 
 #: What friction in the joints takes, in the order of its law.
@@ -54,10 +54,7 @@ class JointFriction:
         """Read one number per joint; ``loads`` comes from the routing."""
         law, size = description.joint_friction, len(description.joints)
         return cls(
-            loads=loads,
-            kinetic=expand(law.coulomb, size),
-            static=expand(law.stiction, size),
-            **bristles(law, size),
+            loads=loads, kinetic=expand(law.coulomb, size), static=expand(law.stiction, size), **bristles(law, size)
         )
 
     def rows(self, names: tuple[str, ...], drives: Mapping[str, Array], actuated: int, width: int) -> Rows:

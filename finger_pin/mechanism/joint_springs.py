@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from finger_pin.description.parameters import FingerDescription, Spring
 from finger_pin.description.routing import Array
 from finger_pin.laws.spring import JOINT_SPRING, spring_torque
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.hysteresis import OF_JOINTS, hysteresis_rows
 from finger_pin.mechanism.rows import Rows
 

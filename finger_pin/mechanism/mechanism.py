@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.books import Books
+from finger_pin.mechanism.energies import Energies
 from finger_pin.mechanism.evaluation import Evaluation
+from finger_pin.mechanism.joined_bodies import join_bodies
 from finger_pin.mechanism.pieces import PathKinematics, Paths, moved, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, RowSignals
@@ -41,7 +42,7 @@ class Mechanism:
         inertia: Of the lumps, shape (l,), kg or kg m2.
         rows: The tables, in the order of evaluation.
         states: For every table the range of its states in z.
-        books: Energies and powers of the rows.
+        energies: Energies and powers of the rows.
         channels: Number of inputs from outside.
         moved: Whether the base moves along a path.
         guided: For coordinates that are moved along paths, the number of their acceleration among all; else -1.
@@ -67,7 +68,7 @@ class Mechanism:
         self.rows = tuple(rows)
         self.moved = moved
         self.guided = np.full(self.coordinates, -1) if guided is None else guided
-        self.books = Books.of(self.rows, moved, not moved and bool(np.any(self.guided >= 0)))
+        self.energies = Energies.of(self.rows, moved, not moved and bool(np.any(self.guided >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
         self.states: list[slice] = []
         end = 0
@@ -86,7 +87,7 @@ class Mechanism:
         Raises:
             InputError: If gravity is not the same for all.
         """
-        body = RigidBody.join({name: part.body for name, part in parts.items()})
+        body = join_bodies({name: part.body for name, part in parts.items()})
         width = int(body.model.nv) + sum(len(part.lumps) for part in parts.values())
         joint = coordinate = channel = 0
         lump, rows = int(body.model.nv), []
@@ -206,7 +207,7 @@ class Mechanism:
         moving = self.body.position_rate(turning, v[..., :joints])
         rates = [found[t.group].rate for t in self.rows if t.states]
         return Evaluation(
-            books=self.books,
+            energies=self.energies,
             rows=found,
             torque=torque,
             external=external,

@@ -110,7 +110,7 @@ Paths = Sequence[Sequence[Leg]]
 
 
 def moved(paths: Paths, shift: int) -> tuple[tuple[Leg, ...], ...]:
-    """Return paths in a model where all joints but the base have moved on by some."""
+    """Return paths in a model whose joints but the base are shifted by some places."""
 
     @cache
     def piece_there(piece: Piece) -> Piece:

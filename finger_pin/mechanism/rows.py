@@ -7,8 +7,10 @@ evaluated.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
-from finger_pin.mechanism.books import LOST, SUPPLIED, Energy, energy
+from finger_pin.mechanism.energies import LOST, SUPPLIED, Energy, energy
 from finger_pin.mechanism.pieces import Leg
 
 
@@ -70,6 +72,7 @@ class Rows:
     powers: tuple[Energy, ...] = ()
     unit: str = ""
     pulls: tuple[str, ...] = ()
+    _form = None
 
     def __post_init__(self) -> None:
         """Fill in defaults, and check the sizes."""
@@ -122,8 +125,29 @@ class Rows:
         """Whether paths through space belong to any row."""
         return any(self.paths)
 
+    @property
+    def form(self) -> Rows:
+        """The table that this one differs from in the law's numbers alone; itself unless `numbered` has made it."""
+        return self._form or self
+
+    @cached_property
+    def content(self) -> tuple[Any, ...]:
+        """Everything but the parameters of the law, to be compared by value."""
+        arrays = (self.arm, self.measure, self.offset, self.channels, self.pins, self.bends, self.curvature_offset)
+        weighted = [(*each, *(matrix.tobytes() for matrix in each.values())) for each in (self.inputs, self.loads)]
+        named = (self.group, self.law, self.paths, self.stored, self.powers)
+        return (*named, *self.arm.shape, *weighted, *(each.tobytes() for each in arrays))
+
+    def numbered(self, parameters: Array) -> Rows:
+        """Return the same rows with other numbers of their law, shape (len(law.parameters), k)."""
+        if parameters.shape != self.parameters.shape:
+            raise InputError(f"rows.{self.group}.parameters", f"must have shape {self.parameters.shape}")
+        twin = copy.copy(self)
+        vars(twin).update(parameters=parameters, _form=self.form)
+        return twin
+
     def spread(self, places: NDArray[np.int64], width: int) -> Rows:
-        """Return the same rows where their coordinates stand at some places among more."""
+        """Return the same rows with their coordinates at some places among more."""
 
         def wide(matrix: Array) -> Array:
             found = np.zeros((len(matrix), width))

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.objects import Object
 from finger_pin.description.palm import Palm
 from finger_pin.description.parameters import FingerDescription, Link
-from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
@@ -124,7 +124,7 @@ def finger_solids(links: Mapping[str, Link], body: RigidBody) -> list[Solid]:
 
 
 def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody) -> list[Solid]:
-    """Return the shapes of the bodies of a tree, which are one group; ``placed`` says where the bodies stand."""
+    """Return the shapes of the bodies of a tree, which are one group; ``placed`` has the bodies' placements."""
     found = []
     for name, each in tree.bodies.items():
         for own, shape in each.shapes.items():
@@ -191,13 +191,20 @@ def add_free_objects(body: RigidBody, objects: Mapping[str, Object], palm: Palm 
     if palm is not None and any(each.frame == "world" for each in objects.values()):
         world = tuple(palm.on_path(name.split()[1]).greatest for name in WORLD)
     form = _EXTENDED.of((body.form, *moved, world), lambda: _extended(body, moved, world))
+    heavy = tuple((objects[name].mass, objects[name].inertia) for name in moved)
+    return _EXTENDED.of((form, body, heavy), lambda: _weighing(form, body, [objects[name] for name in moved]))
+
+
+def _weighing(form: RigidBody, body: RigidBody, moved: Sequence[Object]) -> RigidBody:
+    """Return an extended body with the inertias of the body itself, and those of objects that move."""
     # Of what is led any inertia will do, if it is too little to count.
     slight, none = _inertia(_SLIGHT, np.full(3, _SLIGHT)), pin.Inertia.Zero()
     inertias = body.inertias
-    for each in (objects[name] for name in moved):
+    for each in moved:
         inertias += [none, slight if each.mass is None else _inertia(each.mass, each.inertia)]
-    if world:
-        inertias += [none] * (len(world) - 1) + [slight]
+    # Of the joints of the world the last one carries all.
+    further = form.model.njoints - 1 - len(inertias)
+    inertias += [*[none] * (further - 1), slight][-further:] if further else []
     return form.weighing(inertias, body.model.gravity.linear)
 
 

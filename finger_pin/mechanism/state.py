@@ -13,13 +13,14 @@ the six joints of the world that it sees follow o and o'.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import Remembered
 from finger_pin.mechanism.rows import Rows, further_states
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from finger_pin.mechanism.tendons import Tendons
 
 Array = NDArray[np.float64]
+_KNOWN: Remembered[Layout] = Remembered()
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +125,13 @@ class Layout:
         drives, further = (
             further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False)
         )
-        return cls(
+        ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
+        found = cls(
             joints=routing.joints,
             tendons=routing.tendons,
             passive=routing.passive,
             further=further,
-            ringing=tuple((np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)).tolist()),
+            ringing=tuple(ringing.tolist()),
             motors=motors.names,
             objects=() if around is None else tuple(around.free),
             world=() if around is None else around.world,
@@ -136,6 +139,8 @@ class Layout:
             held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
             drives=drives,
         )
+        # Of the same names and sizes much follows, once for all fingers.
+        return _KNOWN.of((found,), lambda: found)
 
     @cached_property
     def _blocks(self) -> dict[str, tuple[tuple[str, ...], float]]:
@@ -186,10 +191,6 @@ class Layout:
         return dict(zip(self._blocks, parts, strict=True))
 
     @cached_property
-    def _in_order(self) -> list[slice]:
-        return [self._parts[each.name] for each in fields(State)]
-
-    @property
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
         prefixes = dict.fromkeys(("position", "velocity"), "joint_")
@@ -215,7 +216,10 @@ class Layout:
         """
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
-        return State(*[x[..., part] for part in self._in_order])
+        # Of a frozen class the constructor takes longer than all else in a step's answer.
+        state = object.__new__(State)
+        vars(state).update([(name, x[..., part]) for name, part in self._parts.items()])
+        return state
 
     def scales(self) -> Array:
         """Return one typical magnitude per number of the state, for absolute tolerances; shape (size,).
@@ -225,6 +229,10 @@ class Layout:
         velocity that goes with 1 % of its position: an oscillation too small to matter in the one is not followed
         in the other.
         """
+        return self._scales.copy()
+
+    @cached_property
+    def _scales(self) -> Array:
         scales = np.repeat([scale for _, scale in self._blocks.values()], self.sizes)
         for kind, states in (("further", self.further), ("drives", self.drives)):
             scales[self._parts[kind]] = [scale for _, scale in states]

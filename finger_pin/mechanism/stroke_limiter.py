@@ -10,7 +10,7 @@ from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
 from finger_pin.laws.limiter import STROKE_LIMITER
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.rows import Rows
 
 _ENERGY = Energy("limiter", "stroke limiters")

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription, Link
-from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
@@ -29,6 +29,7 @@ from finger_pin.mechanism.state import State
 POSE, VELOCITY = 7, 6
 _CONTACTS: Remembered[Rows] = Remembered()
 _SPREAD: Remembered[Rows] = Remembered(1024)
+_CHECKED: Remembered[None] = Remembered()
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
@@ -84,8 +85,9 @@ class Surroundings:
         width = int(extended.model.nv) + len(mechanism.lumps)
         # How heavy objects are, and where they move, is nothing to their contacts.
         forms = [
-            (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.pose.tobytes(), each.surface)
+            (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, *place)
             for name, each in objects.items()
+            for place in [(each.position, each.orientation)]
         ]
         carried = (joint.link for joint in description.joints.values())
         links = [(link.length, link.width, link.offset) for link in carried if link]
@@ -116,7 +118,7 @@ class Surroundings:
         return contact_rows([*own, *object_solids(objects, extended)], width, pairs_within(description))
 
     def same_but_for_paths(self, objects: Mapping[str, Object] | None) -> bool:
-        """Return whether some objects are the same but for the paths along which they, or the palm, are moved."""
+        """Return whether some objects are the same but for the paths of theirs and of the palm."""
         # A world that a moving palm sees has to be as wide as the palm's path.
         if self.world or objects is None or [*objects] != [*self.objects]:
             return False
@@ -138,10 +140,10 @@ class Surroundings:
         joints, bodies, lumps = int(mechanism.body.model.nv), int(self.body.model.nv), len(mechanism.lumps)
         places = np.append(np.arange(joints), bodies + np.arange(lumps))
         width = bodies + lumps
-        rows = [
-            _SPREAD.of((table, places.tobytes(), width), partial(table.spread, places, width))
-            for table in mechanism.rows
-        ]
+        rows = []
+        for table in mechanism.rows:
+            form = _SPREAD.of((table.form, places.tobytes(), width), partial(table.form.spread, places, width))
+            rows.append(form if table.form is table else form.numbered(table.parameters))
         lumps_of = mechanism.lumps, mechanism.inertia
         guided = np.full(bodies + lumps, -1)
         guided[bodies - len(self.world) : bodies] = np.arange(len(self.world))
@@ -152,7 +154,7 @@ class Surroundings:
 
     @property
     def world(self) -> tuple[str, ...]:
-        """Names of the joints of the world that a moving palm sees; none where nothing stands there."""
+        """Names of the joints of the world seen by a moving palm; none for an empty world."""
         return WORLD if self.body.model.existJointName(WORLD[0]) else ()
 
     def start(self) -> tuple[Array, Array]:
@@ -167,7 +169,11 @@ class Surroundings:
         Raises:
             InputError: Naming the pair.
         """
-        check_start(self.contacts, self.body, _placed(state))
+        placed = _placed(state)
+        # Many runs start alike.
+        _CHECKED.of(
+            (self.contacts, self.body.form, placed.tobytes()), lambda: check_start(self.contacts, self.body, placed)
+        )
 
     @property
     def mass(self) -> Array:

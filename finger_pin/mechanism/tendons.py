@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.joint_friction import bristles
 from finger_pin.mechanism.rows import Rows, pulled
@@ -28,6 +29,7 @@ LOSSES = (
 _SLACK = Energy("slack", "tensions cut at zero")
 _BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _HALVES = ("proximal", "distal")
+_WIRED: Remembered[list[Rows]] = Remembered()
 _STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
 
 
@@ -135,6 +137,27 @@ class Tendons:
             drives: Motors that pull tendons in place of ideal sources.
             motors: Number of motors.
         """
+        if self.held:
+            return self._rows(drives, motors)
+        # How they are wired, other numbers of friction leave alone.
+        tables = _WIRED.of((self.routing, *(each.form for each in drives), motors), lambda: self._rows(drives, motors))
+        friction = self._friction
+        halves, *_, driven, passive = tables
+        taken, actuated = driven.parameters[-1:], self.routing.actuated
+        return [
+            halves.numbered(np.repeat(self.half_stiffness, 2)[None]),
+            *drives,
+            driven.numbered(np.concatenate([friction[:, :actuated], taken])),
+            passive.numbered(friction[:, actuated:]),
+        ]
+
+    @property
+    def _friction(self) -> Array:
+        """The numbers of friction in the canals by those of its law, shape (f, t)."""
+        shared = (getattr(self, name) for name in PASSIVE_FRICTION.parameters[2:])
+        return np.array([self.surface, self.stiction_ratio, *shared])
+
+    def _rows(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
         routing, joints = self.routing, len(self.routing.joints)
         actuated, passive = routing.actuated, routing.passive
         width = joints + passive + motors
@@ -142,9 +165,7 @@ class Tendons:
         driven[:, :joints] = routing.coupling
         driven[actuated:] = np.eye(passive, width, joints)
         bends[:, :joints] = routing.curvature_matrix
-        shared = (getattr(self, name) for name in PASSIVE_FRICTION.parameters[2:])
-        friction = np.array([self.surface, self.stiction_ratio, *shared])
-        names = routing.passive_names
+        friction, names = self._friction, routing.passive_names
         wired = pulled(drives, routing.tendons[:actuated])
         taken = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         halves = self._halves(motors)

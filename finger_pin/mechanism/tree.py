@@ -17,7 +17,7 @@ from finger_pin.laws.dead_band import DEAD_BAND_SPRING
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.spring import JOINT_SPRING
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Placed, Route, Routes, rotation
 from finger_pin.mechanism.rows import Rows

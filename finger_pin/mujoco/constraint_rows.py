@@ -12,7 +12,7 @@ _NOTHING = 1e-12
 
 @compiled
 def write_rows(m: Any, d: Any, at: Any, of: Any, kinds: Any, rows: Any, dt: Any) -> None:
-    """Write the solver's rows: of islands their copies too, and where it is a dual one the diagonal of its matrix."""
+    """Write the solver's rows: of islands their copies too, of a dual one the diagonal of its matrix."""
     width, ne, nefc = size(m, at.nv), integer(d, of.ne), integer(d, of.nefc)
     kind, which = integers(d, of.efc_type), integers(d, of.efc_id)
     aref, most = numbers(d, of.efc_aref), numbers(d, of.efc_frictionloss)

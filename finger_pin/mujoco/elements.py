@@ -100,7 +100,7 @@ def pin(m: Any, d: Any, at: Any, of: Any, e: Any, held: Any, reactions: Any) -> 
 
 @compiled
 def _proximal(m: Any, d: Any, at: Any, of: Any, joint: Any) -> Any:
-    """Return e_j: from the joint before to this one, or the x axis of its carrier where there is none."""
+    """Return e_j: from the joint before to this one, or the x axis of its carrier."""
     parent, joints, count = integers(m, at.body_parentid), integers(m, at.body_jntadr), integers(m, at.body_jntnum)
     anchor, own = numbers(d, of.xanchor), integer_in(m, at.jnt_bodyid, joint)
     body = parent[own]

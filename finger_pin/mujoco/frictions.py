@@ -137,7 +137,7 @@ def _tendon_law(model: Any, name: str, law: Any) -> tuple[float, ...]:
 
 
 def _crossed(model: Any, name: str, law: Any) -> tuple[tuple[bool, str, float], ...]:
-    """Return the joints that a tendon crosses, whose pins it loads; of a fixed one with 1 where they bend it."""
+    """Return the joints that a tendon crosses, whose pins it loads; of a fixed one with 1 for those that bend it."""
     tendon, movers = model.tendon(name).id, None
     found = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
     for k in _pieces(model, tendon):

@@ -71,7 +71,7 @@ _LOW = 0xFFFFFFFF
 
 @compiled
 def instance_of(m: Any, instance: Any, at: Any, kinds: Any) -> Any:
-    """Return the actuator and the tuple of an instance; -1 where there are none, or friction cannot be."""
+    """Return the actuator and the tuple of an instance; -1 without them, or without friction."""
     if integer(m, at.integrator) == kinds.discrete:
         return -1, -1
     plugin, names = integers(m, at.actuator_plugin), flags(m, at.names)
@@ -99,7 +99,7 @@ def signals(m: Any, instance: Any, at: Any) -> Any:
 
 @compiled
 def init(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> Any:
-    """Note in a new mjData which actuator and which tuple are an instance's; -1 where it cannot be."""
+    """Note the actuator and the tuple of an instance in a new mjData; -1 if friction is impossible."""
     actuator, which = instance_of(m, instance, at, kinds)
     if which < 0:
         return -1

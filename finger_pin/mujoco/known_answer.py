@@ -17,15 +17,19 @@ _SLIDER = """
 
 
 def try_known_answer() -> None:
-    """Hold a slider below what its tendon's friction bears, and let it run above: T (1 - exp(-mu phi)) of tension T.
+    """Hold a slider below the limit of its tendon's friction, T (1 - exp(-mu phi)) of tension T, and release it above.
 
     Raises:
-        InputError: If MuJoCo does not do so.
+        InputError: If MuJoCo does not do so, or refuses the model.
     """
     spec = mujoco.MjSpec.from_string(_SLIDER)
     law = {"coulomb": 0.2, "curvature_offset": 1.5, "stiction_ratio": 1.0, "viscous": 0.0}
     add_friction(spec, tendons={"rope": law})
-    model = spec.compile()
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        told = " ".join(str(error).split())
+        raise InputError(f"mujoco {mujoco.__version__}", f"friction needs MuJoCo 3.12 or later: {told}") from None
     tension, borne = 10.0, 10.0 * (1.0 - math.exp(-0.3))
     data, moved = mujoco.MjData(model), []
     for share in (0.8, 1.1):

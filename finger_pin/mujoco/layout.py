@@ -107,7 +107,7 @@ def layout() -> tuple[Any, Any, Any, Any]:
         contact = _offsets("mjContact", Contact, size=ctypes.sizeof(_structure("mjContact")))
         kinds = _kinds()
     except (AttributeError, KeyError) as error:
-        raise InputError(f"mujoco {version}", f"friction needs MuJoCo 3.12 or later: it has no {error}") from None
+        raise InputError(f"mujoco {version}", f"friction needs MuJoCo 3.12 or later: {error}") from None
     for what in _disagreements(model, data, contact):
         raise InputError(f"mujoco {version}", f"friction cannot read its {what}: write to the authors of finger_pin")
     return model, data, contact, kinds

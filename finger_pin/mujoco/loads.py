@@ -47,7 +47,7 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any)
 
 @compiled
 def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
-    """Return the force of a tendon's own spring along it, N: negative where it pulls."""
+    """Return the force of a tendon's own spring along it, N, negative in tension."""
     stiffness = number_in(m, at.tendon_stiffness, tendon)
     if stiffness == 0.0:
         return 0.0
@@ -76,15 +76,13 @@ def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
     point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
     x0, y0, z0, known, real, imaginary = 0.0, 0.0, 0.0, False, 1.0, 0.0
-    px, py, pz, apart = 0.0, 0.0, 0.0, True
-    for k in range(first, first + count):
-        qx, qy, qz = point[3 * k], point[3 * k + 1], point[3 * k + 2]
-        x, y, z = qx - px, qy - py, qz - pz
-        px, py, pz, square = qx, qy, qz, x * x + y * y + z * z
-        if of_wrap[k] == -2 or apart:
-            # A pulley, and what comes after it.
-            known, apart = False, of_wrap[k] == -2
+    for k in range(first + 1, first + count):
+        if of_wrap[k] == -2 or of_wrap[k - 1] == -2:
+            # To a pulley, and from there to what comes after it.
+            known = False
             continue
+        x, y, z = between(point, k - 1, k)
+        square = x * x + y * y + z * z
         if square < 1e-24:
             continue
         if known:

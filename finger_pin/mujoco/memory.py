@@ -80,7 +80,6 @@ def power_over(typing_context: Any, value: Any) -> Any:
 
 
 _load_number, _load_int, _load_word = (_loader(each) for each in (_types.float64, _types.int32, _types.int64))
-_load_flag = _loader(_types.uint8)
 
 
 @compiled
@@ -111,12 +110,6 @@ def number_in(owner: Any, offset: Any, index: Any) -> Any:
 def integer_in(owner: Any, offset: Any, index: Any) -> Any:
     """Return a number of an array of int."""
     return np.int64(_load_int(_load_word(owner + offset) + 4 * index))
-
-
-@compiled
-def flag_in(owner: Any, offset: Any, index: Any) -> Any:
-    """Return a number of an array of mjtBool or char."""
-    return _load_flag(_load_word(owner + offset) + index)
 
 
 _view_numbers, _view_ints, _view_words, _view_flags = (
@@ -162,7 +155,7 @@ def integers_at(address: Any) -> Any:
 
 @compiled
 def zeros(room: Any, count: Any) -> Any:
-    """Return the address of `scratch`, where there are zeros now."""
+    """Return the address of `scratch`, filled with zeros."""
     for k in range(count):
         numbers_at(room)[k] = 0.0
     return room

@@ -63,6 +63,13 @@ _numpy: Any = ModuleType("numpy")
 _numpy.exp, _numpy.abs, _numpy.maximum = exponential, np.abs, np.maximum
 
 
+@compiled
+def _magnitude(value: Any, _side: Any) -> Any:
+    """Return |x|: here no friction is held on a side."""
+    return abs(value)
+
+
 def compiled_law(law: Any) -> Any:
     """Return a law of `finger_pin.laws`, compiled with this exponential in place of NumPy's."""
-    return compiled(FunctionType(law.__code__, {"np": _numpy}, law.__name__, law.__defaults__))
+    known = {"np": _numpy, "magnitude": _magnitude}
+    return compiled(FunctionType(law.__code__, known, law.__name__, law.__defaults__))

@@ -38,7 +38,7 @@ class LoopReference(Reference, Protocol):
     """A reference in a loop: its motion, its knots, its compiled form."""
 
     def signals(self) -> tuple[Signal, ...]:
-        """Return the functions of time that it follows: steps end where they bend."""
+        """Return the functions of time that it follows; steps end at their knots."""
 
     def planned(self) -> SignalReference | None:
         """Return its signals, which the compiled core can follow; None if it is Python."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.description.remembering import Remembered
+from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
@@ -69,7 +69,7 @@ class Signal:
     def from_samples(
         cls, name: str, samples: tuple[ArrayLike, ArrayLike], columns: Sequence[str], tolerance: float = 0.0
     ) -> Signal:
-        """Return signals through samples: monotone cubics, or fewer where samples are dense (`sample_fitting`).
+        """Return signals through samples: monotone cubics, fewer of them for dense samples (`sample_fitting`).
 
         Args:
             name: Of the argument, for messages.
@@ -111,7 +111,7 @@ class Signal:
 
     @cached_property
     def is_harmonic(self) -> bool:
-        """Whether there are sinusoids only."""
+        """Whether all are sinusoids."""
         return not self.coefficients.any()
 
     def at(self, time: Array | float) -> tuple[Array, Array]:

@@ -54,13 +54,7 @@ class Account:
     residual: Array
 
 
-def account(
-    loop: ClosedLoop,
-    trajectory: Trajectory,
-    times: Array,
-    signals: LoopSignals,
-    motion: Motion,
-) -> Account:
+def account(loop: ClosedLoop, trajectory: Trajectory, times: Array, signals: LoopSignals, motion: Motion) -> Account:
     """Keep the energy account of a trajectory.
 
     Args:

@@ -12,9 +12,10 @@ import numpy as np
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.textbook import Stop, Trajectory
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import LEAST_ATOL_SCALE, LEAST_RTOL, Scenario
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.simulation_settings import LEAST_ATOL_SCALE, LEAST_RTOL
 from finger_pin.laws.contact import CONTACT
-from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
 from finger_pin.simulation.energy import entries
@@ -32,7 +33,7 @@ _EXPECTED, _MOST_EXPECTED = 1e3, 1e-2
 _DOUBTED = 3.0
 _TIGHTER = 10.0
 _BEYOND = (
-    "small errors grow beyond all bounds, as over many impacts; "
+    "small errors grow beyond all bounds, as over many impacts or of a body that tumbles; "
     "try a shorter simulation.duration, or a smaller simulation.rtol and atol_scale"
 )
 # Where joint friction is above two thirds of what locks the finger, small forces make large tensions: how far it slips
@@ -191,13 +192,13 @@ def with_tighter(scenario: Scenario, factor: float) -> Scenario:
 
 
 def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:
-    """Return the question whether to stop: after more looks than a trajectory took, or so many at most."""
+    """Return a `Stop` after more looks than a trajectory took, or so many at most."""
     looks, most = count(), min(_PATIENCE * (_FEW + trajectory.statistics.steps // CHUNK), most)
     return lambda: next(looks) >= most
 
 
 def left_open(result: xr.Dataset) -> float:
-    """Return the largest share of all energy exchanged that the account leaves open; 0 where that is rounding.
+    """Return the largest share of all energy exchanged that the account leaves open; 0 for rounding.
 
     Of bodies that exchange none, such as one that flies freely, it is the share of the most that is stored.
     """
@@ -228,7 +229,7 @@ def open_account(result: xr.Dataset, share: float) -> str:
 
 
 def ringing(loop: ClosedLoop, trajectory: Trajectory) -> str:
-    """Return the mass that rings undamped where a run took many short steps, with its frequency; else empty.
+    """Return the warning about a mass that rings undamped and makes steps short, with its frequency, or empty.
 
     The modes are those of the Jacobian of the whole at the last state.
     """

@@ -11,11 +11,13 @@ from finger_pin.exceptions import InputError
 from finger_pin.laws.contact import CONTACT
 from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.state import State
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from finger_pin.simulation.motions import SampledMotion
 
 # Dimensions, unit and name.
 Variables = dict[str, tuple[tuple[str, ...], str, str]]
@@ -57,32 +59,38 @@ def contact_variables(finger: Finger) -> Variables:
     return table
 
 
-def contact_values(finger: Finger, signals: FingerSignals) -> dict[str, Array]:
-    """Return the values of these variables."""
-    around, state = finger.surroundings, signals.state
-    if around is None or state.object_pose is None or state.object_velocity is None or state.contact_bend is None:
-        return {}
-    found = signals.mechanism.rows[around.contacts.group]
-    touch, arms = found.row, CONTACT.arms
-    assert isinstance(touch, Touch)
-    space = signals.mechanism.touching or around.touching(state, found.force)
+def contact_value(name: str, finger: Finger, of: SampledMotion) -> Array:
+    """Return the values of one of these variables."""
+    if name.startswith("object_"):
+        return _of_object(name, of.state)
+    if name == "contact_bend":
+        assert of.state.contact_bend is not None
+        return _split(of.state.contact_bend, 2)
+    around, evaluation = finger.surroundings, of.finger.mechanism
+    assert around is not None
+    found, arms = evaluation.rows[around.contacts.group], CONTACT.arms
+    if name in ("contact_force", "contact_point", "contact_normal"):
+        return np.asarray(getattr(of.touching, name.removeprefix("contact_")))
+    if name == "contact_normal_force":
+        return found.force[:, ::arms]
+    if name == "contact_level":
+        return found["level"]
+    if name == "contact_gap":
+        assert isinstance(found.row, Touch)
+        return np.asarray(found.row.gap)
     friction = np.hypot(found.force[:, 1::arms], found.force[:, 2::arms])
+    return friction if name == "contact_friction" else found["sliding_speed"] * (friction > 0.0)
+
+
+def _of_object(name: str, state: State) -> Array:
+    """Return place, turn, or rates of the free objects."""
+    assert state.object_pose is not None and state.object_velocity is not None
     pose, velocity = _split(state.object_pose, POSE), _split(state.object_velocity, VELOCITY)
-    return {
-        "contact_gap": touch.gap,
-        "contact_slip": found["sliding_speed"] * (friction > 0.0),
-        "contact_force": space.force,
-        "contact_normal_force": found.force[:, ::arms],
-        "contact_friction": friction,
-        "contact_level": found["level"],
-        "contact_point": space.point,
-        "contact_normal": space.normal,
-        "contact_bend": _split(state.contact_bend, 2),
-        "object_position": pose[..., :3],
-        "object_orientation": pose[..., 3:],
-        "object_velocity": velocity[..., :3],
-        "object_angular_velocity": _turned(pose[..., 3:], velocity[..., 3:]),
-    }
+    if name == "object_position":
+        return pose[..., :3]
+    if name == "object_orientation":
+        return pose[..., 3:]
+    return velocity[..., :3] if name == "object_velocity" else _turned(pose[..., 3:], velocity[..., 3:])
 
 
 def contact_coordinates(finger: Finger) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.books import SUPPLIED, Books, Energy
+from finger_pin.mechanism.energies import SUPPLIED, Energies, Energy
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Kinematics, Motion
@@ -43,10 +43,10 @@ class Flows:
     booked: tuple[Energy, ...]
 
     @classmethod
-    def of(cls, books: Books, rows: Array, fingertip: Array) -> Flows:
+    def of(cls, energies: Energies, rows: Array, fingertip: Array) -> Flows:
         """Join the powers of the rows, shape (..., powers), and that of the fingertip force, shape (...,)."""
         values = np.concatenate([rows, np.asarray(fingertip)[..., None]], axis=-1)
-        return cls(values, flows(books))
+        return cls(values, flows(energies))
 
     def __getitem__(self, name: str) -> Array:
         """Return one of them, shape (...,)."""
@@ -71,26 +71,26 @@ def energies(finger: Finger, signals: FingerSignals, motion: Motion | Kinematics
     return found
 
 
-def flows(books: Books) -> tuple[Energy, ...]:
+def flows(energies: Energies) -> tuple[Energy, ...]:
     """Return the entries of a mechanism's powers, with that of the fingertip force."""
-    return (*books.powers, FINGERTIP)
+    return (*energies.powers, FINGERTIP)
 
 
 def stores(finger: Finger) -> tuple[Energy, ...]:
     """Return the entries of a finger's stored energies."""
     rotors = (_ROTORS,) if finger.actuators.names else ()
     objects = () if finger.surroundings is None else _OBJECTS
-    return (_KINETIC, _GRAVITY, *finger.mechanism.books.stored, *rotors, *objects)
+    return (_KINETIC, _GRAVITY, *finger.mechanism.energies.stored, *rotors, *objects)
 
 
 def powers(signals: FingerSignals) -> Flows:
     """Return the powers supplied and lost at the given signals."""
     found = signals.mechanism
     if found.booked is not None:
-        rows = found.booked[..., len(found.books.stored) :]
+        rows = found.booked[..., len(found.energies.stored) :]
     else:
         rows = np.stack(list(found.account()[1].values()), axis=-1)
-    return Flows.of(found.books, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
+    return Flows.of(found.energies, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
 
 
 def entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:
@@ -98,7 +98,7 @@ def entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:
 
     Args:
         result: Dataset of `simulate`.
-        kinds: Of `mechanism.books`.
+        kinds: Of `mechanism.energies`.
 
     Returns:
         By the name of the variable; ``label`` among its attributes says in words what it is.

@@ -96,17 +96,20 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     Raises:
         InputError: If it is anything else; ``name`` names the argument.
     """
-    wanted = f"must be {' times '.join(map(str, shape))} numbers"
     try:
         found = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(name, wanted, value) from None
+        raise InputError(name, _wanted(shape), value) from None
     if found.shape != shape:
-        raise InputError(name, f"{wanted}, not an array of shape {found.shape}")
+        raise InputError(name, f"{_wanted(shape)}, not an array of shape {found.shape}")
     # Of a few numbers Python asks sooner than NumPy.
     if not all(map(math.isfinite, found.ravel().tolist())):
         raise InputError(name, "must be finite", found.tolist())
     return found
+
+
+def _wanted(shape: tuple[int, ...]) -> str:
+    return f"must be {' times '.join(map(str, shape))} numbers"
 
 
 def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:

@@ -1,4 +1,4 @@
-"""Ctrl-C in a script or notebook: the run ends where it is, and its result so far is kept."""
+"""Ctrl-C in a script or notebook: the run ends, and its result so far is kept."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Found = TypeVar("Found", "xr.Dataset", RunArrays)
 
 
 class CtrlC:
-    """Ctrl-C while entered; called like a `Stop`, it says whether it was pressed, or the caller's own stop is due.
+    """Ctrl-C while entered: a `Stop` that is due once it is pressed, or with the caller's own stop.
 
     A second Ctrl-C ends at once, without a result. Where others than Python handle the signal, such as a command of
     this package, and in threads, which get none, it is theirs.
@@ -56,7 +56,7 @@ class CtrlC:
 
 
 def interruptible(run: Callable[[Stop], Found], stop: Stop | None) -> Found:
-    """Return the result of a run, which is given the question whether it is to stop.
+    """Return the result of a run, which is given a `Stop`.
 
     Raises:
         Interrupted: After Ctrl-C or such a stop, with what the run has computed.

@@ -9,12 +9,12 @@ from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.proportional import ControlSignals
 from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.evaluation import Touching
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.account import Account, account
-from finger_pin.simulation.contact_variables import contact_values
 from finger_pin.simulation.energy import Flows, energies, powers
 
 
@@ -65,11 +65,6 @@ class SampledMotion:
         return self.signals.control
 
     @cached_property
-    def contacts(self) -> dict[str, Array]:
-        """Signals of contacts and free objects."""
-        return contact_values(self.loop.finger, self.finger)
-
-    @cached_property
     def signals(self) -> LoopSignals:
         """All signals of the finger."""
         return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
@@ -78,6 +73,13 @@ class SampledMotion:
     def finger(self) -> FingerSignals:
         """Signals of the finger, by the names of the paper."""
         return self.signals.finger
+
+    @cached_property
+    def touching(self) -> Touching:
+        """Contacts in space."""
+        around, found = self.loop.finger.surroundings, self.finger.mechanism
+        assert around is not None
+        return found.touching or around.touching(self.state, found.rows[around.contacts.group].force)
 
     @cached_property
     def motion(self) -> Motion:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a result to a file, whole or not at all: netCDF4, or its signals as CSV where the name ends with .csv.
+    """Write a result to a file, whole or not at all: netCDF4, or its signals as CSV under a name with .csv.
 
     A column of CSV is a signal of one joint, tendon or the like, such as ``joint_position[distal] (rad)``; a row is a
     sample. Numbers are written so that reading them gives the same floats.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,17 +18,16 @@ from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, own_finger
 from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.motions import SampledMotion
-from finger_pin.simulation.recording import attributes_of, record, recorded
+from finger_pin.simulation.recording import attributes_of, record, recorded, refuse_unknown
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.running import run
-from finger_pin.simulation.sensitivity import add_slopes, changed, nearby
+from finger_pin.simulation.sensitivity import add_slopes, changed, nearby, on_steps_of
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
 
@@ -77,8 +76,14 @@ class Prepared:
         start: The packed state at the start, shape (size,), with the scenario's own values.
     """
 
-    def __init__(self, family: Family, record: tuple[str, ...], finger: Finger | None = None) -> None:
-        """Build the parts that the runs share; use `prepare`."""
+    def __init__(
+        self,
+        family: Family,
+        record: tuple[str, ...],
+        finger: Finger | None = None,
+        bindings: list[Bindings] | None = None,
+    ) -> None:
+        """Build the parts that the runs share; use `prepare`. Bindings may be shared with another, also in threads."""
         self.family, self.record, self._given = family, record, finger
         loop = ClosedLoop.from_scenario(family.scenario, finger=finger)
         refuse_unknown("record", record, variables(loop))
@@ -86,7 +91,7 @@ class Prepared:
         self.start: Array = loop.initial_state()
         self.start.flags.writeable = False
         # As many as there were runs at once.
-        self._bindings: list[Bindings] = []
+        self._bindings = [] if bindings is None else bindings
 
     def __repr__(self) -> str:
         """Return the scenario, the keys that may be changed, and the variables recorded."""
@@ -140,11 +145,7 @@ class Prepared:
         return interruptible(lambda asked: self._run(values, initial, asked, sensitivities), stop)
 
     def _run(
-        self,
-        values: Sequence[Any] | None,
-        initial: ArrayLike | xr.Dataset | None,
-        stop: Stop,
-        sensitivities: bool,
+        self, values: Sequence[Any] | None, initial: ArrayLike | xr.Dataset | None, stop: Stop, sensitivities: bool
     ) -> RunArrays:
         scenario = self.scenario(values)
         setup, trajectory, found = self._made(scenario, initial, stop)
@@ -154,7 +155,10 @@ class Prepared:
             return found
         if not trajectory.islands:
             # It will be repeated on its steps: the derivative of what was computed, errors and all.
-            setup, trajectory, found = self._made(_tight(scenario), initial, stop)
+            _, chosen, _ = self._made(_tight(scenario), initial, stop)
+            setup = self._setup(_tight(scenario), initial)
+            trajectory = on_steps_of(chosen, setup)
+            found = self._recorded(setup, trajectory)
         given = self.values if values is None else values
         for key, value in zip(self.parameters, given, strict=True):
             if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
@@ -163,18 +167,25 @@ class Prepared:
             raise InputError("simulation.method", f"sensitivities are for {', '.join(TABLEAUS)}", setup.method)
         numbers = [float(value) for value in given]
         sizes = [abs(value) or 1.0 for value in numbers]
-        others, changes = changed(numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial))
+        others, changes = changed(
+            numbers, sizes, lambda moved: self._setup(self.scenario(moved), initial, self._free_bindings())
+        )
         near = nearby(setup, trajectory, others, changes)
         runs = in_threads(lambda pair: self._recorded(*pair), list(zip(others, near, strict=True)))
+        self._bindings += [each.bindings for each in (setup, *others) if each.bindings]
         return add_slopes(found, numbers, runs, changes)
+
+    def _free_bindings(self) -> Bindings:
+        """Return bindings of an earlier run that no other run uses, if there are any."""
+        try:
+            return self._bindings.pop()
+        except IndexError:
+            return Bindings()
 
     def _setup(
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, bindings: Bindings | None = None
     ) -> Setup:
-        setup = Setup.of(scenario, self._loop(scenario, initial), bindings=bindings)
-        if setup.loop.finger is not self._finger:
-            refuse_unknown("record", self.record, variables(setup.loop))
-        return setup
+        return Setup.of(scenario, self._loop(scenario, initial), bindings=bindings)
 
     def _recorded(self, setup: Setup, trajectory: Trajectory) -> RunArrays:
         motions = SampledMotion(setup.loop, trajectory, setup.scenario.sample_times(), self.record)
@@ -186,11 +197,7 @@ class Prepared:
         self, scenario: Scenario, initial: ArrayLike | xr.Dataset | None, stop: Stop | None
     ) -> tuple[Setup, Trajectory, RunArrays]:
         """Make a run, with bindings of an earlier one if any are free."""
-        try:
-            bindings = self._bindings.pop()
-        except IndexError:
-            bindings = Bindings()
-        setup = self._setup(scenario, initial, bindings)
+        setup = self._setup(scenario, initial, self._free_bindings())
         trajectory = setup.integrate(stop=stop)
         if trajectory.failure or trajectory.interrupted:
             motions = SampledMotion(setup.loop, trajectory, scenario.sample_times(), self.record)
@@ -226,15 +233,6 @@ class Prepared:
         finger = fitted(self._finger, self.family.scenario, scenario)
         loop = ClosedLoop.from_scenario(scenario, finger=finger)
         return loop if initial is None else replace(loop, start=packed_state(initial, loop.finger))
-
-
-def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise unless a result has all variables of some names."""
-    known = list(known)
-    for name in names:
-        if name not in known:
-            hint = suggestion(name, known)
-            raise InputError(entry, f"the result has no such variable; it has {', '.join(known)}{hint}", name)
 
 
 def _tight(scenario: Scenario) -> Scenario:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from finger_pin.description.routing import Array
-from finger_pin.mechanism.books import Energy
+from finger_pin.mechanism.energies import Energy
 from finger_pin.simulation.motions import SampledMotion
 
 #: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib import metadata
@@ -15,7 +15,9 @@ from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.embedded import embedded
 from finger_pin.description.loading import to_toml
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import Scenario, SimulationSettings
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.simulation_settings import SimulationSettings
+from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.motions import SampledMotion
@@ -31,14 +33,19 @@ _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 Recorded = dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]
 
 
-def recorded(motions: SampledMotion, names: Sequence[str] | None = None) -> Recorded:
+def recorded(motions: SampledMotion, names: Sequence[str] | None = None, entry: str = "record") -> Recorded:
     """Return variables of a motion, by default all, from only the signals that they need.
 
     Args:
         motions: The motion at the times that are recorded.
         names: Of the variables.
+        entry: What named them.
+
+    Raises:
+        InputError: If the result has no such variable.
     """
     table = variables(motions.loop)
+    refuse_unknown(entry, names or (), table)
     if names is None and motions.control.shortfall is None:
         del table[SHORTFALL]
     chosen = table if names is None else {name: table[name] for name in names}
@@ -47,12 +54,16 @@ def recorded(motions: SampledMotion, names: Sequence[str] | None = None) -> Reco
         return {name: (each.dims, np.asarray(each.value(motions)), each.attributes) for name, each in chosen.items()}
 
 
+def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise unless a result has all variables of some names."""
+    known = list(known)
+    for name in names:
+        if name not in known:
+            raise InputError(entry, f"the result has no such variable; it has {choices(name, known)}", name)
+
+
 def record(
-    scenario: Scenario,
-    motions: SampledMotion,
-    method: str,
-    names: Sequence[str] | None = None,
-    text: str | None = None,
+    scenario: Scenario, motions: SampledMotion, method: str, names: Sequence[str] | None = None, text: str | None = None
 ) -> xr.Dataset:
     """Return a motion as a Dataset.
 
@@ -72,7 +83,7 @@ def record(
 
 
 def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> dict[str, Any]:
-    """Return the attributes of a result about its run: how far it went, by which method, at which cost."""
+    """Return the attributes of a result about its run: its end, method and cost."""
     statistics = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,

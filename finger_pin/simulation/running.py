@@ -14,8 +14,8 @@ from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.stepping.textbook import Stop, Trajectory
+from finger_pin.description.caching import Remembered
 from finger_pin.description.loading import to_toml
-from finger_pin.description.remembering import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
@@ -25,14 +25,7 @@ from finger_pin.exceptions import (
     MicroDampingWarning,
     SelfLockingWarning,
 )
-from finger_pin.simulation.accuracy import (
-    CHUNK,
-    close_account,
-    estimate_error,
-    open_account,
-    ringing,
-    too_stiff,
-)
+from finger_pin.simulation.accuracy import CHUNK, close_account, estimate_error, open_account, ringing, too_stiff
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import check_memory, finite_part, record
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
@@ -41,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _MARGINS: Remembered[float] = Remembered()
+_DRIVEN: Remembered[str] = Remembered()
 
 
 def run(
@@ -65,7 +59,7 @@ def run(
     """
     loop = loop or ClosedLoop.from_scenario(scenario)
     check_memory(scenario.simulation, loop.finger)
-    driving = micro_damping_advice(scenario.finger)
+    driving = _DRIVEN.of((scenario.finger,), lambda: micro_damping_advice(scenario.finger))
     if driving:
         warnings.warn(driving, MicroDampingWarning, stacklevel=5)
     setup = Setup.of(scenario, loop, own, control_period)
@@ -122,12 +116,13 @@ def _whole(setup: Setup, trajectory: Trajectory, result: xr.Dataset, slow: str) 
         reason, reached = f"{excess} is not finite after that", result.attrs["end_time"]
         raise IntegrationError(reached, reason, ADVICE, result)
     if trajectory.interrupted:
+        result.attrs["interrupted"] = f"interrupted at t = {reached:.6g} s of {setup.scenario.simulation.duration:g} s"
         raise Interrupted(reached, result)
     return result
 
 
 def _margin(scenario: Scenario, loop: ClosedLoop, own: str) -> float | None:
-    """Return the margin of the joints' friction to self-locking; None where the reference is not planned.
+    """Return the margin of the joints' friction to self-locking, or None without a planned reference.
 
     The margin is that of the paper's controller on the scenario's reference.
     """

@@ -18,7 +18,7 @@ import numpy as np
 
 from finger_pin.core.stepping.integrator import joined
 from finger_pin.core.stepping.island_motion import IslandMotion
-from finger_pin.core.stepping.neighbours import NearbyMotion, differentiate, fits
+from finger_pin.core.stepping.sensitivity_equations import NearbyMotion, differentiate, fits
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.core.threads import in_threads
@@ -64,6 +64,14 @@ def changed(
     return found, np.array(changes)
 
 
+def on_steps_of(trajectory: Trajectory, setup: Setup) -> Trajectory:
+    """Return the trajectory of a setup that has not been run, on the steps of another one, taken whole.
+
+    When steps were chosen, some were cut out of longer ones, and err otherwise: what is compared is run on them anew.
+    """
+    return setup.integrate(steps=trajectory.ends or (trajectory.breakpoints,))
+
+
 def nearby(
     setup: Setup, trajectory: Trajectory, others: Sequence[Setup], changes: Array, allowed: float = 0.0
 ) -> list[Trajectory]:
@@ -87,20 +95,15 @@ def nearby(
         linear = _linear(motions, chosen, knots, changes[near], allowed)
         for k, stepper, moved in zip(near, chosen[1:], linear, strict=False):
             found[k] = replace(trajectory, interpolate=joined(stepper, moved), islands=())
-    steps = trajectory.ends or (trajectory.breakpoints,)
 
     def again(k: int) -> Trajectory:
-        return found[k] if k in found else others[k].integrate(steps=steps)
+        return found[k] if k in found else on_steps_of(trajectory, others[k])
 
     return in_threads(again, range(len(others)))
 
 
 def _linear(
-    motions: Sequence[IslandMotion],
-    steppers: Sequence[Stepper],
-    knots: Sequence[Array],
-    changes: Array,
-    allowed: float,
+    motions: Sequence[IslandMotion], steppers: Sequence[Stepper], knots: Sequence[Array], changes: Array, allowed: float
 ) -> list[list[NearbyMotion]]:
     """Return the motions of all islands with each number changed; none if a linear system is singular."""
 

@@ -12,12 +12,14 @@ from finger_pin.control.compiled import Bindings, compiled_control, sampled_cont
 from finger_pin.control.loop_controller import LoopController
 from finger_pin.control.position_drive import PositionDrives
 from finger_pin.control.sampling import SampledController, sampling_settings
-from finger_pin.core.stepping.encounters import meetings
+from finger_pin.core.control import Control
 from finger_pin.core.stepping.integrator import integrate_compiled
+from finger_pin.core.stepping.interpolant_collision import meetings
 from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
 from finger_pin.core.stepping.textbook import Stop, Trajectory, Watch, integrate
 from finger_pin.description.routing import Array
-from finger_pin.description.scenario import METHODS_IN_NUMPY, Scenario, SimulationSettings
+from finger_pin.description.scenario import Scenario
+from finger_pin.description.simulation_settings import METHODS_IN_NUMPY, SimulationSettings
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.accuracy import CHUNK
 from finger_pin.simulation.initial_state import check_motors
@@ -47,6 +49,7 @@ class Setup:
         answers: The controller itself, where the loop samples it.
         sampled: Its sampled controller, if it has one.
         bindings: Compiled code bound for several runs; None to bind it for each integration.
+        control: Inputs that are compiled; None where they are sampled or Python.
     """
 
     scenario: Scenario
@@ -55,6 +58,7 @@ class Setup:
     answers: LoopController
     sampled: SampledController | None
     bindings: Bindings | None = None
+    control: Control | None = None
 
     @classmethod
     def of(
@@ -92,7 +96,8 @@ class Setup:
         positioned = bool(np.any(loop.finger.actuators.holds))
         if positioned and method not in TABLEAUS:
             raise InputError("simulation.method", f"a position drive is sampled: one of {', '.join(TABLEAUS)}", method)
-        if sampling is None and method in TABLEAUS and compiled_control(loop) is None:
+        control = compiled_control(loop) if sampling is None and method in TABLEAUS else None
+        if sampling is None and method in TABLEAUS and control is None:
             if positioned:
                 raise InputError(
                     "controller.sampling.period", "is missing: beside position drives this controller is sampled"
@@ -111,7 +116,7 @@ class Setup:
         elif own:
             # A wrong answer of a user's own controller is refused before anything is computed.
             loop.evaluate(0.0, loop.initial_state())
-        return cls(scenario, loop, method, answers, sampled, bindings)
+        return cls(scenario, loop, method, answers, sampled, bindings, control)
 
     def integrate(
         self,
@@ -162,6 +167,9 @@ class Setup:
             # Numbers that join what moved apart, or part it, leave the steps of all to each.
             own = steps if len(steps) == len(stepper.parts) else [np.concatenate(steps)] * len(stepper.parts)
             stepper.repeat([np.union1d(ends, knots) for ends in own])
+            if self.bindings:
+                # It goes on repeating: no other run can have it.
+                self.bindings.stepper = None
         return integrate_compiled(
             stepper,
             settings.duration,
@@ -179,7 +187,7 @@ class Setup:
         given, loop = settings or self.scenario.simulation, self.loop
         return (self.bindings or Bindings()).stepping(
             loop.finger,
-            compiled_control(loop) or sampled_control(loop),
+            self.control or sampled_control(loop),
             loop.initial_state(),
             loop.fingertip_force,
             method=self.method,
@@ -190,7 +198,7 @@ class Setup:
         )
 
     def failure(self, trajectory: Trajectory, slow: str = "") -> tuple[str, str]:
-        """Return the reason why a trajectory ended early, and advice.
+        """Return the reason of a trajectory's early end, and advice.
 
         Args:
             trajectory: One that failed.

@@ -103,7 +103,7 @@ class Simulator:
         self._pulling = np.delete(np.arange(finger.routing.actuated), finger.actuators.voltages)
 
     def _at(self, position: Array) -> Array:
-        """Return the packed state at rest in a posture; refuse one where bodies overlap."""
+        """Return the packed state at rest in a posture; refuse one with overlapping bodies."""
         finger, x = self.finger, self.finger.rest_state(position)
         if self._guides is not None:
             x = self._guides.place(finger, x)

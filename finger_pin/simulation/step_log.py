@@ -39,7 +39,7 @@ class Told:
     """The steps of a simulator since a start, in the order in which they were made."""
 
     def __init__(self, stepper: Stepper) -> None:
-        """Begin with no steps, where a stepper stands that goes on meanwhile."""
+        """Begin with no steps, at the present time of a stepper."""
         self._stepper, self._moments = stepper, stepper.moments
         self._numbers = array("d")
 
@@ -51,7 +51,7 @@ class Told:
         return start
 
     def add(self, end: float, inputs: Array, force: Array) -> None:
-        """Keep a step: its end, s, and what it held: inputs (u,), and forces (3,) or (f, 3), N."""
+        """Keep a step: its end, s, its inputs (u,), and its forces (3,) or (f, 3), N."""
         self._numbers.append(end)
         self._numbers.frombytes(inputs.tobytes() + force.tobytes())
 

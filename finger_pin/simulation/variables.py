@@ -12,9 +12,9 @@ import pinocchio as pin
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.books import LOST
+from finger_pin.mechanism.energies import LOST
 from finger_pin.mechanism.rows import Rows
-from finger_pin.simulation.contact_variables import contact_coordinates, contact_variables
+from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
 from finger_pin.simulation.energy import flows, stores
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME, Quantity
@@ -96,7 +96,7 @@ def _more(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _contact(name: str, of: SampledMotion) -> Array:
-    return of.contacts[name]
+    return contact_value(name, of.loop.finger, of)
 
 
 def _fingertip_force(of: SampledMotion) -> Array:
@@ -247,7 +247,7 @@ def _of_account(loop: ClosedLoop) -> dict[str, Quantity]:
             _TIME, partial(stored, name=each.name), "J", f"energy stored: {each.label}", booked=each
         )
     # What comes in before what is lost.
-    for each in sorted(flows(loop.finger.mechanism.books), key=lambda each: each.kind == LOST):
+    for each in sorted(flows(loop.finger.mechanism.energies), key=lambda each: each.kind == LOST):
         name, text = each.name, f"{each.kind}: {each.label}"
         table[f"power_{name}"] = Quantity(_TIME, partial(power, name=name), "W", f"power {text}", booked=each)
         table[f"energy_exchanged_{name}"] = Quantity(

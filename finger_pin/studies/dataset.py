@@ -1,4 +1,4 @@
-"""The Dataset of a sweep: metrics over the varied keys, and which runs failed and why."""
+"""The Dataset of a sweep: metrics over the varied keys, and the failed runs with their reasons."""
 
 from __future__ import annotations
 

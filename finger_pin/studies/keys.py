@@ -78,7 +78,7 @@ class Starting:
         return load_scenario(self.given, changed)
 
     def finger_at(self, scenario: Scenario) -> Finger | None:
-        """Return the finger that replaces the one of a point's scenario; None where nothing does."""
+        """Return the replacement of the finger of a point's scenario, or None."""
         return None if self.finger is None else fitted(self.finger, self.scenario, scenario)
 
     def check(self, key: str, values: Sequence[Value], *, alone: bool = False) -> None:
@@ -193,7 +193,7 @@ def _leaves(held: Any, key: str, numbers: bool) -> Iterator[str]:
 
 
 def _look_up(scenario: Scenario, key: str) -> Any:
-    """Return the entry at a key, or None; where a star stands for all names, at the first of them."""
+    """Return the entry at a key, or None; a star for all names means the first of them."""
     name, index = split(key)
     held: Any = scenario.model_dump(mode="python")
     for part in name.split("."):

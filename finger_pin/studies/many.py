@@ -13,16 +13,19 @@ import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice
 from finger_pin.control.closed_loop import ClosedLoop
+from finger_pin.control.compiled import Bindings
 from finger_pin.core.stepping.textbook import Stop
+from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted, SelfLockingWarning, StudyError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_like import FingerLike, own_finger
+from finger_pin.mechanism.finger_like import FingerLike, described_by, own_finger
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
-from finger_pin.simulation.prepared import prepare, refuse_unknown
+from finger_pin.simulation.prepared import Prepared
 from finger_pin.simulation.quantity import Quantity
+from finger_pin.simulation.recording import refuse_unknown
 from finger_pin.simulation.simulate import simulate
 from finger_pin.simulation.variables import variables as known_variables
 from finger_pin.studies.executing import Crew, Lost
@@ -69,10 +72,12 @@ def simulate_many(
     runs = [load_scenario(each) for each in scenarios]
     if not runs:
         raise InputError("scenarios", "at least one is needed")
+    runs = _sharing(runs)
     finger = own_finger(finger, runs[0])
     _check_alike(runs)
     _check_kept(runs, variables or (), finger)
-    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables))
+    bindings: list[Bindings] = []
+    run = partial(_run, finger=finger, keep=None if variables is None else tuple(variables), bindings=bindings)
     progress = progress or notebook_bar("runs")
     found: dict[int, xr.Dataset | Lost] = {}
     texts = [""] * len(runs)
@@ -103,14 +108,16 @@ def simulate_many(
     return stacked
 
 
-def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None) -> xr.Dataset:
+def _run(
+    scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...] | None, bindings: list[Bindings]
+) -> xr.Dataset:
     failure = ""
     try:
         # The study has a bar of its own.
         result = (
             simulate(scenario, finger=finger, progress=lambda time: None, stop=stop)
             if keep is None
-            else _recorded(scenario, stop, finger, keep)
+            else _prepared(scenario, finger, keep, bindings).run(stop=stop).dataset()
         )
     except IntegrationError as error:
         assert error.result is not None
@@ -118,10 +125,25 @@ def _run(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str,
     return result.assign_attrs(failure=failure)
 
 
-def _recorded(scenario: Scenario, stop: Stop, finger: Finger | None, keep: tuple[str, ...]) -> xr.Dataset:
-    known = known_variables(ClosedLoop.from_scenario(scenario, finger=finger))
-    prepared = prepare(scenario, record=[name for name in keep if name in known], finger=finger)
-    return prepared.run(stop=stop).dataset()
+def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...], bindings: list[Bindings]) -> Prepared:
+    family = Family(described_by(scenario, finger), ())
+    try:
+        return Prepared(family, keep, finger, bindings)
+    except InputError:
+        # It may lack what others have.
+        known = known_variables(ClosedLoop.from_scenario(scenario, finger=finger))
+        return Prepared(family, tuple(name for name in keep if name in known), finger, bindings)
+
+
+def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
+    """Return scenarios of which those with the same finger have the same object, which is then built once."""
+    first = runs[0]
+    return [
+        run.model_copy(update={"finger": first.finger, "environment": first.environment})
+        if run.hand is None and (run.finger, run.environment) == (first.finger, first.environment)
+        else run
+        for run in runs
+    ]
 
 
 def _check_alike(runs: Sequence[Scenario]) -> None:

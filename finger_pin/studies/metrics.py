@@ -1,4 +1,4 @@
-"""Metrics: a number each that says how good a design is.
+"""Metrics: the quality of a design, in a number each.
 
 Metrics of the motion are taken over the whole run, its start from rest included, and are means over time, not over
 samples.
@@ -22,20 +22,14 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism import joint_friction, tendons
-from finger_pin.mechanism.books import LOST
+from finger_pin.mechanism.energies import LOST
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import described_by
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.simulate import simulate
 from finger_pin.studies.executing import quiet
-from finger_pin.studies.response import (
-    fingertip_hysteresis,
-    grip_margin,
-    rows,
-    settling_time,
-    winding_temperature,
-)
+from finger_pin.studies.response import fingertip_hysteresis, grip_margin, rows, settling_time, winding_temperature
 
 #: Greatest tension for the metric of the fingertip force, N.
 FORCE_TENSION = 20.0
@@ -68,7 +62,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that says how good a run is.
+    """A measure of the quality of a run, in one number.
 
     Attributes:
         name: Name by which it is asked for.

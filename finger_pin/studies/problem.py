@@ -1,4 +1,4 @@
-"""The problem of a search: the variables that it may change, its objectives, and its constraints."""
+"""The problem of a search: its variables, objectives and constraints."""
 
 from __future__ import annotations
 

@@ -201,7 +201,7 @@ def _identity(metric: Metric) -> list[str]:
 
 
 def _known(digest: Callable[[Any], str], thing: Any) -> str:
-    """Return a digest of a thing; one that comes only once where it has none."""
+    """Return a digest of a thing, or a unique one if it has none."""
     try:
         return digest(thing)
     except UnknownDependency:

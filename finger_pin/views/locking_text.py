@@ -1,4 +1,4 @@
-"""Self-locking in words: where a finger grips itself, with or without the friction of its tendons."""
+"""Self-locking in words: the limits of a finger's joint friction, with or without that of its tendons."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def summarize_locking(scenario: Scenario, found: SelfLockingMap) -> str:
     blocks = [
         [
             "Joint friction at which the finger locks in its worst direction, mm,",
-            "without tendon friction, so at any posture alike; and M^c, what it has",
+            "without tendon friction, so at any posture alike; and its own, M^c",
             *table(("moving", "locks at", "has"), rows),
         ]
     ]

@@ -77,8 +77,8 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
 
 
 _PROFILES = (
-    "Each curve says by how much the recordings are met worse where one number is held and the others are fitted anew. "
-    "Where it crosses the dashed line the 95 % interval ends; where it does not, the interval is open on that side."
+    "Each curve shows how the fit worsens with one number held and the others fitted anew. "
+    "It crosses the dashed line at the ends of the 95 % interval; without a crossing the interval is open on that side."
 )
 
 
@@ -152,7 +152,7 @@ def _agreement(result: xr.Dataset) -> str:
 
 
 def _borne_out(result: xr.Dataset) -> bool:
-    """Return whether at least two searches, and half of them, end at the same place; one alone is not doubted."""
+    """Return whether two searches at least, and half of them, end at the same place; one alone will do."""
     alike, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
     return count == 1 or (alike >= 2 and 2 * alike >= count)
 
@@ -183,7 +183,7 @@ def _laws(result: xr.Dataset) -> str:
         (str(name), str(count), f"{bic:.1f}", f"{rms:.3f}", "-" if math.isnan(out) else f"{out:.3f}")
         for name, count, bic, rms, out in zip(*(result[each].values for each in columns), strict=True)
     ]
-    head = ["law", "parameters", "BIC (less is better)", "rms over noise", "rms of what was held out"]
+    head = ["law", "parameters", "BIC (less is better)", "rms over noise", "rms of the held-out samples"]
     return _table(head, rows)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger_pin.description.embedded import described
-from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
 
 if TYPE_CHECKING:
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 _SETTLING = 1.0
 _LONG = 2.0
-_WARNINGS = ("self_locking", "micro_damping", "accuracy", "account", "ringing")
+_WARNINGS = ("interrupted", "self_locking", "micro_damping", "accuracy", "account", "ringing")
 # What counts as sliding, m/s.
 _CREEP = 1e-6
 
 
 def summarize(result: xr.Dataset) -> str:
-    """Return a summary of a result as plain text, at most 80 columns wide where its names allow.
+    """Return a summary of a result as plain text, at most 80 columns wide if its names allow.
 
     Args:
         result: Dataset of `simulate`, or the partial one that its exception carries.
@@ -209,7 +209,7 @@ def _range(name: str, values: Array) -> tuple[str, str, str]:
 
 
 def _share(value: float, total: float) -> str:
-    """Return a share in percent, or a dash where there is nothing to share."""
+    """Return a share in percent, or a dash for a share of nothing."""
     if not total > 0.0:
         return "-"
     percent = 100.0 * value / total

@@ -27,13 +27,7 @@ from finger_pin.references.reference import SignalReference
 
 _PERIOD = 1e-3
 # Whether one spring replaces the lumped mass, and the integrator; with the mass "implicitfast" does as "Euler" does.
-_VARIANTS = (
-    (False, "Euler"),
-    (False, "discrete"),
-    (True, "Euler"),
-    (True, "implicitfast"),
-    (True, "discrete"),
-)
+_VARIANTS = ((False, "Euler"), (False, "discrete"), (True, "Euler"), (True, "implicitfast"), (True, "discrete"))
 _TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7)
 _ROUNDS = 3
 # Runs that take longer than this are timed once, s.

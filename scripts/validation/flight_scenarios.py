@@ -160,10 +160,7 @@ def spinning_capsule(rng: np.random.Generator) -> Flight:
         return from_segment(np.zeros(3), q[:, :3] - half, q[:, :3] + half) - radii.sum()
 
     return Flight(
-        {"post": post, "capsule": capsule},
-        2.0 * meets,
-        gap,
-        lambda t: pose(thrown(t, start, velocity, 0.0), spin * t),
+        {"post": post, "capsule": capsule}, 2.0 * meets, gap, lambda t: pose(thrown(t, start, velocity, 0.0), spin * t)
     )
 
 

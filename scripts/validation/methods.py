@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.description.loading import load_scenario
-from finger_pin.description.scenario import METHODS
+from finger_pin.description.simulation_settings import METHODS
 from finger_pin.simulation.simulate import simulate
 from finger_pin.views.plots.lines import series
 from finger_pin.views.plots.style import new_figure, styled

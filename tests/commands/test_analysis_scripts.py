@@ -61,6 +61,7 @@ def test_an_unknown_name_is_told_in_one_line(run, tmp_path, name, given):
         (("--force", "1,2,inf"), "must be a finite number"),
         (("--posture", "1,x"), "--posture: x: must be a finite number"),
         (("--posture", "10,20"), "must be 4 angles with commas between"),
+        (("--posture", "0,300,30,20"), "proximal must be from 0 to 90 deg"),
     ],
 )
 def test_wrong_numbers_of_the_force_script_are_named(run, tmp_path, arguments, says):

@@ -58,6 +58,8 @@ def test_a_run_killed_at_any_moment_leaves_whole_results(started, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_run_asked_to_end_keeps_what_was_computed(started, tmp_path, number):
+    # At rest a thousand seconds are over in no time.
+    (tmp_path / "s.toml").write_text('extends = "fig6"\n', encoding="utf-8")
     process = started("--duration", "1000", "--set", "simulation.sample_rate=100")
     time.sleep(0.7)
     process.send_signal(number)

@@ -40,7 +40,7 @@ TOO_STIFF = {
     "finger.tendon_friction.coulomb": 0.0,
     "finger.tendon_friction.viscous": 0.0,
     "simulation.rtol": 1e-12,
-    "simulation.atol_scale": 2e-15,
+    "simulation.atol_scale": 1e-15,
     "simulation.sample_rate": 1e7,
 }
 
@@ -52,7 +52,7 @@ def test_an_integration_that_fails_by_itself_ends_with_3_says_when_and_what_to_t
     code, out, lines = run("fig6", "--output", "out", "--duration", "0.1", *sets)
     assert (code, len(lines)) == (3, 1)
     said = re.fullmatch(
-        r"simulate.py: the integration stopped at t = ([\d.e-]+) s: .* largest in passive_velocity\[T5\]; "
+        r"simulate.py: the integration stopped at t = ([\d.e-]+) s: .* largest in passive_velocity\[T5\]; .*"
         r"try a larger simulation.rtol and simulation.atol_scale, .*; what was computed is in out",
         lines[0],
     )
@@ -100,14 +100,15 @@ def test_a_failed_run_leaves_no_figures_of_an_earlier_one(run, here, quick, monk
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_simulating_saves_what_was_computed(run, here, quick, monkeypatch, number):
-    from finger_pin.simulation.running import run as simulate
+    # What takes it from there must have done so before it is replaced.
+    from finger_pin.simulation.simulate import run as simulate
 
     def interrupted(scenario, *, stop, **options):
         asked = []
 
         def counted():
             asked.append(None)
-            if len(asked) == 2:
+            if len(asked) == 1:
                 os.kill(os.getpid(), number)
             return stop()
 

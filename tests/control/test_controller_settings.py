@@ -68,8 +68,7 @@ def test_what_is_not_asked_for_is_not_in_the_controller_nor_in_the_written_scena
 
 
 @pytest.mark.parametrize(
-    "key",
-    ["gravity_compensation", "tendon_friction_feedforward", "joint_friction_compensation", "distribution"],
+    "key", ["gravity_compensation", "tendon_friction_feedforward", "joint_friction_compensation", "distribution"]
 )
 def test_every_part_alone_makes_another_controller_than_the_paper_s(key):
     value = {"gravity_compensation": True, "distribution": {"maximum_tension": 9.0}}

@@ -107,11 +107,7 @@ def undisturbed(method, period):
 @pytest.mark.parametrize("method", ["Rodas5P", "LSODA", "sampled"])
 @pytest.mark.parametrize(
     ("answer", "said"),
-    [
-        (divides, "ZeroDivisionError"),
-        (pushes, "that of T1 is not"),
-        (loses, "nan: tensions must be finite"),
-    ],
+    [(divides, "ZeroDivisionError"), (pushes, "that of T1 is not"), (loses, "nan: tensions must be finite")],
 )
 def test_what_goes_wrong_later_ends_the_run_there_says_so_and_keeps_what_was_computed(method, answer, said):
     settings = {"simulation.method": "Rodas5P" if method == "sampled" else method}

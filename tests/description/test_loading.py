@@ -70,6 +70,12 @@ def test_overrides_win_over_the_file(tmp_path):
     assert scenario.reference.joints["proximal"].offset == 0.6
 
 
+@pytest.mark.parametrize("overrides", [["controller.gain"], "controller.gain=2", 2.0])
+def test_overrides_that_are_no_mapping_are_refused(overrides):
+    with pytest.raises(fp.InputError, match=r"overrides = .*: must be values by dotted key"):
+        fp.load_scenario("fig6", overrides)
+
+
 def test_a_joint_that_the_file_leaves_at_rest_may_be_moved_by_an_override(tmp_path):
     (tmp_path / "s.toml").write_text(PLANAR.replace("[reference.joints.distal]\noffset = 0.4\n", ""))
     key = "reference.joints.distal.offset"

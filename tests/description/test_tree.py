@@ -61,16 +61,8 @@ def test_the_tree_itself_is_taken():
         ("tree__bodies__tip__solids", {"shell": {"kind": "mesh"}}, "solids.shell.mesh: is missing"),
         ("tree__bodies__tip__solids", {"shell": {"kind": "mesh", "mesh": "shell"}}, "no such mesh; there are none"),
         ("tree__meshes", {"shell": {**SHELL, "points": "AAAA"}}, "shell.points: must be numbers in threes"),
-        (
-            "tree__meshes",
-            {"shell": {**SHELL, "faces": SHELL["points"]}},
-            "must be corners from 0 to 2",
-        ),
-        (
-            "tree__meshes",
-            {"shell": Mesh.packed(1e3 * np.eye(3), FACES)},
-            "must be finite and at most 10 m",
-        ),
+        ("tree__meshes", {"shell": {**SHELL, "faces": SHELL["points"]}}, "must be corners from 0 to 2"),
+        ("tree__meshes", {"shell": Mesh.packed(1e3 * np.eye(3), FACES)}, "must be finite and at most 10 m"),
         ("tree__bodies__link__parent", "tip", "finger.tree.bodies.link.parent"),
         ("tree__bodies__tip__parent", "lnk", "did you mean link"),
         ("tree__bodies__link__orientation", [1.0, 1.0, 0.0, 0.0], "quaternion x, y, z, w of length 1"),

@@ -120,12 +120,7 @@ def test_masses_centres_and_inertias_survive_the_round_trip_in_yourdfpy(finger):
 
 
 def test_the_published_masses_and_inertias_are_those_of_the_shipped_finger():
-    rows = [
-        (0.0050, 2.8e-7, 2.0e-7),
-        (0.0101, 1.9e-6, 3.6e-7),
-        (0.0060, 5.4e-7, 1.9e-7),
-        (0.0038, 2.0e-7, 9.3e-8),
-    ]
+    rows = [(0.0050, 2.8e-7, 2.0e-7), (0.0101, 1.9e-6, 3.6e-7), (0.0060, 5.4e-7, 1.9e-7), (0.0038, 2.0e-7, 9.3e-8)]
     for inertia, row in zip(list(build_rigid_body(load_finger("ub")).model.inertias)[1:], rows, strict=True):
         tensor = inertia.inertia
         np.testing.assert_allclose((inertia.mass, tensor[1, 1], tensor[0, 0]), row, rtol=1e-14)

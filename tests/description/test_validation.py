@@ -14,6 +14,7 @@ from finger_pin.description.validation import (
     Description,
     Numbers,
     choice,
+    choices,
     expand,
     nearest,
     real,
@@ -155,3 +156,17 @@ def test_long_and_deep_values_are_cut():
         deep = [deep]
     for value in ("x" * 10_000, list(range(10_000)), deep, ["x" * 1000] * 1000):
         assert len(toml_like(value)) <= 80
+
+
+def test_few_names_are_all_listed():
+    assert (
+        choices("joint_positon", ["joint_position", "joint_velocity"])
+        == "joint_position, joint_velocity; did you mean joint_position?"
+    )
+
+
+def test_of_many_names_those_are_listed_that_are_near():
+    many = ["joint_position", "joint_velocity", *(f"power_of_{index}" for index in range(60))]
+    said = choices("joint_positon", many)
+    assert said.startswith("joint_position, joint_velocity, power_of_")
+    assert said.endswith("and 57 more; did you mean joint_position?")

@@ -8,18 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from validation import lugre
-from validation.lugre import (
-    COULOMB,
-    EXPONENT,
-    LAG,
-    MICRO,
-    STATIC,
-    STIFFNESS,
-    STRIBECK,
-    VISCOUS,
-    law,
-    move,
-)
+from validation.lugre import COULOMB, EXPONENT, LAG, MICRO, STATIC, STIFFNESS, STRIBECK, VISCOUS, law, move
 
 from finger_pin.laws import bristle as friction
 

@@ -196,44 +196,6 @@ def test_noise_has_the_deviation_that_was_asked_for():
     assert abs(noise.std() / 0.2 - 1.0) < 4.0 / np.sqrt(2.0 * noise.size)
 
 
-def test_goals_of_spools_are_lengths_over_radius():
-    scenario = fp.load_scenario("servo_position", COARSE)
-    by_angle = Environment(scenario, reward=nothing, action="motor_position", observation=["motor_position"])
-    by_length = Environment(scenario, reward=nothing, action="tendon_length", observation=["motor_position"])
-    goal, _ = by_angle.reset(seed=0)
-    by_length.reset(seed=0)
-    np.testing.assert_allclose(by_length.action_space.high, 0.005 * by_angle.action_space.high, rtol=1e-6)
-    for _ in range(20):
-        reached, *_ = by_angle.step(goal + 0.05)
-        np.testing.assert_allclose(by_length.step(0.005 * (goal + 0.05))[0], reached, atol=2e-5)
-    # All spools wind in against stretch: towards the goal, and with a proportional loop not all the way.
-    assert np.all((reached > goal) & (reached < goal + 0.06))
-
-
-def test_goals_of_joints_are_reached_whatever_slack_is_known():
-    key = "finger.actuators.*.pretension"
-    task = dict(reward=nothing, action="joint_position", observation=["joint_position"])
-    goal, found = np.array([0.05, 0.6, 0.7]), {}
-    for name, drawn in (("known", {}), ("slack", {key: Uniform(0.0, 0.0)})):
-        drawn_in = {f"finger.actuators.M{k}.pretension": 40.0 for k in range(1, 5)}
-        environment = Environment(fp.load_scenario("servo_position", COARSE | drawn_in), **task, randomise=drawn)
-        environment.reset(seed=0)
-        for _ in range(25):
-            found[name], *_ = environment.step(goal)
-    # What proportional loops and friction leave; and 40 N over 20 N/mm of slack, 2 mm of rope on radii of 5 to 8 mm.
-    np.testing.assert_allclose(found["known"][:3], goal, atol=0.02)
-    assert 0.05 < np.abs(found["slack"][:3] - goal).max() < 0.4
-
-
-def test_an_episode_of_servos_goes_as_if_it_were_the_first():
-    environment = Environment(fp.load_scenario("servo_position", COARSE), reward=nothing, action="joint_position")
-    seen = []
-    for _ in range(2):
-        environment.reset(seed=0)
-        seen.append([environment.step([0.1, 0.8, 0.9])[0] for _ in range(3)])
-    np.testing.assert_array_equal(*seen)
-
-
 def test_an_episode_is_a_result():
     environment = Environment(FIG6, reward=nothing)
     environment.reset(seed=0)
@@ -290,6 +252,7 @@ def test_intervals_of_an_identification_are_distributions(tmp_path):
         ({"start": lambda random: [0.0]}, "4 finite angles"),
         ({"observation": {"joint_position": Sensor(delay=0.03)}}, "multiple of the control period"),
         ({"period": 0.0}, "period"),
+        ({"randomize": {}}, "did you mean randomise?"),
         ({"observation": {"way": lambda seen: 0.0, "joint_position": Sensor()}}, "worlds in front"),
     ],
 )
@@ -297,6 +260,11 @@ def test_a_wrong_task_is_refused_in_one_line(task, words):
     with pytest.raises(fp.InputError) as caught:
         Environment(FIG6, **{"reward": nothing, **task})
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_an_environment_without_a_reward_is_refused():
+    with pytest.raises(fp.InputError, match="reward: is missing"):
+        Environment(FIG6)
 
 
 def test_wrong_actions_and_rewards_are_refused():

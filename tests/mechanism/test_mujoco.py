@@ -105,14 +105,7 @@ def test_without_masses_a_passive_tendon_is_one_spring_k_t_that_only_pulls():
         np.testing.assert_allclose(data.qacc, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(
-    "name, overrides",
-    [
-        ("fig6", {}),
-        ("fig6", SOFT),
-    ],
-    ids=["fig6", "soft passive tendon"],
-)
+@pytest.mark.parametrize("name, overrides", [("fig6", {}), ("fig6", SOFT)], ids=["fig6", "soft passive tendon"])
 def test_mujoco_converges_to_our_trajectory_at_the_first_order_of_its_time_step(name, overrides):
     found = mujoco_motion.converge(name, overrides)
     result, finger = found.ours, found.scenario.finger

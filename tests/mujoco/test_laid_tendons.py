@@ -20,14 +20,16 @@ joints = { mcp = 0.006, pip = 0.004 }
 pull = 20.0
 
 [tendons.flexor.path]
-start = { kind = "point", body = "palm", position = [0.0, 0.0, -0.01] }
-wheel = { kind = "cylinder", body = "near", radius = 0.006, orientation = [0.5, 0.5, 0.5, 0.5], side = [-0.02, 0, 0] }
-guide = { kind = "point", body = "near", position = [0.03, 0.0, -0.007] }
+start = { kind = "point", body = "palm", position = [0.0, 0.0, -0.004] }
+wheel = { kind = "cylinder", body = "near", radius = 0.006, orientation = [0.7071068, 0, 0, 0.7071068], \
+side = [0, -0.1, 0] }
+guide = { kind = "point", body = "near", position = [0.03, 0.0, -0.004] }
 end = { kind = "point", body = "far", position = [0.02, 0.0, -0.006] }
 """
 
 
-def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path):
+@pytest.mark.parametrize("mcp, wrapped", [(-0.1, True), (0.4, False)])
+def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path, mcp, wrapped):
     (tmp_path / "laid.toml").write_text(LAID)
     (tmp_path / "bare.xml").write_text(BARE)
     described = fp.from_mujoco(tmp_path / "bare.xml", tendons=tmp_path / "laid.toml")
@@ -37,8 +39,9 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path):
     fp.mujoco.add_friction(spec, tendons={"*": {"coulomb": 0.12}}, joints={"*": {}})
     model = spec.compile()
     data, hand = mujoco.MjData(model), fp.Hand(described)
-    data.qpos, data.ctrl = [0.4, 0.3], [1.0, 3.0]
+    data.qpos, data.ctrl = [mcp, 0.3], [1.0, 3.0]
     mujoco.mj_forward(model, data)
+    assert data.ten_wrapnum[model.tendon("flexor").id] == (5 if wrapped else 3)
     order = [model.tendon(name).id for name in described.tree.tendons]
     np.testing.assert_allclose(hand.paths.length(data.qpos), data.ten_length[order], atol=1e-12)
     dense = np.zeros((2, 2))
@@ -46,7 +49,7 @@ def test_they_have_the_same_lengths_arms_and_pulls_there_and_here(tmp_path):
     np.testing.assert_allclose(hand.paths.arms(data.qpos), dense[order], atol=1e-12)
     # The extensor's turn is that of its joints, (15) with an offset of zero, the flexor's that of its path.
     signals = fp.mujoco.friction(model, data)
-    assert signals.turn[signals.index("extensor")] == pytest.approx(0.7)
+    assert signals.turn[signals.index("extensor")] == pytest.approx(abs(mcp) + 0.3)
     assert signals.turn[signals.index("flexor")] == pytest.approx(hand.paths.turn(data.qpos)[order.index(1)], abs=1e-9)
     assert signals.tension[signals.index("flexor")] == pytest.approx(3.0)
 

@@ -5,7 +5,8 @@ import pytest
 from sliders import XML
 
 import finger_pin as fp
-from finger_pin.mujoco import MujocoWarning
+from finger_pin.mujoco import MujocoWarning, specification
+from finger_pin.mujoco.known_answer import try_known_answer
 
 
 def rope(**options):
@@ -54,6 +55,13 @@ def test_what_cannot_be_is_refused_and_what_is_less_is_warned_of():
         fp.mujoco.friction(plain, mujoco.MjData(plain))
     with pytest.warns(MujocoWarning, match="noslip"):
         fp.mujoco.add_friction(rope(noslip_iterations=3), tendons={"rope": {}})
+
+
+def test_a_mujoco_that_does_not_take_actuators_without_a_control_is_told_by_its_version_in_one_line(monkeypatch):
+    monkeypatch.setattr(specification, "NO_INPUT", 1)
+    with pytest.raises(fp.InputError) as caught:
+        try_known_answer()
+    assert caught.value.entry == f"mujoco {mujoco.__version__}" and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("gain, integrator, told", [(240.0, "IMPLICITFAST", False), (260.0, "IMPLICIT", True)])

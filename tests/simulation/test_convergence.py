@@ -207,16 +207,8 @@ def test_a_run_that_parts_is_a_warning_and_no_error(run, tmp_path, hunting):
 @pytest.mark.parametrize(
     ("error", "expected", "says"),
     [
-        (
-            IntegrationError(0.002, "too stiff", "another method"),
-            0,
-            "convergence could not be checked: the",
-        ),
-        (
-            Interrupted(0.002),
-            130,
-            "interrupted at t = 0.002 s; before convergence was checked; what was",
-        ),
+        (IntegrationError(0.002, "too stiff", "another method"), 0, "convergence could not be checked: the"),
+        (Interrupted(0.002), 130, "interrupted at t = 0.002 s; before convergence was checked; what was"),
     ],
 )
 def test_a_check_that_fails_keeps_the_run(run, tmp_path, monkeypatch, error, expected, says):

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import finger_pin as fp
-from finger_pin.description.scenario import METHODS
+from finger_pin.description.simulation_settings import METHODS
 from finger_pin.simulation.energy import energies, powers
 
 LOSSES = ("tendon_coulomb", "tendon_viscous", "joint_coulomb", "joint_viscous", "limiter")

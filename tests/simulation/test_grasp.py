@@ -16,12 +16,7 @@ def run(**overrides):
     return fp.simulate(
         fp.load_scenario(
             "grasp",
-            {
-                "simulation.rtol": 1e-5,
-                "simulation.atol_scale": 1e-5,
-                "simulation.sample_rate": 200.0,
-                **overrides,
-            },
+            {"simulation.rtol": 1e-5, "simulation.atol_scale": 1e-5, "simulation.sample_rate": 200.0, **overrides},
         )
     )
 

@@ -197,10 +197,7 @@ def test_fingers_that_share_a_name_and_a_finger_that_is_missing_are_refused(tmp_
         ("[fingers.index]\nfinger = 'ub'\n[fingers.Index]\nfinger = 'ub'\n", "another finger is called index"),
         ("[fingers.index]\nscale = 1.0\n", "hand.fingers.index.finger: is missing"),
         ("title = 'none'\n", "hand.fingers: is missing"),
-        (
-            "[fingers.index]\nfinger = 'nobody.toml'\n",
-            missing,
-        ),
+        ("[fingers.index]\nfinger = 'nobody.toml'\n", missing),
     ):
         hand.write_text(text)
         with pytest.raises(InputError) as caught:

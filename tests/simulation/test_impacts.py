@@ -16,11 +16,10 @@ def test_the_estimate_carries_what_an_impact_multiplies(family, seed):
     assert 1.0 / 3.0 < found.ratio < 100.0
 
 
-@pytest.mark.parametrize(("seed", "shown"), [(42, "small errors grow"), (30, ".* differs by")])
-def test_a_motion_in_which_impacts_multiply_errors_beyond_bounds_says_that_it_cannot_be_judged(seed, shown):
+def test_a_motion_in_which_impacts_multiply_errors_beyond_bounds_says_that_it_cannot_be_judged():
     # It drops on a floor, spinning, and rattles to rest.
-    scenario = at_tolerance(impact_scenario("drops", seed), 1e-3)
-    with pytest.warns(fp.exceptions.AccuracyWarning, match=f"error of the run cannot be judged: {shown}"):
+    scenario = at_tolerance(impact_scenario("drops", 30), 1e-3)
+    with pytest.warns(fp.exceptions.AccuracyWarning, match="error of the run cannot be judged: small errors grow"):
         result = fp.simulate(scenario)
     assert "estimated_error" not in result.attrs
     assert "cannot be judged" in summarize(result).replace("\n", " ")

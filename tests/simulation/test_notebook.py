@@ -30,9 +30,9 @@ def shown(monkeypatch):
 
 
 def test_a_notebook_shows_how_far_a_simulation_and_a_study_are(shown):
-    fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 0.5}))
-    values = [float(each) for text in shown for each in re.findall(r'max="0.5" value="([\d.]+)"', text)]
-    assert values == sorted(values) and len(values) == len(shown) and values[-1] == 0.5
+    fp.simulate(fp.load_scenario("fig6", {"simulation.duration": 1.5}))
+    values = [float(each) for text in shown for each in re.findall(r'max="1.5" value="([\d.]+)"', text)]
+    assert values == sorted(values) and len(values) == len(shown) and values[-1] == 1.5
     shown.clear()
     bar = notebook.notebook_bar("s", 8.0)
     for second in range(9):

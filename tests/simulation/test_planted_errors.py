@@ -88,7 +88,7 @@ def wrong_joint_friction(loop, monkeypatch):
 
 
 def wrong_stiction_rate(loop, monkeypatch):
-    def halved(stiction, velocity, level, stiffness):
+    def halved(stiction, velocity, level, stiffness, _side):
         return stiffness * (velocity - 0.5 * stiction * np.abs(velocity) / level)
 
     monkeypatch.setattr(capstan, "stiction_rate", halved)

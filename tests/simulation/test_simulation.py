@@ -10,7 +10,7 @@ import xarray as xr
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.proportional import ControlSignals
-from finger_pin.description.scenario import METHODS
+from finger_pin.description.simulation_settings import METHODS
 from finger_pin.exceptions import InputError, IntegrationError, Interrupted
 from finger_pin.references.reference import ReferenceSignals
 
@@ -131,6 +131,7 @@ def test_an_interruption_of_the_compiled_core_keeps_what_was_computed(method, fi
     error = caught.value
     assert np.all(np.diff(seen) > 0.0) and seen[-1] < 3.0
     assert 1.5 < error.time <= seen[-1]
+    assert error.result.attrs["interrupted"] == f"interrupted at t = {error.time:.6g} s of 8 s"
     assert error.time - 1e-3 < float(error.result.time[-1]) <= error.time
     whole = fig6.sel(time=error.result.time)
     np.testing.assert_allclose(error.result.joint_position, whole.joint_position, atol=1e-3)

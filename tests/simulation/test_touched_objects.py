@@ -196,7 +196,7 @@ def test_powers_of_many_states_are_those_of_each_alone(scene, pushed):
     alone = np.concatenate([loop.powers(times[k : k + 1], x[k : k + 1]) for k in range(len(x))])
     assert loop.powers(times, x) == pytest.approx(alone, rel=1e-12, abs=1e-18)
     # What slept meanwhile has met the ball.
-    assert alone[:, [each.name for each in loop.finger.mechanism.books.powers].index("contacts_impact")].max() > 0.0
+    assert alone[:, [each.name for each in loop.finger.mechanism.energies.powers].index("contacts_impact")].max() > 0.0
 
 
 def last_state(finger, result, k):

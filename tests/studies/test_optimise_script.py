@@ -1,7 +1,6 @@
 """The search on the command line: what it writes, how it ends, and that a kill costs nothing that was done."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,16 +14,6 @@ QUICK = (
     "--constraint", "self_locking_margin>=1.1", "--population", "8", "--generations", "3", "--output", "out",
     "--set", "simulation.duration=0.1",
 )  # fmt: skip
-
-
-@pytest.fixture
-def script(monkeypatch):
-    """The script's module, for commands that end before anything runs."""
-    monkeypatch.syspath_prepend(str(SCRIPT.parent))
-    monkeypatch.setattr(sys, "argv", [str(SCRIPT)])
-    sys.modules.pop("optimise", None)
-    yield __import__("optimise")
-    sys.modules.pop("optimise", None)
 
 
 def test_a_search_goes_on_from_what_a_kill_leaves_and_ends_with_the_same_front(script, tmp_path, monkeypatch, capsys):

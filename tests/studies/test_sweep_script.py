@@ -42,16 +42,6 @@ def wait_for_lines(process, path, count):
         time.sleep(0.005)
 
 
-@pytest.fixture
-def script(monkeypatch):
-    """The script's module, for commands that end before anything runs."""
-    monkeypatch.syspath_prepend(str(SCRIPT.parent))
-    monkeypatch.setattr(sys, "argv", [str(SCRIPT)])
-    sys.modules.pop("sweep", None)
-    yield __import__("sweep")
-    sys.modules.pop("sweep", None)
-
-
 def test_a_sweep_writes_its_results_and_says_what_came_out(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     radius = "finger.tendons.T3.crossings.medial.radius"
@@ -134,7 +124,11 @@ def test_every_run_failing_has_its_own_exit_code(script, tmp_path, monkeypatch, 
         (("--over", "controller.gain=1,2", "--seed", "3"), "--seed"),
         (("--over", "controller.gain=1,2", "--design", "gird"), "is not one of"),
         (("--over", "controller.gain=1,2", "--workers", "0"), "workers"),
-        (("--over", "controller.gain=1,2", "--workers", "x"), "workers"),
+        (("--over", "controller.gain=1,2", "--workers", "x"), "--workers = x: "),
+        (
+            ("--over", "controller.gain=1,2", "--format=gif"),
+            "--format = gif: 'gif' is not one of 'png', 'pdf', 'svg'\n",
+        ),
         (("--over", "controller.gain=1,2", "--workers", "2", "--scheduler", "tcp://h:1"), "--workers"),
         (("--over", "controller.gain=1,2", "--scheduler", "nonsense://h"), "scheduler"),
         (("--over", "controller.gain=1,2", "--set", "controller"), "KEY=VALUE"),

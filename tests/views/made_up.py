@@ -76,12 +76,7 @@ def synthetic(joints=4, actuated=4, passive=1, samples=2001, seed=0):
     return xr.Dataset(variables, coordinates, embedded(fp.load_scenario("fig6")))
 
 
-SIZES = {
-    "paper": (4, 4, 1),
-    "planar": (2, 3, 0),
-    "two passive": (4, 4, 2),
-    "many": (9, 6, 3),
-}
+SIZES = {"paper": (4, 4, 1), "planar": (2, 3, 0), "two passive": (4, 4, 2), "many": (9, 6, 3)}
 
 
 def lines(axes):

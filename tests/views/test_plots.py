@@ -184,3 +184,29 @@ def test_a_joint_that_no_torque_turns_but_rounding_shows_a_flat_line():
         axes for axes in plots.plot_losses(result).axes if axes.get_ylabel().startswith(str(result.joint[0].item()))
     )
     assert panel.get_ylim() == (-1.0, 1.0)
+
+
+def test_a_reference_that_lies_on_another_one_is_dashed_so_that_both_are_seen():
+    result = synthetic()
+    result["joint_reference"][:, 2] = result["joint_reference"][:, 1]
+    references = columns(plots.plot_fig6(result))[0][0]
+    assert [line.is_dashed() for line in references.get_lines()] == [False, False, True, False]
+
+
+def test_of_constant_references_the_angles_are_shown():
+    result = synthetic()
+    result["joint_reference"][:] = 0.2
+    axes = columns(plots.plot_fig6(result))[0][0]
+    assert "angle" in axes.get_ylabel()
+    assert_shows(axes.get_lines()[0], result["time"].values, np.rad2deg(result["joint_position"].values[:, 0]))
+
+
+def test_a_spike_of_one_sample_leaves_the_panel_of_a_torque():
+    result = synthetic()
+    time = result["time"].values
+    for name in ("joint_torque_command", "joint_torque", "joint_friction"):
+        result[name][:, 0] = 1e-3 * np.sin(2.0 * np.pi * time / time[-1])
+    result["joint_torque_command"][0, 0] = 1.0
+    low, high = columns(plots.plot_losses(result))[1][0].get_ylim()
+    # A tenth of the range beyond it: +-1.2 mN m.
+    np.testing.assert_allclose((low, high), (-1.2, 1.2), rtol=0.01)

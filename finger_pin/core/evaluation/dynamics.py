@@ -134,7 +134,7 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
 
 @compiled
 def exert(model: Any, address: int, time: float) -> None:
-    """Fill the rows' arguments, forces and rates of states, where bodies are placed by `move` and inputs known."""
+    """Fill the rows' arguments, forces and rates of states, after `move` and with known inputs."""
     tables, control, x, work = model.tables, model.control, model.state, model.work
     width = work.torque.size
     if tables.loaded:

@@ -102,7 +102,7 @@ def input_slopes(control: Any, time: float) -> None:
 
 @compiled
 def tip_forces(control: Any, time: float, order: int, out: Any) -> None:
-    """Fill the forces at the tips where they vary in time, or a derivative of them, shape (t, 3)."""
+    """Fill the varying forces at the tips, or a derivative of them, shape (t, 3)."""
     if control.force.harmonics.shape[0] > 0:
         for t in range(out.shape[0]):
             for r in range(3):
@@ -123,7 +123,7 @@ def _coordinates(signal: Any, time: float, order: int) -> Any:
 
 @compiled
 def move_base(control: Any, time: float, tables: Any, work: Any) -> None:
-    """Fill velocity and acceleration of the base, and their rates, where it moves."""
+    """Fill velocity and acceleration of a moving base, and their rates."""
     if control.palm.harmonics.shape[0] == 0:
         return
     place = _coordinates(control.palm, time, 0)

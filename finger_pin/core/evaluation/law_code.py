@@ -55,6 +55,19 @@ def widest(laws: Sequence[Law | ContactLaw]) -> tuple[int, int]:
     return SIGNALS + max((len(law.signals) for law in laws), default=0), 1 + powers
 
 
+def kink_column(law: Law | ContactLaw) -> int:
+    """Return the column of the table of rows by whose sign a law bends, -1 for none.
+
+    Raises:
+        InputError: If it bends with the sign of its speed, but has no state whose rate could.
+    """
+    if law.kink != "speed":
+        return SIGNALS + law.signals.index(law.kink) if law.kink else -1
+    if law.scale is None or law.arms > 1:
+        raise InputError(f"law {law.name}: kink", "is 'speed', which is for laws of one arm with a state")
+    return SPEED
+
+
 @cache
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a plain function compiled, with all plain functions that it calls.

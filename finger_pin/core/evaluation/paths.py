@@ -61,7 +61,7 @@ def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
 
 @compiled
 def look(paths: Any, e: int, work: Any) -> bool:
-    """Fill value and wrenches of a piece where bodies are placed; return false if it is out of reach."""
+    """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     own = work.paths
     _frame(paths, e, work)
     out, y = own.out[e], own.seen[e]

@@ -48,9 +48,19 @@ def _place(tables: Any, i: int, angle: float, work: Any) -> None:
 
 
 @compiled
+def _massless(tables: Any, i: int) -> Any:
+    """Return whether a body has no inertia, as five of the six of a free object have none."""
+    body = tables.bodies[i]
+    return body[MASS] == 0.0 and body[INERTIA] == 0.0 and body[INERTIA + 3] == 0.0 and body[INERTIA + 5] == 0.0
+
+
+@compiled
 def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
     """Express the inertia of body i about O in base axes."""
     body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
+    if _massless(tables, i):
+        out[:] = 0.0
+        return
     mass, x, y, z = body[MASS], body[CENTRE], body[CENTRE + 1], body[CENTRE + 2]
     ixx, ixy, ixz = body[INERTIA], body[INERTIA + 1], body[INERTIA + 2]
     iyy, iyz, izz = body[INERTIA + 3], body[INERTIA + 4], body[INERTIA + 5]
@@ -116,6 +126,9 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
             work.spatial[SPATIAL_ACCELERATION, i, k] = (
                 above + work.spatial[AXIS, i, k] * own + work.spatial[AXIS_RATE, i, k] * velocity[i]
             )
+        if _massless(tables, i):
+            work.spatial[FORCE, i] = 0.0
+            continue
         apply_inertia(work.inertia[i], work.spatial[SPATIAL_ACCELERATION, i], work.spatial[FORCE, i])
         apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
         add_force_cross(work.spatial[MOTION, i], work.vectors[0], work.spatial[FORCE, i])
@@ -140,7 +153,7 @@ def base_power(tables: Any, velocity: Any, work: Any) -> Any:
 
 @compiled
 def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
-    """Fill the time derivative of inverse dynamics at a given motion where the base moves, shape (n,).
+    """Fill the time derivative of inverse dynamics at a given motion on a moving base, shape (n,).
 
     All velocities change alike, by dV; accelerations by that of the base and by dV x S v of every joint before. What
     an evaluation has left in two layers is overwritten.

@@ -6,18 +6,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.evaluation.charts import place_bodies
+from finger_pin.core.collision.broad_phase import arrive, glide, list_awake, set_asleep, settle, wake
+from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
 from finger_pin.core.jit import Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, call_filling, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.broad_phase import arrive, glide, list_awake, set_asleep, settle, wake
 from finger_pin.core.tables import END, FIRST
 
 
 class States(NamedTuple):
-    """Many states of one island under given inputs, which its control must hold, and what is filled for them.
+    """Many states of one island under given inputs, which its control must hold, and their signals to be filled.
 
     Attributes:
         model: Address of a bound `Model`.
@@ -30,7 +30,7 @@ class States(NamedTuple):
         first: Where in it the first state stands.
         torques: Filled with the sum of A^T phi, shape (m, N).
         externals: Filled with J^T F, shape (m, N).
-        booked: Filled with energies and powers, shape (m, books); the last is that of a base that moves.
+        booked: Filled with energies and powers, shape (m, energies); the last is that of a base that moves.
         bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
             (m, 15 + g), or (0, 15 + g) at rest.
         attitudes: Quaternions of free bodies, shape (m, f, 4).
@@ -54,7 +54,7 @@ class States(NamedTuple):
 
 
 class Motions(NamedTuple):
-    """Many positions and velocities of the bodies, and what is filled for them.
+    """Many positions and velocities of the bodies, and their signals to be filled.
 
     With a base that moves energies are those of the motion in the world, where the base has no height.
 
@@ -92,13 +92,13 @@ def book(tables: Any, work: Any, totals: Any) -> None:
                 k = tables.paths.row[work.paths.awake[index]]
                 if begin <= k < end:
                     call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, k, k + 3)
-                    for i in range(tables.books.shape[1]):
-                        if tables.books[g, i] >= 0:
-                            totals[tables.books[g, i]] += work.powers[i, k]
+                    for i in range(tables.energies.shape[1]):
+                        if tables.energies[g, i] >= 0:
+                            totals[tables.energies[g, i]] += work.powers[i, k]
             continue
         call_filling(tables.laws[g, 2], work.rows, tables.parameters, work.powers, begin, end)
-        for i in range(tables.books.shape[1]):
-            entry = tables.books[g, i]
+        for i in range(tables.energies.shape[1]):
+            entry = tables.energies[g, i]
             if entry >= 0:
                 total = totals[entry]
                 for k in range(begin, end):
@@ -146,7 +146,7 @@ def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
 
 @compiled
 def _touch(paths: Any, work: Any, out: Any) -> None:
-    """Fill the forces of contacts on the second body, the points, and the normals; zero where they are open."""
+    """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
     own = work.paths
     for index in range(own.closed_count[0]):
         e = own.closed[index]
@@ -187,7 +187,7 @@ def _evaluate(many: Any, model: Any, m: int) -> None:
 
 @compiled
 def exert_alone(model: Any, address: int, time: float) -> None:
-    """Fill what the rows do where inputs are known: for powers, which do not need the acceleration."""
+    """Fill the rows' forces and rates under known inputs, for powers, which do not need the acceleration."""
     tables, width = model.tables, model.work.torque.size
     # Only some rows need to know where bodies are.
     if tables.loaded or tables.paths.columns.size > 0:
@@ -197,7 +197,7 @@ def exert_alone(model: Any, address: int, time: float) -> None:
 
 @compiled
 def _keep(many: Any, model: Any, m: int) -> None:
-    """Fill the m-th place with what has been evaluated."""
+    """Fill the m-th place with the latest evaluation."""
     tables, work, rates, rows = model.tables, model.work, many.rates, many.rows
     if rates.shape[0] > 0:
         for c in range(many.states.shape[1]):
@@ -216,7 +216,7 @@ def _keep(many: Any, model: Any, m: int) -> None:
 
 @compiled
 def book_moved(model: Any, address: int, moving: bool, totals: Any) -> None:
-    """Book the power of a base that moves, or of what moves coordinates along paths, after a whole evaluation."""
+    """Book the power of a moving base, or of coordinates led along paths, after a whole evaluation."""
     work, width, last = model.work, model.work.torque.size, totals.size - 1
     if model.power != 0 and moving:
         call_at(model.power, address, 0.0)

@@ -22,7 +22,7 @@ _PLAIN = (int, float, complex, str, bytes, bool, type(None), slice)
 
 
 class Unknown(Exception):
-    """Something of which nobody can say later whether it is still the same."""
+    """A thing without a lasting identity: a later process cannot recognise it."""
 
 
 def reached(function: FunctionType) -> str:
@@ -39,7 +39,8 @@ def reached(function: FunctionType) -> str:
         seen.add(id(each))
         if each.__module__ not in sys.modules:
             raise Unknown(f"{each.__qualname__} stands in no module")
-        text = [_text(each.__code__, each.__doc__), str(vars(each).get("loose"))]
+        # What is kept names the modules that it is of.
+        text = [each.__module__, _text(each.__code__, each.__doc__), str(vars(each).get("loose"))]
         for name, value in _values(each):
             if is_jitted(value):
                 value = value.py_func

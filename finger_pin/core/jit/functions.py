@@ -1,4 +1,4 @@
-"""Functions compiled, by numba; on disk they are where numba keeps code.
+"""Functions compiled by numba, and kept in its cache on disk.
 
 Numba keeps code beside the file that a function stands in, under the function's name, as long as that file is the
 same. It sees neither what a function calls in other files nor which globals it was given: so functions are handed to
@@ -37,7 +37,7 @@ _INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, **INTERNA
 
 
 def compiled(function: _Function) -> _Function:
-    """Return the function compiled, to be called by compiled code only, where it is inlined."""
+    """Return the function compiled, to be inlined into compiled code."""
     return numba.njit(**_INLINED)(function)  # type: ignore[no-any-return]
 
 
@@ -63,6 +63,10 @@ class Unit:
     @cached_property
     def _call(self) -> Callable[[int, float], int]:
         return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double)(self.address)
+
+    def compile(self) -> None:
+        """Compile it, or find it on disk."""
+        assert self.address
 
     @property
     def kept(self) -> bool:
@@ -104,12 +108,12 @@ def address_of(signature: str, function: FunctionType, announced: bool = True) -
 
 
 def cache_root() -> Path:
-    """Return the folder that compiled code is kept in, where it can be."""
+    """Return the folder of compiled code, which may not be writable."""
     return Path(os.environ.get("FINGER_PIN_CACHE_DIR") or platformdirs.user_cache_dir("finger_pin"))
 
 
 def cache_place() -> Path | None:
-    """Return the empty file beside which code is kept, or None where nothing can be."""
+    """Return the empty file beside the compiled code, or None if that cannot be kept."""
     place = cache_root() / "compiled.py"
     try:
         if not place.exists():
@@ -144,7 +148,7 @@ def _announce() -> None:
     lasting = cache_place() is not None
     often = "once for this version" if lasting else f"in every run, as {cache_root()} cannot be written"
     advice = "" if lasting else "; FINGER_PIN_CACHE_DIR may name another folder"
-    _say(f"Compiling the model, {often}: about half a minute{advice} ...")
+    _say(f"Compiling the model, {often}: about a minute{advice} ...")
 
 
 @cache

@@ -83,14 +83,21 @@ def fits(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
     return True
 
 
-def refill(table: tuple[Any, ...], other: tuple[Any, ...]) -> None:
-    """Copy the numbers of another table, which `fits`, into the arrays of one: a block that holds it holds them."""
-    for own, new in zip(table, other, strict=True):
+def refill(table: tuple[Any, ...], other: tuple[Any, ...], before: tuple[Any, ...] | None = None) -> None:
+    """Copy the numbers of another table, which `fits`, into the arrays of one: a block that holds it holds them.
+
+    Args:
+        table: It is filled.
+        other: Whose numbers it is given.
+        before: What it was filled from before, if nothing has changed them since: what both share stays.
+    """
+    for own, new, old in zip(table, other, before or (None,) * len(table), strict=True):
+        if own is new or new is old:
+            continue
         if isinstance(own, np.ndarray):
-            if own is not new:
-                own[...] = new
+            own[...] = new
         elif isinstance(own, tuple):
-            refill(own, new)
+            refill(own, new, old)
 
 
 def numbered(table: _Table) -> _Table:
@@ -124,7 +131,10 @@ def _copied(value: Any) -> Any:
 
 def _address(array: Any) -> int:
     """Return the address of an array's numbers."""
-    if array.size and array.flags.writeable:
+    if not array.size:
+        # Nobody looks there.
+        return 0
+    if array.flags.writeable:
         # Sooner than NumPy says it itself.
         return ctypes.addressof(ctypes.c_char.from_buffer(array))
     return int(array.ctypes.data)
@@ -136,8 +146,7 @@ def _write(table: Any, kind: Kind, words: list[int]) -> None:
             fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous
             if not fitting or value.dtype != _DTYPES[own.dtype]:
                 raise TypeError(f"{value!r} cannot be bound as {own}")
-            words.append(_address(value))
-            words.extend(value.shape)
+            words += (_address(value), *value.shape)
         elif isinstance(own, Kind):
             _write(value, own, words)
         elif isinstance(value, bool | int) and own in (int, bool):

@@ -1,4 +1,4 @@
-"""Steps as long as a tolerance allows, compiled: which are taken, what is kept of them, how long the next may be."""
+"""Adaptive step lengths, compiled: acceptance of steps, their record, and the length of the next."""
 
 from __future__ import annotations
 
@@ -6,22 +6,17 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.collision.broad_phase import list_awake, settle
+from finger_pin.core.collision.continuous import NOTHING, UNSEEN
 from finger_pin.core.control import HELD
-from finger_pin.core.evaluation.charts import rechart
-from finger_pin.core.jit import Unit, bound_at, compiled
+from finger_pin.core.evaluation.attitude_charts import rechart
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
-from finger_pin.core.stepping.broad_phase import list_awake, settle
-from finger_pin.core.stepping.drift import carry, defect, weigh
 from finger_pin.core.stepping.error_norm import step_error, worst
-from finger_pin.core.stepping.flights import NOTHING, UNSEEN, survey
-from finger_pin.core.stepping.law_branches import passed, past_kink, price, strayed
 from finger_pin.core.stepping.rosenbrock import try_step
 
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
-
-# What a step that is cut at a kink keeps of its length at least and at most.
-_SHORTEST, _LONGEST = 0.1, 0.9
 
 
 @compiled
@@ -29,7 +24,7 @@ def _begin(integration: Any, model: Any, end: float) -> None:
     """Make ready to advance to a time, with all contacts awake that may be."""
     memory, control = integration.memory, model.control
     list_awake(model.tables, model.work.paths)
-    memory[at.FRESH], memory[at.WHOLE], memory[at.AFTER] = 1.0, 0.0, np.inf
+    memory[at.FRESH], memory[at.WHOLE] = 1.0, 0.0
     # Right after a full record nothing has jumped.
     jumped = control.kind == HELD and memory[at.HELD_STEP] >= 0.0
     memory[at.JUMPED], memory[at.HELD_STEP] = 1.0 * jumped, abs(memory[at.HELD_STEP])
@@ -67,7 +62,7 @@ def _blame(integration: Any) -> None:
 
 @compiled
 def _tried(integration: Any, model: Any, h: float) -> int:
-    """Try a step, and count what it took; return what comes of it."""
+    """Try a step, and count its evaluations; return its outcome, as `try_step` does."""
     memory, tables = integration.memory, model.tables
     fresh, count = memory[at.FRESH] > 0.0, integration.tableau.nodes.size
     outcome = try_step(integration, model, memory[at.TIME], h, fresh)
@@ -79,32 +74,14 @@ def _tried(integration: Any, model: Any, h: float) -> int:
     memory[at.JACOBIANS] += fresh
     memory[at.FACTORISATIONS] += 1
     memory[at.EVALUATIONS] += count if fresh or tables.loaded or tables.touching > 0 else count - 1
-    memory[at.FRESH] = 0.0
+    # What follows a kink follows from this try alone.
+    memory[at.FRESH], memory[at.AFTER] = 0.0, np.inf
     return outcome
 
 
 @compiled
-def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
-    """Return how much of a step to try next, 1 to keep it, and the share after which a row has left its side, or 1."""
-    memory, time, r = integration.memory, integration.memory[at.TIME], integration.r
-    share, dear = strayed(model.tables, model.work.rows, integration.kinks), False
-    if share < 1.0:
-        # A row was held on a side that it has left: what that cost is an error too.
-        memory[at.EVALUATIONS] += 2
-        cost = price(integration, model, time + h, h, r)
-        dear = not cost <= 1.0
-        if not dear:
-            memory[at.AFTER] = past_kink(h, share, cost, integration.rtol, integration.tableau)
-    elif outcome == at.STRAYED:
-        memory[at.EVALUATIONS] += 4
-        share = passed(integration, model, time, h, r)
-        dear = share < 1.0
-    return min(_LONGEST, max(_SHORTEST, 1.02 * share)) if dear else 1.0, share
-
-
-@compiled
 def _fitting(integration: Any, error: float) -> Any:
-    """Return by how much a step of that error is to be longer to fit the tolerance."""
+    """Return the factor by which a step of an error is to be longer to fit the tolerance."""
     if not error <= 1e30:
         return 0.1
     return min(_GROW, max(_SHRINK, _SAFETY * max(error, 1e-10) ** (-1.0 / integration.tableau.order)))
@@ -112,7 +89,7 @@ def _fitting(integration: Any, error: float) -> Any:
 
 @compiled
 def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
-    """Return by how much the step after one that is taken may be longer."""
+    """Return the factor by which the step after one that is taken may be longer."""
     memory, factor = integration.memory, _fitting(integration, error)
     if memory[at.LAST_STEP] > 0.0 and not clipped:
         # Gustafsson's predictive controller: the error's trend counts too, unless the end cut the step.
@@ -120,37 +97,6 @@ def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
         factor = min(factor, max(_SHRINK, _SAFETY * h / memory[at.LAST_STEP] * trend))
     # Right after a rejection the step does not grow.
     return min(factor, 1.0) if memory[at.CULPRIT] < 0.0 else factor
-
-
-@compiled
-def _estimate(integration: Any, model: Any, h: float, turned: bool, doubtful: bool) -> None:
-    """Carry the error of the run over a step that is taken.
-
-    Args:
-        integration: The integration; its state is that of the step's start.
-        model: The model; its state is that of the step's end.
-        h: Length of the step, s.
-        turned: Whether it ends at a kink.
-        doubtful: Whether the two methods may err alike.
-    """
-    memory, drift, k, width = integration.memory, integration.drift, integration.k, model.linear.mass.shape[0]
-    if integration.joints.size + integration.objects.size == 0:
-        return
-    if doubtful:
-        defect(integration, model, memory[at.TIME], h)
-    memory[at.BEHIND] = carry(
-        model.linear,
-        h,
-        integration.tableau.gamma,
-        drift,
-        k[k.shape[0] - 1],
-        memory[at.BEHIND],
-        turned,
-        integration.r,
-        model.rate,
-    )
-    memory[at.DRIFT] += h * weigh(integration.joints, width, drift)
-    memory[at.OBJECT_DRIFT] += h * weigh(integration.objects, width, drift)
 
 
 @compiled
@@ -163,7 +109,7 @@ def _shorten(integration: Any, h: float, whole: float) -> None:
 
 @compiled
 def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) -> None:
-    """Count a step that is taken, and say how long the next may be."""
+    """Count a step that is taken, and set the length of the next."""
     memory = integration.memory
     factor = _growth(integration, h, error, clipped)
     if memory[at.JUMPED] > 0.0 and not clipped:
@@ -176,23 +122,7 @@ def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) 
     memory[at.STEP] = min(memory[at.STEP], memory[at.AFTER])
     memory[at.ACCEPTED] += 1
     memory[at.FRESH], memory[at.JUMPED] = 1.0, 0.0
-    memory[at.CULPRIT], memory[at.WHOLE], memory[at.AFTER] = max(memory[at.CULPRIT], 0.0), 0.0, np.inf
-
-
-@compiled
-def _record(stretch: Any, integration: Any) -> None:
-    """Keep the interpolant of a step, if there is a record; its end comes later."""
-    if stretch.taken[0] == stretch.times.size:
-        return
-    k, tableau = integration.k, integration.tableau
-    for row in range(tableau.dense.shape[0]):
-        bend = stretch.dense[stretch.taken[0], row]
-        for c in range(bend.size):
-            bend[c] = 0.0
-        for j in range(tableau.nodes.size):
-            of_stage = tableau.dense[row, j]
-            for c in range(bend.size):
-                bend[c] += of_stage * k[j, c]
+    memory[at.CULPRIT], memory[at.WHOLE] = max(memory[at.CULPRIT], 0.0), 0.0
 
 
 @compiled
@@ -208,6 +138,7 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
     integration.memory[at.TIME] = time
     if taken < stretch.times.size:
         stretch.times[taken] = time
+        stretch.dense[taken] = integration.dense
         for c in range(x.size):
             stretch.states[taken, c] = x[c]
     rechart(tables, x, attitude, integration.drift)
@@ -216,12 +147,11 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
             for c in range(4):
                 stretch.attitudes[taken, f, c] = attitude[f, c]
         stretch.taken[0] += 1
-    integration.memory[at.FRESH] = 1.0
 
 
 @compiled
 def _still(integration: Any, model: Any, first: int) -> None:
-    """Clear what earlier steps have left of the states of contacts that sleep, which are zero and stay so."""
+    """Clear the rates and errors of the states of contacts that sleep, which are zero and stay so."""
     tables = model.tables
     for row in range(0, tables.touching, 3):
         if model.work.paths.asleep[row]:
@@ -263,22 +193,21 @@ def advance(address: int, end: float) -> int:
                 _blame(integration)
                 return at.UNDERFLOW
             continue
-        kept, share = 1.0, 1.0
-        worth = h > 1e-12 * max(1.0, abs(time))
-        if worth:
-            kept, share = _kept_at_kinks(integration, model, h, outcome)
-        touch = survey(integration, model) if worth and kept == 1.0 and model.tables.touching else NOTHING
+        memory[at.OUTCOME], memory[at.TOUCH] = outcome, NOTHING
+        call_at(integration.cut, stretch.integration, h)
+        if memory[at.KEPT] == 1.0 and model.tables.touching:
+            call_at(integration.survey, stretch.integration, h)
+        kept, part, touch = memory[at.KEPT], memory[at.PART], memory[at.TOUCH]
         if touch == UNSEEN:
             # The same step once more, with what slept.
             list_awake(model.tables, model.work.paths)
             memory[at.FRESH] = 1.0
         elif kept < 1.0 or touch < NOTHING:
             # Of a touch nothing has seen the next step's end is inside, and sees it.
-            _shorten(integration, h * (touch if touch < NOTHING else kept), max(memory[at.WHOLE], h))
+            _shorten(integration, h * (part * touch if touch < NOTHING else kept), max(memory[at.WHOLE], h))
         else:
-            again = memory[at.CULPRIT] < 0.0 and model.tables.touching > 0
-            _record(stretch, integration)
-            _estimate(integration, model, h, share < 1.0, share < 1.0 or outcome == at.STRAYED or again)
-            _arrive(stretch, integration, model, end if final else time + h)
+            if integration.joints.size + integration.objects.size > 0:
+                call_at(integration.judge, stretch.integration, h)
+            _arrive(stretch, integration, model, end if final and part == 1.0 else time + part * h)
             _pace(integration, h, error, final, clipped)
     return at.DONE

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from finger_pin.core.evaluation.charts import place_bodies, turn_small
+from finger_pin.core.collision.broad_phase import list_awake
+from finger_pin.core.evaluation.attitude_charts import place_bodies, turn_small
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.bends import cross, hold_all, last_before, look, rate_at, state_at, turned_after
-from finger_pin.core.stepping.broad_phase import list_awake
+from finger_pin.core.stepping.events import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.interpolation import Between, begin_of
+from finger_pin.core.stepping.kink_sides import release
 from finger_pin.core.stepping.radau import copy, curvature, node, relax
 
 # Entries of the memory.
@@ -34,7 +35,7 @@ SINGULAR = -1
 
 
 class Collocation(NamedTuple):
-    """A motion of size n with p numbers, and what is filled for at most m intervals.
+    """A motion of size n with p numbers, and its at most m intervals to be filled.
 
     Attributes:
         model: Address of the bound `Model`.
@@ -124,9 +125,10 @@ def _place(col: Any, step: int) -> None:
 
 @compiled
 def _awake(address: int) -> None:
-    """Let no contact of a model sleep."""
+    """Wake all contacts of a model, and release all rows from the sides of an earlier integration."""
     model = bound_at(address, MODEL)
     paths = model.work.paths
+    release(model.tables, model.work.rows)
     for k in range(paths.asleep.size):
         paths.asleep[k] = 0
     for e in range(paths.path.size):
@@ -136,7 +138,7 @@ def _awake(address: int) -> None:
 
 @compiled
 def _jump(col: Any, model: Any, step: int, corner: int) -> None:
-    """Add to S what a later jump of the inputs makes of it: (f before - f after) dt/dp."""
+    """Add to S the effect of a later jump of the inputs: (f before - f after) dt/dp."""
     moves = False
     for k in range(col.changes.size):
         moves = moves or col.shifts[corner, k] != 0.0
@@ -174,22 +176,28 @@ def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: 
     """Solve for S at the nodes between two times, of which the first is in a step.
 
     Returns:
-        0 if it is solved, `SINGULAR` if a linear system is; else before which node the motion bends, from 1.
+        0 if it is solved, `SINGULAR` if a linear system is; else a time by which the motion has bent.
     """
-    h = end - begin
+    h, at = end - begin, step
+    while looks and col.motion.ends[at] < end:
+        # From one node to the next it may bend and bend back.
+        look(col, model, at, col.motion.ends[at], col.after)
+        if turned_after(col, col.after, col.after) < 1.0:
+            return col.motion.ends[at]
+        at += 1
     for a in range(col.nodes.size):
         time = end if a == col.nodes.size - 1 else begin + col.nodes[a] * h
         if looks:
             look(col, model, step, time, col.after)
             if turned_after(col, col.after, col.after) < 1.0:
-                return a + 1
+                return time
         else:
             state_at(col.motion, step, time, col.state)
             rate_at(col.model, time, col.state)
         if not node(col, model, a, time, h):
-            return SINGULAR
+            return float(SINGULAR)
     relax(col, h)
-    return 0
+    return 0.0
 
 
 @compiled
@@ -210,7 +218,7 @@ def _keep(col: Any, taken: int, end: float) -> None:
 
 @compiled
 def _latest(col: Any, step: int) -> Any:
-    """Return when the interval that begins in a step ends at the latest: where inputs bend, or angles begin anew."""
+    """Return the latest end of the interval that begins in a step: a knot of the inputs, or a restart of the angles."""
     b, close = col.motion, col.motion.charts.size > 0 or col.memory[SPLIT] >= _SPLITS
     while step < b.ends.size - 1 and not close and col.corners[step] == 0:
         step += 1
@@ -234,13 +242,12 @@ def _solved(col: Any, model: Any, step: int, begin: float) -> Any:
             end = latest
         if end <= least:
             return end, bends
-        found = _interval(col, model, step, begin, end, bends == 0 and memory[SPLIT] < _SPLITS)
-        if found > 0:
-            behind = end if found == col.nodes.size else begin + col.nodes[found - 1] * (end - begin)
+        behind = _interval(col, model, step, begin, end, bends == 0 and memory[SPLIT] < _SPLITS)
+        if behind > 0.0:
             latest, bends = last_before(col, model, step, begin, behind), 1
             length = latest - begin
             continue
-        if found == SINGULAR:
+        if behind == SINGULAR:
             return end, SINGULAR
         curved = curvature(col) / col.allowed
         factor = min(max(0.9 * max(curved, 1e-6) ** (-1.0 / col.nodes.size), 0.3), 3.0)
@@ -252,7 +259,7 @@ def _solved(col: Any, model: Any, step: int, begin: float) -> Any:
 
 @Unit
 def collocate(address: int, _time: float) -> int:
-    """Fill intervals of the `Collocation` at an address; return how many, or `SINGULAR`."""
+    """Fill intervals of the `Collocation` at an address; return their number, or `SINGULAR`."""
     col = bound_at(address, COLLOCATION)
     model, b, memory = bound_at(col.model, MODEL), col.motion, col.memory
     taken, last = 0, b.ends.size - 1

@@ -14,7 +14,7 @@ from finger_pin.exceptions import InputError
 
 
 def check_installed() -> None:
-    """Refuse the method where its package is missing.
+    """Refuse the method if its package is missing.
 
     Raises:
         InputError: If scikit-sundae is not installed.

@@ -10,11 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from finger_pin.core.stepping import rosenbrock as core
+from finger_pin.core.stepping.companion_motion import Companion
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part, Record, failure
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
-from finger_pin.core.stepping.twin import Twin
 from finger_pin.core.threads import in_threads
 from finger_pin.description.routing import Array
 
@@ -53,7 +53,7 @@ class _Recorder:
         self.kept = [part.room(0)]
         self.room = part.room(chunk)
         self.taken = 0
-        self.twin = Twin(part) if judged else None
+        self.companion = Companion(part) if judged else None
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
 
     def advance(self, end: float, chunks: int = -1) -> int:
@@ -63,8 +63,8 @@ class _Recorder:
             status, steps = part.advance(end, self.room)
             self.kept.append(self.room.first(steps))
             self.taken += steps
-            if self.twin is not None:
-                self.twin.look()
+            if self.companion is not None:
+                self.companion.look()
             chunks -= 1
             if status != core.FULL or self.taken >= self.most:
                 return status
@@ -114,13 +114,14 @@ def integrate_compiled(
     """
     if knots is not None:
         stepper.end_steps_at(knots[(knots > stepper.time) & (knots < duration)])
-    # Advancing by nothing compiles, which is no part of an integration's cost.
-    stepper.advance(stepper.time)
-    began = time.perf_counter()
     # Of a controller that acts in between, the linearised flow knows nothing.
     known = held is None and not stepper.driven
     judged = known and stepper.judged
     recorders = [_Recorder(stepper, index, chunk, judged) for index in range(len(stepper.parts))]
+    for recorder in recorders:
+        # Compiling is no part of an integration's cost.
+        recorder.part.ready(recorder.room)[1].compile()
+    began = time.perf_counter()
     alone = len(recorders) == 1
     reason, interrupted = "", False
     while stepper.time < duration and not reason and not interrupted:
@@ -167,8 +168,11 @@ def _statistics(recorders: Sequence[_Recorder], wall_time: float) -> Statistics:
 
 
 def _error(stepper: Stepper, recorders: Sequence[_Recorder]) -> float:
-    """Return the error of a run as it estimates it, rad or m rms; infinite where it has grown beyond all bounds."""
-    lost = any(recorder.twin is not None and recorder.twin.lost for recorder in recorders)
+    """Return the estimated error of a run, rad or m rms; infinite if it has grown beyond all bounds."""
+    companions = [recorder.companion for recorder in recorders if recorder.companion is not None]
+    for companion in companions:
+        companion.look(1)
+    lost = any(companion.lost for companion in companions)
     return np.inf if lost else stepper.estimated_error
 
 

@@ -110,15 +110,29 @@ def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None
 
 
 @compiled
-def bend_of_stages(tableau: Any, k: Any, c: int, share: float) -> Any:
-    """Return the bend of a state after a share of a step, as `between` has it, from the stages k, shape (s, size)."""
-    bend = 0.0
-    for row in range(tableau.dense.shape[0] - 1, -1, -1):
-        value = 0.0
+def interpolant(tableau: Any, k: Any, dense: Any) -> None:
+    """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
+    for row in range(dense.shape[0]):
+        bend = dense[row]
+        for c in range(bend.size):
+            bend[c] = 0.0
         for j in range(tableau.nodes.size):
-            value += tableau.dense[row, j] * k[j, c]
-        bend = value + share * bend
-    return bend
+            of_stage = tableau.dense[row, j]
+            for c in range(bend.size):
+                bend[c] += of_stage * k[j, c]
+
+
+@compiled
+def cut(before: Any, after: Any, dense: Any, share: float) -> None:
+    """Let a step end after a share of it: the state at its end and its row of ``dense`` become those of that part."""
+    for c in range(before.size):
+        bend, last, new = 0.0, 0.0, 0.0
+        for row in range(dense.shape[0] - 1, -1, -1):
+            old = dense[row, c]
+            bend = old + share * bend
+            new += share ** (row + 2) * (old - last)
+            dense[row, c], last = new, old
+        after[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
 
 
 @compiled

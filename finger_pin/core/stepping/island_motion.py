@@ -8,13 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from finger_pin.core.bound_models import FEW
+from finger_pin.core.buffers import build_work
+from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import call, copied
 from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
 from finger_pin.core.stepping.island_stepper import Part, Record
 from finger_pin.core.stepping.powers import POWERS, Powers, power_many
-from finger_pin.core.threads import in_threads
-from finger_pin.core.work import build_work
+from finger_pin.core.threads import in_threads, threads
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 
@@ -74,34 +75,35 @@ class IslandMotion:
         )
 
     def powers(self, times: Array) -> Array:
-        """Return powers of its rows and of the forces at its tips, shape (m, powers + 1), W, in the order of the books.
+        """Return powers of its rows and of its tip forces, shape (m, powers + 1), W, in the order of `Energies`.
 
         Inputs, forces and the motion of the base are those that the core computes itself.
 
         Args:
             times: Shape (m,), s; there must be a step.
         """
-        books, count = self.mechanism.books, len(times)
-        found = np.empty((count, len(books.powers) + 1))
-        parts = 1 if count < FEW else 2
+        energies, count = self.mechanism.energies, len(times)
+        found = np.empty((count, len(energies.powers) + 1))
+        parts = 1 if count < FEW else min(2, threads())
         while len(self._models) < parts:
             self._models.append(self._bound())
 
         def fill(thread: int) -> None:
             own = slice(thread * count // parts, (thread + 1) * count // parts)
-            between, booked = self._between(np.array(times[own])), np.zeros(len(books.stored) + len(books.powers))
+            between, booked = self._between(np.array(times[own])), np.zeros(len(energies.stored) + len(energies.powers))
             call(power_many, Powers(self._models[thread].address, between, booked, found[own]), POWERS)
 
         in_threads(fill, range(parts))
         return found
 
     def _bound(self) -> BoundModel:
-        """Return a model of the island with its inputs."""
+        """Return a further model of the island with its inputs."""
         part = self.part
         work = build_work(part.tables, part.laws, len(part.control.tension))
         return BoundModel(copied(part.tables), copied(part.control), work)
 
     @cached_property
     def _models(self) -> list[BoundModel]:
-        """Models that have served, one for each thread."""
-        return []
+        """Models that serve, one for each thread, the first the island's own: it goes no further."""
+        self.part.work.rows[SIDE] = 0.0
+        return [self.part.model]

@@ -10,20 +10,22 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.buffers import build_work
+from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.control import Control
-from finger_pin.core.evaluation.charts import place_all
+from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.jit import Unit, bound, copied, fits
 from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
-from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
+from finger_pin.core.stepping.error_propagation import judge_step
 from finger_pin.core.stepping.islands import Island
 from finger_pin.core.stepping.knots import KNOTTED, Knotted, advance_knotted
+from finger_pin.core.stepping.step_cuts import cut_step, survey_step
 from finger_pin.core.stepping.tableaus import Tableau
 from finger_pin.core.tables import Tables
-from finger_pin.core.work import build_work
 from finger_pin.description.routing import Array
 from finger_pin.laws.law import ContactLaw, Law
 
@@ -113,10 +115,14 @@ class Part:
             start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
             end=np.zeros(len(x)),
+            dense=np.zeros((len(tableau.dense), len(x))),
             drift=np.zeros(len(x)),
             kinks=np.zeros(len(tables.state)),
             joints=np.flatnonzero(~of_objects & led & judged),
             objects=np.flatnonzero(of_objects & led & judged),
+            cut=cut_step.address,
+            survey=survey_step.address if tables.touching else 0,
+            judge=judge_step.address if judged else 0,
         )
         self._block = bound(self._bound, core.INTEGRATION)
         self.joints, self.objects = self._bound.joints, self._bound.objects
@@ -162,7 +168,7 @@ class Part:
         return self._at, self._advance
 
     def _place(self, record: Record) -> None:
-        """Put a record where compiled code finds it, with the loops of motors if any run, and the knots if any."""
+        """Hand a record to compiled code, with the loops of motors and the knots, if any."""
         placed = record, self.drives, self.knots
         if all(one is other for one, other in zip(self._placed, placed, strict=True)):
             return
@@ -194,7 +200,7 @@ class Part:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
 
     def fits(self, tables: Tables, control: Control) -> bool:
-        """Return whether other tables and another control have room where these are bound."""
+        """Return whether other tables and another control have room in the bound ones."""
         return fits(self.tables, tables._replace(loaded=self.tables.loaded)) and fits(self.control, control)
 
     def renew(self, tables: Tables, control: Control, x: Array, attitude: Array, atol: Array) -> None:
@@ -222,11 +228,7 @@ class Part:
         )
 
     def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled by its attributes, many of which are addresses.
-
-        Raises:
-            TypeError: Always.
-        """
+        """Refuse with a TypeError to be copied or pickled by its attributes, many of which are addresses."""
         raise TypeError("an island under way holds addresses: its stepper is copied, and binds another")
 
     @property
@@ -253,8 +255,8 @@ class Part:
         twin.memory[core.STEP], twin.knots, twin.drives = _ANY, np.array(ends, dtype=float), self.drives
         return twin
 
-    def copy(self, judged: bool | None = None) -> Part:
-        """Return an independent part that goes on bit by bit alike; its error is estimated, if not told, as here."""
+    def copy(self, judged: bool | None = None, tolerances: float = 1.0) -> Part:
+        """Return an independent part at a share of its tolerances; its error is estimated, if not told, as here."""
         bound = self._bound
         return Part(
             self.island,
@@ -264,8 +266,8 @@ class Part:
             bound.x.copy(),
             bound.attitude.copy(),
             bound.tableau,
-            bound.rtol,
-            bound.atol.copy(),
+            bound.rtol * tolerances,
+            bound.atol * tolerances,
             bound.memory.copy(),
             self.judged if judged is None else judged,
         )

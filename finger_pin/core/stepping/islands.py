@@ -121,7 +121,7 @@ def select(tables: Tables, island: Island) -> Tables:
 
 
 def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the groups that some rows belong to, and their entries where these rows stand one after the other."""
+    """Return the groups of some rows, and their entries with these rows one after the other."""
     counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)
     present = np.flatnonzero(counts)
     ends = np.cumsum([0, *counts[present]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from finger_pin.core.evaluation.charts import place_bodies
+from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
 from finger_pin.core.evaluation.signals import book, book_moved, exert_alone, let_sleep, rouse, wake_since
 from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call_at, compiled
@@ -13,12 +13,12 @@ from finger_pin.core.stepping.interpolation import Between, step_at, within
 
 
 class Powers(NamedTuple):
-    """The steps of an island, and what is filled at the k times of their `Between`.
+    """The steps of an island, and their powers to be filled at the k times of their `Between`.
 
     Attributes:
         model: Address of a bound `Model` with the island's inputs.
         between: The steps, of which there must be one.
-        booked: Scratch, energies and powers of the rows, shape (books,).
+        booked: Scratch, energies and powers of the rows, shape (energies,).
         powers: Filled with the powers, and that of the forces at the tips, shape (k, powers + 1).
     """
 
@@ -39,7 +39,7 @@ def _attitude(b: Any, step: int) -> Any:
 
 @compiled
 def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
-    """Fill powers of the rows, the last of what is booked, and that of the forces at the tips."""
+    """Fill the powers of the rows, which are booked last, and that of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
     for i in range(count):
         out[i] = booked[booked.size - count + i]

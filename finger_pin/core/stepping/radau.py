@@ -16,7 +16,7 @@ from numpy.polynomial import Legendre
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import bound_at, call_at, compiled
 from finger_pin.core.model import MODEL
-from finger_pin.core.stepping.bends import rate_at
+from finger_pin.core.stepping.events import rate_at
 
 _COUNT = 4
 #: Nodes c, of a step: zeros of P_s - P_(s-1) on it.

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from finger_pin.core.collision.broad_phase import depart
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Vector, call_at, compiled
-from finger_pin.core.stepping.broad_phase import depart
-from finger_pin.core.stepping.law_branches import hold, release, strayed
+from finger_pin.core.stepping.kink_sides import hold, release, strayed
 from finger_pin.core.stepping.tableaus import Tableau
 
 # Entries of the memory that outlives a call.
@@ -17,7 +17,10 @@ TIME, STEP, LAST_STEP, LAST_ERROR, EVALUATIONS, JACOBIANS, FACTORISATIONS, ACCEP
 HELD_STEP, GOAL, WINDOW_START, WINDOW_END, DRIFT, OBJECT_DRIFT, BEHIND = range(10, 17)
 # Of the step that is tried: whether it begins anew, whether inputs have jumped since the last one, how long it was
 # before it was cut at a kink, or 0, and how long the one after the kink may be.
-FRESH, JUMPED, WHOLE, AFTER, MEMORY_SIZE = range(17, 22)
+FRESH, JUMPED, WHOLE, AFTER = range(17, 21)
+# What has come of the try; the share of it that is taken, that to try next, or 1, that after which a row has left its
+# side, and that at which bodies touch and part again.
+OUTCOME, PART, KEPT, SHARE, TOUCH, MEMORY_SIZE = range(21, 27)
 DONE, FULL, UNDERFLOW, NOT_FINITE, CREEPING, RUNAWAY = range(6)
 
 # So many tries in a row must advance by so much time each on average, s: a second at that pace would take hours.
@@ -44,10 +47,14 @@ class Integration(NamedTuple):
         start: Scratch, f(t, x) at the start of a step, shape (size,).
         r: Scratch, shape (size + 1,).
         end: Scratch, shape (size,).
+        dense: Coefficients of a step's interpolant, shape (rows of the tableau's dense, size).
         drift: Estimate of the error so far, shape (size,).
         kinks: Where each row was between the sides of its kink when the step began, shape (K,).
         joints: Coordinates whose error is estimated; without any nothing is, which saves a tenth.
         objects: Those of free objects, likewise.
+        cut: Address of the unit that cuts a step that was tried.
+        survey: Of the one that looks for touches in it; 0 without contacts.
+        judge: Of the one that carries the error over it; 0 where none is estimated.
     """
 
     model: int
@@ -61,14 +68,18 @@ class Integration(NamedTuple):
     start: Vector
     r: Vector
     end: Vector
+    dense: Matrix
     drift: Vector
     kinks: Vector
     joints: Indices
     objects: Indices
+    cut: int
+    survey: int
+    judge: int
 
 
 class Stretch(NamedTuple):
-    """What is integrated further, and room for a record of at most m steps.
+    """The motion to be integrated further, and room for a record of at most m steps.
 
     Attributes:
         integration: Address of the bound `Integration`.

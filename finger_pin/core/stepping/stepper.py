@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.control import HELD, Control
-from finger_pin.core.evaluation.charts import Charts
+from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.jit import copied, numbered, taken
 from finger_pin.core.stepping import rosenbrock as core
-from finger_pin.core.stepping.broad_phase import wake_all
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
 from finger_pin.core.stepping.islands import Island, find_islands, select, select_control, wiring
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
 from finger_pin.core.threads import in_threads
+from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 
@@ -27,6 +28,9 @@ from finger_pin.mechanism.mechanism import Mechanism
 Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
+
+# Of mechanisms that are wired alike.
+_ISLANDS: Remembered[list[Island]] = Remembered()
 
 # As often the error that is carried along counts.
 _TWICE = 2.0
@@ -70,7 +74,7 @@ class Stepper:
         self.judged = judged
         tables, laws = build_tables(mechanism), [table.law for table in mechanism.rows]
         self._charts, self._width, self._wiring = Charts.of(mechanism), mechanism.coordinates, wiring(tables, control)
-        self._islands = find_islands(tables, control)
+        self._islands = _islands(self._wiring, tables, control)
         self._free = [np.isin(tables.charts, island.coordinates) for island in self._islands]
         self._made_of, self._tables = (mechanism, control, x, tableau, rtol, atol, force, time), self._selected(tables)
         self.mechanism, self.parts = mechanism, list[Part]()
@@ -282,6 +286,12 @@ class Stepper:
         """Return a status in words, with a name for every number of the state; empty if nothing failed."""
         part = min(self.parts, key=lambda each: each.time)
         return failure(part, status, [names[at] for at in self.places(part.island)])
+
+
+def _islands(wires: bytes, tables: Tables, control: Control) -> list[Island]:
+    """Return the islands of a mechanism under its inputs, found anew only for another wiring."""
+    arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
+    return _ISLANDS.of((wires, control.kind, *map(len, arrays)), partial(find_islands, tables, control))
 
 
 def _groups_of(tables: Tables, island: Island) -> list[int]:

@@ -171,7 +171,7 @@ class _Steps:
 
     @property
     def exhausted(self) -> str:
-        """Why there must be no more steps: the last ones were too short, or there are too many; empty if there may."""
+        """The reason to stop, steps that are too short or too many; empty without one."""
         steps = len(self.dense)
         if steps > _MOST_STEPS:
             return f"after {_MOST_STEPS} steps the trajectory has reached the most that is kept in memory"

@@ -161,7 +161,7 @@ class _Reader:
         }
 
     def _solids(self, body: int) -> Table:
-        """Return the geoms of a body that the viewer shows, all where it hides all; meshes of moving bodies only."""
+        """Return the visible geoms of a body, or all if none is; meshes of moving bodies only."""
         model, kinds, found = self.model, self.mujoco.mjtGeom, {}
         own = np.flatnonzero(model.geom_bodyid == body)
         shown = own[model.geom_group[own] < _HIDDEN]

@@ -243,7 +243,7 @@ def _add_tendon(
     damping: float = 0.0,
     stiffness: float = 0.0,
 ) -> None:
-    """Add a tendon; one with stiffness pulls where its length is positive and is slack where it is negative."""
+    """Add a tendon; one with stiffness pulls at positive lengths and is slack at negative ones."""
     law = {"damping": _numbers(damping)} if stiffness == 0.0 else {"stiffness": _numbers(stiffness)}
     if stiffness != 0.0:
         law["springlength"] = _numbers(-_SLACK, 0)

@@ -83,7 +83,7 @@ class ActuatorReader(ElementReader):
         return {int(model.wrap_objid[k]): float(model.wrap_prm[k]) for k in pieces} if fixed else {}
 
     def _foreign(self, i: int) -> str | None:
-        """Return the reason why an actuator's target or computation is not carried over; None where it is."""
+        """Return the reason against carrying an actuator's target or computation over, or None."""
         model, mujoco = self.model, self.mujoco
         driven = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
         if driven not in ("joint", "jointinparent", "tendon"):
@@ -93,7 +93,7 @@ class ActuatorReader(ElementReader):
         return "a plugin computes it" if model.actuator_plugin[i] >= 0 else None
 
     def _law(self, i: int) -> tuple[float, float, float, float] | str:
-        """Return an actuator's law as in `laws`, or the reason why it has none."""
+        """Return an actuator's law as in `laws`, or the reason for its lack."""
         model, gains, biases = self.model, self.mujoco.mjtGain, self.mujoco.mjtBias
         kind = gains(int(model.actuator_gaintype[i])).name.removeprefix("mjGAIN_").lower()
         gain, bias = model.actuator_gainprm[i].tolist(), model.actuator_biasprm[i].tolist()

@@ -47,13 +47,13 @@ def obeyed(mujoco: Any, model: Any) -> Any:
 
 
 def without_counterpart(mujoco: Any, model: Any) -> list[str]:
-    """Return the flags of a model that mean nothing here: they are about how MuJoCo computes."""
+    """Return the flags of a model that mean nothing here: those of MuJoCo's way of computing."""
     enabled = _set(mujoco.mjtEnableBit, model.opt.enableflags) - {"override"}
     return sorted(disabled(mujoco, model) - set(_ZEROED) - _ASKED_FOR | enabled)
 
 
 def undriven(mujoco: Any, model: Any, actuator: int) -> str | None:
-    """Return the reason why an actuator does not act, or not as it seems; None where it does."""
+    """Return the reason for which an actuator does not act, or not as it seems, or None."""
     if "actuation" in disabled(mujoco, model):
         return "actuation is disabled in the model"
     if model.opt.disableactuator & (1 << int(model.actuator_group[actuator])):

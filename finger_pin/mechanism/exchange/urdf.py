@@ -9,12 +9,13 @@ from functools import lru_cache, partial
 import numpy as np
 import pinocchio as pin
 
+from finger_pin.description.caching import Remembered
 from finger_pin.description.hand import HandSettings
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import FingerDescription, Link
-from finger_pin.description.remembering import Remembered
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.joined_bodies import join_bodies
 from finger_pin.mechanism.rigid_body import Form, RigidBody
 from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shapes, palm_shapes
 
@@ -128,7 +129,7 @@ def build_hand(hand: HandSettings) -> RigidBody:
 
     def join() -> RigidBody:
         places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
-        return RigidBody.join(parts, places)
+        return join_bodies(parts, places)
 
     def weigh() -> RigidBody:
         joined = _HANDS.of((*placed, *(part.form for part in parts.values())), join)

@@ -166,9 +166,4 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
 
 
 #: The gap between a part of a body and a rounded prism; sizes of the latter from `prism_parameters`.
-PRISM = Gap(
-    name="rounded prism",
-    parameters=("radius", "disc", "along", *NUMBERS),
-    value=_value,
-    slopes=_slopes,
-)
+PRISM = Gap(name="rounded prism", parameters=("radius", "disc", "along", *NUMBERS), value=_value, slopes=_slopes)

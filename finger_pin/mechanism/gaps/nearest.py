@@ -164,7 +164,7 @@ def _expanded(y: Any, p: Any, frame: Any, pulls: Any, u: float, v: float, s: flo
 
 
 def _along(y: Any, p: Any, frame: Any, pulls: Any, start: Any, step: Any) -> Any:
-    """Return a share of a step at which F is about least: where its slope, which rises, is small, or all of it."""
+    """Return the share of a step of about the least F: of a small slope, which rises, or the whole step."""
     f, g, e = frame
     x, y_, z = (
         step[0] * f[0] + step[1] * g[0] + step[2] * e[0],

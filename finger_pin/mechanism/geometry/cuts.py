@@ -32,7 +32,7 @@ class Groove(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A tendon where it crosses a joint, at rest in one of the two links.
+    """The crossing of a tendon over a joint, at rest in one of the two links.
 
     Attributes:
         tendon: Its name.

@@ -200,7 +200,7 @@ def _visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:
 
 
 def _moved(pieces: tuple[WoundSpan | Arc, ...], place: pin.SE3, first: int) -> tuple[WoundSpan | Arc, ...]:
-    """Return the pieces of a finger's tendon as those of a hand, where its joints come after others."""
+    """Return the pieces of a finger's tendon as those of a hand, with its joints after others."""
     moved: list[WoundSpan | Arc] = []
     for piece in pieces:
         if isinstance(piece, Arc):

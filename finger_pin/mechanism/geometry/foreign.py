@@ -66,7 +66,7 @@ def placed_solids(solids: pin.GeometryModel, turns: list[Array]) -> Iterator[tup
 
 
 def _onwards(body: RigidBody, index: int) -> Array:
-    """Return the place where the finger goes on from a joint, in its frame: the next joint, or the tip."""
+    """Return the next place of the finger after a joint, in its frame: the next joint, or the tip."""
     model = body.model
     after = [joint for joint in range(index + 1, model.njoints) if int(model.parents[joint]) == index]
     if after:

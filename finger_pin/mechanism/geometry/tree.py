@@ -131,7 +131,7 @@ def _stretch(piece: Piece, rotations: Array, places: Array) -> Array:
 
 
 def _touch(piece: Piece, point: Array, direction: Array) -> Array:
-    """Return the point where the straight part from a point meets the wrap."""
+    """Return the meeting point of the straight part from a point with the wrap."""
     flat = np.array([1.0, 1.0, 0.0]) if piece.shape is CYLINDER else np.ones(3)
     a, d = point * flat, direction * flat
     square, half = d @ d, a @ d

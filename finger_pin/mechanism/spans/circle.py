@@ -73,7 +73,7 @@ def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
 
 
 def _inside(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
-    """Return `path` of two lines that meet on the circle where their sum is least: both meet its normal alike.
+    """Return `path` of two lines with the least sum that meet on the circle, at equal angles to its normal.
 
     With f(r, psi) the distance of an end from the point psi further on the circle, P = f(r_0, psi) + f(r_1, phi - psi)
     and dP/dpsi = 0. So psi does not enter the first derivatives of P; its own follow from those of dP/dpsi.
@@ -101,7 +101,7 @@ def _inside(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
 
 
 def _meeting(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
-    """Return psi where dP/dpsi, which rises, is zero: Newton's steps, halved where they leave the bracket."""
+    """Return the zero psi of dP/dpsi, which rises: Newton's steps, halved if they leave the bracket."""
     low, high = max(0.0, angle - math.acos(radius / r1)), min(angle, math.acos(radius / r0))
     psi = 0.5 * (low + high)
     for _ in range(_MOST_STEPS):

@@ -9,7 +9,7 @@ from finger_pin.mechanism.spans.span import Span
 
 
 def straight_value(y: Any, p: Any, out: Any) -> None:
-    """Fill in length, no turn, and pull; no pull where the points coincide."""
+    """Fill in length, no turn, and pull; no pull between coincident points."""
     length = math.sqrt((y[3] - y[0]) ** 2 + (y[4] - y[1]) ** 2 + (y[5] - y[2]) ** 2)
     share = 1.0 / length if length > 0.0 else 0.0
     out[0] = length

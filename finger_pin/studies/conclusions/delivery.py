@@ -146,7 +146,7 @@ def check_delivery(scenario: Scenario) -> None:
 
 
 def crossing(values: Array, deviations: Array, level: float = BROKEN) -> float:
-    """Return the value where deviations first exceed a level, by interpolation; infinite where they do not."""
+    """Return the first value with a deviation above a level, by interpolation; infinite without one."""
     above = np.flatnonzero(deviations > level)
     if not above.size:
         return float("inf")

@@ -1,4 +1,4 @@
-"""Findings of the experiments: the paper's conclusions as claims, the measurements, and whether these bear them out."""
+"""Findings of the experiments: the paper's conclusions as claims, the measurements, and the verdicts."""
 
 from __future__ import annotations
 
@@ -233,7 +233,7 @@ def delivery_findings(found: PassiveDelivery) -> list[Finding]:
 
 
 def _senses(found: FrictionInfluence) -> list[tuple[str, str, bool]]:
-    """Return every sense of "more crucial": its meaning, the measurement, and whether it holds."""
+    """Return every sense of "more crucial": its meaning, the measurement, and the verdict."""
     as_is = _row(found.joint, 1.0)
     here = int(np.argmin(np.abs(found.minimum.runs.error - found.joint.runs.error[as_is])))
     joint, tendon = found.elasticity_joint[here], found.elasticity_tendon[here]

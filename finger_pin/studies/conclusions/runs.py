@@ -195,7 +195,7 @@ def swinging_to_lock(scenario: Scenario) -> Scenario:
 
 
 def internal_passive_tension(scenario: Scenario) -> tuple[float, ...]:
-    """Return the tension that (21), (22) plan for the passive tendons where no torque is asked for: lambda f^k, N."""
+    """Return the tension that (21), (22) plan for the passive tendons at zero torque: lambda f^k, N."""
     routing = Routing.from_description(scenario.finger)
     internal = routing.force_closure().tension
     level = np.max(expand(scenario.controller.minimum_tension, len(internal)) / internal)

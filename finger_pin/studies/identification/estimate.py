@@ -1,4 +1,4 @@
-"""The estimate: least squares with a noise for every signal, weighed by how many of its samples are independent."""
+"""The estimate: least squares with a noise for every signal, weighed by the number of its independent samples."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from finger_pin.studies.identification.problem import Problem, minus_twice_likel
 
 # Rounds of steps and weights in turn; steps in each, and how many of them in a row may fail.
 _ROUNDS, _STEPS, _FAILS = 5, 40, 3
-# Where steps end, by how much minus twice the likelihood may still fall: of motions, whose own errors it feels, and of
-# closed forms.
-_GAIN, _EXACT = 1e-3, 1e-9
+# Where steps end, by how much minus twice the likelihood may still fall: of motions, whose own errors it feels, where
+# only means count, where it is felt, where it is hardly felt; and of closed forms.
+_ROUGHLY, _NEARLY, _GAIN, _EXACT = 1.0, 0.05, 1e-3, 1e-9
+# The longest step, of the range of a parameter.
+_FARTHEST = 0.3
 # Damping at first and at the least, of the information; how it falls and rises (Levenberg, Marquardt).
 _DAMPING, _LESS, _MORE = 1e-3, 0.2, 30.0
 # What a motion's own errors may hide of what a step gains: mostly, at the most, and of every sample where it is far
 # from what was recorded.
 _FEIGNED, _MOST_FEIGNED, _BY_SAMPLE = 0.05, 1.0, 1e-3
-# Parts of what a step promises: from what gain on it is taken, and up to what error of it the slopes serve again.
+# Parts of what a step promises: from what gain on it is taken; up to what error of it its slopes serve again, or bent
+# ones from what gain on.
 _TAKEN, _SERVED = 0.05, 0.3
 #: What a squared residual u counts for where outliers are to count less, and how fast that grows.
 LOSSES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
@@ -111,27 +114,38 @@ def _descend(
     slopes: Sequence[Array] | None,
     scale: Array | None,
 ) -> tuple[Array, Sequence[Array], Sequence[Array], bool]:
-    """Return where the likelihood is greatest, the residuals, the slopes of the last step, and whether it was found.
+    """Return the place of the greatest likelihood, its residuals, the slopes of the last step, and success.
 
     Steps are those of Gauss and Newton, damped. A run costs less than its slopes: these are made anew only where a
-    step gains much less than they promise.
+    step does not gain what they promise. Of motions they are bent to agree with it while far from the end: over whole
+    steps the little leaps of a motion count less than in slopes at one place.
     """
     fresh, damping, failed = slopes is None, _DAMPING, 0
     slopes = problem.slopes(z) if slopes is None else list(slopes)
-    enough, feigned = (_GAIN, _FEIGNED) if any(signal.ordered for signal in problem.signals) else (_EXACT, 0.0)
+    moves = any(signal.ordered for signal in problem.signals)
+    gain = _GAIN if problem.finely else _ROUGHLY if problem.means else _NEARLY
+    enough, feigned = (gain, _FEIGNED) if moves else (_EXACT, 0.0)
     count = float(sum(w * len(e) for w, e in zip(shares, residuals, strict=True)))
     hidden = _MOST_FEIGNED if problem.finely else max(_MOST_FEIGNED, _BY_SAMPLE * count)
+    bending = moves and not problem.finely
     for _ in range(_STEPS):
         noise = _noise(problem, residuals) if scale is None else scale
         met, inner, pull = _normal(problem, residuals, slopes, shares, noise, loss)
         move, promised = _step(problem, z, free, inner, pull, damping)
+        if promised < 0.0:
+            # The bounds have cut it wrongly.
+            damping *= _MORE
+            continue
         if promised < enough:
             return z, residuals, slopes, True
         there = problem.residuals(z + move)
         sums = [minus_twice_likelihood(each, shares, problem.groups) for each in (met, _counted(there, noise, loss)[0])]
         gained = sums[0] - sums[1]
         taken, served = gained > _TAKEN * promised, abs(gained - promised) < _SERVED * promised + feigned
+        if bending:
+            served = gained > _SERVED * promised - feigned
         if taken:
+            before = residuals
             z, residuals, failed, damping = z + move, there, 0, max(damping * _LESS, _DAMPING)
         elif fresh:
             failed, damping = failed + 1, damping * _MORE
@@ -142,14 +156,24 @@ def _descend(
         if not served and (taken or not fresh):
             slopes, fresh = problem.slopes(z), True
         elif taken:
-            fresh = False
+            slopes, fresh = _bent(problem, slopes, move, before, there) if bending else slopes, False
     return z, residuals, slopes, False
+
+
+def _bent(
+    problem: Problem, slopes: Sequence[Array], move: Array, before: Sequence[Array], after: Sequence[Array]
+) -> list[Array]:
+    """Return the slopes that agree with a step, and change the least (Broyden)."""
+    low, high = problem.box
+    way = move / (high - low) ** 2
+    way /= move @ way
+    return [j + np.outer(b - a - j @ move, way) for j, a, b in zip(slopes, before, after, strict=True)]
 
 
 def _normal(
     problem: Problem, residuals: Sequence[Array], slopes: Sequence[Array], shares: Array, scale: Array, loss: str
 ) -> tuple[Sequence[Array], Array, Array]:
-    """Return the residuals as they count, and half of what minus twice the likelihood bends and slopes there."""
+    """Return the weighed residuals, and half of the curvature and slope of minus twice the likelihood there."""
     met, growth = _counted(residuals, scale, loss)
     factors = shares / _noise(problem, met) ** 2
     grown = [each[:, None] * j for each, j in zip(growth, slopes, strict=True)]
@@ -161,7 +185,7 @@ def _normal(
 def _step(
     problem: Problem, z: Array, free: NDArray[np.bool_], inner: Array, pull: Array, damping: float
 ) -> tuple[Array, float]:
-    """Return a step within the bounds, and by how much minus twice the likelihood falls with it to second order."""
+    """Return a step within the bounds, and the fall of minus twice the likelihood with it to second order."""
     low, high = problem.box
     width = high - low
     size = np.diag(inner) * width**2
@@ -177,11 +201,12 @@ def _step(
         if not beyond.any():
             break
         loose &= ~beyond
+    move *= min(1.0, _FARTHEST / max(float(np.max(np.abs(move) / width, initial=0.0)), 1e-300))
     return move, -float(2.0 * pull @ move + move @ inner @ move)
 
 
 def _counted(residuals: Sequence[Array], scale: Array, loss: str) -> tuple[list[Array], list[Array]]:
-    """Return the residuals as they count, their squares summed, and how fast they grow with the residuals."""
+    """Return the weighed residuals, the sum of their squares, and their derivatives by the residuals."""
     if loss == "linear":
         return list(residuals), [np.ones(len(e)) for e in residuals]
     rho, growth = LOSSES[loss]

@@ -23,14 +23,9 @@ from finger_pin.studies.identification.estimate import LOSSES, fit
 from finger_pin.studies.identification.ledger import Ledger, digest
 from finger_pin.studies.identification.motions import RecordedMotion, windows
 from finger_pin.studies.identification.outcome import outcome, write_outcome
-from finger_pin.studies.identification.problem import (
-    Problem,
-    RecordedSignal,
-    RecordingModel,
-    Stopped,
-)
+from finger_pin.studies.identification.problem import Problem, RecordingModel, Stopped
 from finger_pin.studies.identification.readings import SteadyReadings
-from finger_pin.studies.identification.recordings import Recording, read_recording, unit_of
+from finger_pin.studies.identification.recordings import RecordedSignal, Recording, read_recording, unit_of
 from finger_pin.studies.identification.searching import Progress, Work, starting_points
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@ class Side:
 
 
 def covariance(problem: Problem, found: Fit) -> Array:
-    """Return the linearised covariance of z, shape (p, p); pseudo-inverse where a direction is free."""
+    """Return the linearised covariance of z, shape (p, p); a pseudo-inverse for free directions."""
     low, high = problem.box
     width = high - low
     scaled = information(problem, found) * np.outer(width, width)
@@ -94,7 +94,7 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
 
 
 def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
-    """Return where the root of the rise, nearly straight, reaches the level's, from points on either side of it."""
+    """Return the crossing of the rise's root, nearly straight, with the level's, from points on either side."""
     target = math.sqrt(LEVEL)
     if math.isinf(outer[0]):
         return inner[0] * min(4.0, target / max(inner[1], 1e-3))

@@ -97,7 +97,7 @@ class Ledger:
         return found
 
     def reached(self, name: str, start: Array) -> Array:
-        """Return where a search was when it was stopped, shape (p,); its start if it was not."""
+        """Return the last place of a search that was stopped, shape (p,), or its start."""
         return np.array(self._done.get(f"{name} so far", start), dtype=float)
 
     def side(self, name: str, work: Callable[[], Side]) -> Side:

@@ -19,12 +19,11 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import fitted
 from finger_pin.simulation.motions import SampledMotion
-from finger_pin.simulation.prepared import refuse_unknown
 from finger_pin.simulation.recording import recorded
 from finger_pin.simulation.run_arrays import RunArrays
-from finger_pin.simulation.sensitivity import changed, nearby
+from finger_pin.simulation.sensitivity import changed, nearby, on_steps_of
 from finger_pin.simulation.setup import Setup
-from finger_pin.simulation.variables import coordinates, variables
+from finger_pin.simulation.variables import coordinates
 from finger_pin.studies.identification.problem import At, Own, own_number
 from finger_pin.studies.identification.recordings import Recording
 
@@ -40,8 +39,8 @@ _NEAR = 0.3
 _FIRST = 9
 # Relative error of slopes: a search needs no more, and at its end residuals and slopes are nearly orthogonal.
 _ALLOWED = 1e-2
-# Tolerances where numbers are told finely, of a scenario's; never smaller than this.
-_FINER, _FINEST = 0.1, 1e-10
+# Between which tolerances are, unless a scenario asks for others.
+_FINEST, _ROUGHEST = 1e-10, 1e-4
 # Where slopes are wilder than so many ranges of the signal, a larger change and steps of their own serve.
 _WILD, _COARSE = 30.0, 1e-3
 
@@ -83,7 +82,7 @@ class RecordedMotion:
         self.scenario = read_scenario(table)
         self._finger = finger
         self._last: tuple[Any, list[Array], tuple[Setup, Trajectory] | None] | None = None
-        self._fine = False
+        self._factor = 1.0
 
     def compute(self, scenario: Scenario, own: Mapping[str, float]) -> list[Array]:
         """Return the outputs at the recorded times, shape (m,) each; not a number if the run fails."""
@@ -91,9 +90,9 @@ class RecordedMotion:
         self._last = ((scenario, dict(own)), computed, motion)
         return computed
 
-    def refine(self) -> None:
-        """Integrate from now on with a tenth of the tolerances."""
-        self._fine, self._last = True, None
+    def tune(self, factor: float) -> None:
+        """Integrate from now on with so much larger tolerances than the scenario asks for."""
+        self._factor, self._last = factor, None
 
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of the outputs by the values, shape (m, p) each.
@@ -115,12 +114,16 @@ class RecordedMotion:
         others = {k: self._setup(*there[k]) for k in feeling}
         near = dict(zip(feeling, nearby(*motion, list(others.values()), changes[feeling], _ALLOWED), strict=True))
         ranges = [float(np.ptp(each)) for each in computed]
+        base = computed
+        if not motion[1].islands:
+            setup = self._setup(*here)
+            base = self._outputs(setup, on_steps_of(motion[1], setup), here[1])
 
         def column(k: int) -> list[Array]:
             if there[k] == here:
                 return [np.zeros(len(each)) for each in computed]
             found = self._outputs(others.get(k, motion[0]), near.get(k, motion[1]), there[k][1])
-            slopes = [(f - c) / changes[k] for f, c in zip(found, computed, strict=True)]
+            slopes = [(f - c) / changes[k] for f, c in zip(found, base if k in near else computed, strict=True)]
             wild = any(
                 not np.max(np.abs(each)) * float(sizes[k]) <= _WILD * size
                 for each, size in zip(slopes, ranges, strict=True)
@@ -159,7 +162,7 @@ class RecordedMotion:
         """Return the outputs, not numbers if the motion fails, and the motion."""
         try:
             setup = self._setup(scenario, own)
-            trajectory = setup.integrate(scenario=_finer(setup.scenario) if self._fine else None)
+            trajectory = setup.integrate(scenario=_tuned(setup.scenario, self._factor))
             failed = bool(trajectory.failure)
         except IntegrationError:
             failed = True
@@ -181,9 +184,9 @@ class RecordedMotion:
         """Return the variables of the outputs with a delay, at the instants that they are of."""
         names = dict.fromkeys(key.partition(".")[0] for key, own in delays.items() if own == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
-        refuse_unknown(f"{self._entry}.outputs", names, variables(setup.loop))
         motions = SampledMotion(setup.loop, trajectory, times, tuple(names))
-        return RunArrays(recorded(motions, tuple(names)), coordinates(setup.scenario, setup.loop, times), {})
+        found = recorded(motions, tuple(names), f"{self._entry}.outputs")
+        return RunArrays(found, coordinates(setup.scenario, setup.loop, times), {})
 
     def _one(self, found: RunArrays, name: str) -> Array:
         """Return one column of a variable, by its labels."""
@@ -250,12 +253,14 @@ class RecordedMotion:
             )
 
 
-def _finer(scenario: Scenario) -> Scenario:
-    """Return a scenario with a tenth of its tolerances."""
+def _tuned(scenario: Scenario, factor: float) -> Scenario:
+    """Return a scenario with so much larger tolerances."""
     own = scenario.simulation
-    rtol, atol = (min(each, max(_FINER * each, _FINEST)) for each in (own.rtol, own.atol_scale))
-    finer = own.model_copy(update={"rtol": rtol, "atol_scale": atol})
-    return scenario.model_copy(update={"simulation": finer})
+    rtol, atol = (
+        min(max(factor * each, min(each, _FINEST)), max(each, _ROUGHEST)) for each in (own.rtol, own.atol_scale)
+    )
+    tuned = own.model_copy(update={"rtol": rtol, "atol_scale": atol})
+    return scenario.model_copy(update={"simulation": tuned})
 
 
 def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:

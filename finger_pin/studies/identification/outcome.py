@@ -20,7 +20,8 @@ from finger_pin.simulation.netcdf import save
 from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit
 from finger_pin.studies.identification.intervals import LEVEL, Side, free_directions
-from finger_pin.studies.identification.problem import Problem, RecordedSignal, minus_twice_likelihood
+from finger_pin.studies.identification.problem import Problem, minus_twice_likelihood
+from finger_pin.studies.identification.recordings import RecordedSignal
 from finger_pin.studies.keys import describe, split
 
 if TYPE_CHECKING:
@@ -162,11 +163,7 @@ def _signals(problem: Problem, best: Fit) -> dict[str, Any]:
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
         "noise": ("signal", best.noise[first], {"long_name": "rms of the residuals, in the unit of the signal"}),
-        "replicate_noise": (
-            "signal",
-            [_replicates(signals[k]) for k in first],
-            {"long_name": "rms of equal readings"},
-        ),
+        "replicate_noise": ("signal", [_replicates(signals[k]) for k in first], {"long_name": "rms of equal readings"}),
         "signal_samples": ("signal", np.bincount(whole["signal_index"], minlength=len(first))),
         "signal_correlation": ("signal", best.correlation[first], {"units": "1", "long_name": "of neighbours"}),
         "independent_share": ("signal", best.weights[first], {"units": "1", "long_name": "(1 - rho) / (1 + rho)"}),

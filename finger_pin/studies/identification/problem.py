@@ -15,14 +15,17 @@ from finger_pin.description.family import Family
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.studies.identification.recordings import RecordedSignal
 
+# Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
+_FINER, _ROUGHER, _MEANS = 0.1, 10.0, 40
 #: What may be found of an output itself, besides the scenario's numbers.
 OF_OUTPUTS = ("offset", "scale", "delay")
 
 
 @dataclass(frozen=True)
 class Own:
-    """A number of a recording's own that is found beside the parameters, such as where a joint starts."""
+    """A number of a recording's own that is found beside the parameters, such as the start of a joint."""
 
     key: str
     low: float
@@ -51,40 +54,13 @@ class RecordingModel(Protocol):
     def slopes(self, at: At, values: Array, sizes: Array) -> list[Array]:
         """Return the derivatives of that by the values, shape (m, p) each, by changes of given sizes."""
 
-    def refine(self) -> None:
-        """Compute from now on with smaller errors, where there are any."""
+    def tune(self, factor: float) -> None:
+        """Compute from now on with the errors asked for times a factor."""
 
 
 def own_number(own: Mapping[str, float], recording: str, output: str, what: str, default: float = 0.0) -> float:
     """Return the offset, scale or delay of an output that is being found."""
     return own.get(f"recordings.{recording}.{output}.{what}", default)
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedSignal:
-    """An output of a recording.
-
-    Attributes:
-        recording: Name of the recording.
-        name: variable.label.
-        unit: SI unit.
-        measured: Shape (m,), those that are numbers.
-        rows: Which rows of the recording they are, shape (m,).
-        instant: Time of each, s; of steady readings its number.
-        load: Input of the model there; not a number where there are several.
-        alike: The number of the group of equal readings that each is of, shape (m,).
-        ordered: Whether its samples follow each other in time, so that neighbours may err alike.
-    """
-
-    recording: str
-    name: str
-    unit: str
-    measured: Array
-    rows: NDArray[np.intp]
-    instant: Array
-    load: Array
-    alike: NDArray[np.intp]
-    ordered: bool
 
 
 class Stopped(Exception):
@@ -93,7 +69,7 @@ class Stopped(Exception):
 
 @dataclass(eq=False)
 class Problem:
-    """Recordings and the parameters to be found in them, searched for as logarithms where they are positive.
+    """Recordings and the parameters to be found in them; positive ones are searched for as logarithms.
 
     Attributes:
         scenario: Scenario with all other numbers.
@@ -107,6 +83,7 @@ class Problem:
         evaluations: Number of scenarios computed.
         best: The least objective so far, and where.
         finely: Whether the errors of what is computed are smaller than the scenario asks.
+        means: Of how many samples in a row, at the most, the mean is met in place of each, by signal; none: of one.
     """
 
     scenario: Scenario
@@ -120,6 +97,7 @@ class Problem:
     evaluations: int = 0
     best: tuple[float, Array] = (math.inf, np.zeros(0))
     finely: bool = False
+    means: Sequence[int] = ()
 
     def __post_init__(self) -> None:
         """Check that every key allows its bounds; numbers of the recordings' own join the parameters."""
@@ -190,7 +168,7 @@ class Problem:
         computed = [
             each for model, at in zip(self.models, self._places(), strict=True) for each in model.compute(*at(values))
         ]
-        residuals = [s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)]
+        residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
         if not all(np.isfinite(e).all() for e in residuals):
             return [np.full(len(e), np.inf) for e in residuals]
         objective = minus_twice_likelihood(residuals, np.ones(len(residuals)), self.groups)
@@ -213,7 +191,7 @@ class Problem:
         ]
         self.evaluations += 2 * len(z)
         stretch = np.where(self.logarithmic, values, 1.0)
-        slopes = [-each[s.rows] * stretch for each, s in zip(found, self.signals, strict=True)]
+        slopes = self._smooth([-each[s.rows] * stretch for each, s in zip(found, self.signals, strict=True)])
         self._slopes = (z.copy(), slopes)
         return slopes
 
@@ -232,15 +210,48 @@ class Problem:
 
         Where thousands of samples tell a number, it jumps by as much as a quarter of what ends an interval.
         """
-        twin = self.alone()
-        twin._slopes, twin.finely = None, True
-        for model in twin.models:
-            model.refine()
+        twin = self._tuned(_FINER)
+        twin.finely = True
         return twin
 
+    def rough(self) -> Problem:
+        """Return the same problem for means over some cycles of motions, computed with larger errors.
+
+        Where something rings, a likelihood of samples has a minimum for every cycle by which a model is late; that of
+        means over some cycles has few.
+        """
+        twin = self._tuned(_ROUGHER)
+        twin.means = self._stretches()
+        return twin
+
+    def averaged(self, values: Sequence[Array]) -> list[Array]:
+        """Return the means that count roughly of residuals of every signal, or of their slopes."""
+        return _means(values, self._stretches())
+
+    def _stretches(self) -> list[int]:
+        """Return the number of samples in a row whose mean counts in rough searches, by signal."""
+        groups, count = self.groups, [len(signal.measured) for signal in self.signals]
+        size = np.bincount(groups, count)[groups]
+        share = np.minimum(size / max(_MEANS, 2 * len(self.keys)), count)
+        return [max(int(n), 1) if s.ordered else 1 for s, n in zip(self.signals, share, strict=True)]
+
+    def _tuned(self, factor: float) -> Problem:
+        twin = self.alone()
+        twin._slopes = None
+        for model in twin.models:
+            model.tune(factor)
+        return twin
+
+    def _smooth(self, values: list[Array]) -> list[Array]:
+        """Return means of as many samples in a row as are asked for."""
+        return _means(values, self.means) if self.means else values
+
     def join(self, twin: Problem) -> None:
-        """Add the evaluations of a twin, and take its best point if that is better."""
+        """Add the evaluations of a twin, and take its best point if that is better, or if there is none yet."""
         self.evaluations += twin.evaluations
+        if list(twin.means) != list(self.means):
+            self.best = self.best if len(self.best[1]) else (math.inf, twin.best[1])
+            return
         self._slopes = twin._slopes or self._slopes
         self.best = min(self.best, twin.best, key=lambda each: each[0])
 
@@ -267,6 +278,12 @@ class Problem:
         return Problem(self.scenario, *bounds, self.models, signals, self.held, self.stop)
 
 
+def _means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
+    """Return means of so many samples in a row."""
+    pairs = zip(values, counts, strict=True)
+    return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]
+
+
 def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
     """Return the number of independent samples of every group of signals, and their mean square."""
     count, squares = np.zeros((2, int(groups.max(initial=-1)) + 1))
@@ -277,7 +294,7 @@ def pooled(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp])
 
 
 def minus_twice_likelihood(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> float:
-    """Return the sum of w n log(SSE / n), least where the likelihood is greatest; a noise for each group of signals."""
+    """Return the sum of w n log(SSE / n), minus twice the log-likelihood; a noise for each group of signals."""
     count, square = pooled(residuals, weights, groups)
     there = count > 0.0
     return float(np.sum(count[there] * np.log(np.maximum(square[there], 1e-300))))

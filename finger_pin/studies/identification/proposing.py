@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def propose(
         scaled = information * np.outer(before, before)
         found[name] = (float(np.linalg.slogdet(scaled)[1]), np.sqrt(np.diag(np.linalg.inv(scaled))) * before)
     order = sorted(found, key=lambda name: -found[name][0])
-    long_name = "of the information over what is known without it"
+    long_name = "of the information over that without it"
     return xr.Dataset(
         {
             "log_determinant": (
@@ -96,12 +97,13 @@ def _check(
         if not table:
             raise InputError(entry, "must have at least one entry")
     for key, bounds in parameters.items():
-        if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
+        pair = np.shape(bounds) == (2,) and all(isinstance(each, Real) for each in bounds)
+        if not (pair and -np.inf < bounds[0] < bounds[1] < np.inf):
             raise InputError(f"parameters.{key}", "must be the least and the greatest value", bounds)
     for entry, numbers in (("outputs", outputs), ("known", known)):
         for key, value in numbers.items():
-            if not 0.0 < value < np.inf:
-                raise InputError(f"{entry}.{key}", "must be above 0", value)
+            if not (isinstance(value, Real) and 0.0 < value < np.inf):
+                raise InputError(f"{entry}.{key}", "must be a number above 0", value)
     for key in known:
         if key not in parameters:
             raise InputError(f"known.{key}", f"is none of the parameters {', '.join(parameters)}")

@@ -95,7 +95,7 @@ class SteadyReadings:
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def refine(self) -> None:
+    def tune(self, factor: float) -> None:
         """Do nothing: a closed form has no errors."""
 
     def _place(self, where: str, label: str, names: Sequence[str]) -> int:

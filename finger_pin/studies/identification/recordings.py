@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.recordings.bench import Column, RecordingSettings
 from finger_pin.description.recordings.units import in_si
@@ -45,6 +46,33 @@ _MISSING = ("na", "n/a", "null", "none", "-")
 
 
 @dataclass(frozen=True, eq=False)
+class RecordedSignal:
+    """An output of a recording.
+
+    Attributes:
+        recording: Name of the recording.
+        name: variable.label.
+        unit: SI unit.
+        measured: Shape (m,), those that are numbers.
+        rows: Which rows of the recording they are, shape (m,).
+        instant: Time of each, s; of steady readings its number.
+        load: Input of the model there; not a number where there are several.
+        alike: The number of the group of equal readings that each is of, shape (m,).
+        ordered: Whether its samples follow each other in time, so that neighbours may err alike.
+    """
+
+    recording: str
+    name: str
+    unit: str
+    measured: Array
+    rows: NDArray[np.intp]
+    instant: Array
+    load: Array
+    alike: NDArray[np.intp]
+    ordered: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Recording:
     """A recording in SI; m rows.
 
@@ -66,7 +94,7 @@ class Recording:
 
 
 def unit_of(name: str) -> str:
-    """Return the SI unit of ``variable.label``; empty where it is not known."""
+    """Return the SI unit of ``variable.label``; empty for an unknown one."""
     return VARIABLES.get(name.partition(".")[0], "")
 
 
@@ -156,7 +184,7 @@ def read_table(entry: str, path: Path) -> dict[str, Array | Sequence[float | str
 
 
 def _number(cell: str, point: str) -> float | str:
-    """Return the number in a cell, not one where it is empty; a word as it stands."""
+    """Return the number in a cell, NaN for an empty one; a word as it stands."""
     try:
         return float(cell.replace(point, ".") or "nan")
     except ValueError:
@@ -164,6 +192,6 @@ def _number(cell: str, point: str) -> float | str:
 
 
 def _numbers(values: Any) -> Any:
-    """Return a column as an array; of objects where there are words in it."""
+    """Return a column as an array, of objects if it has words."""
     words = not isinstance(values, np.ndarray) and any(isinstance(each, str) for each in values)
     return np.array(list(values), dtype=object) if words else np.asarray(values, dtype=float)

@@ -12,6 +12,8 @@ from finger_pin.description.routing import Array
 AXES = "xyz"
 # Least extent of a side, in parts of the largest, so that flat things have a box.
 _THINNEST = 0.2
+# Points that labels stand away from their axis, so that they clear the ticks'.
+_LABEL = 8.0
 
 
 def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
@@ -30,7 +32,7 @@ def space(part: SubFigure, corners: Array, unit: str) -> Axes3D:
     for index, name in enumerate(AXES):
         middle = 0.5 * (low + high)[index]
         getattr(axes, f"set_{name}lim")(middle - 0.52 * span[index], middle + 0.52 * span[index])
-        getattr(axes, f"set_{name}label")(f"{name} ({unit})")
+        getattr(axes, f"set_{name}label")(f"{name} ({unit})", labelpad=_LABEL)
         axis = getattr(axes, f"{name}axis")
         if high[index] - low[index] < 1e-6 * most:
             axis.set_ticks([round(middle, 9) + 0.0])

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from finger_pin.mechanism.books import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
 from finger_pin.views.plots.lines import shade, trace
 from finger_pin.views.plots.panels import labelled, legend, logarithmic, sheet, stack, title
@@ -41,14 +41,16 @@ _COLOURS = (
     *("yellowgreen", "darkolivegreen", "sienna", "mediumpurple", "rosybrown"),
 )
 _MILLI = 1e3
+# Parts of the intake: less is stored as good as never, and less of a loss is thinner than a line.
+_STORED, _LOST = 1e-9, 1e-3
 
 
 @styled
 def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw the energy account from a result.
 
-    (a) Every stored energy that is not zero throughout, mJ. (b) What has been supplied, mJ, and on top of each other
-    what has been lost; with the change of the stored energy this must reach what was supplied. (c) What the
+    (a) Every stored energy but traces, mJ. (b) What has been supplied, mJ, and on top of each other what has been
+    lost, named where it shows; with the change of the stored energy this must reach what was supplied. (c) What the
     account cannot explain, as a part of the intake: the most that was supplied, or taken from store.
 
     Args:
@@ -58,9 +60,11 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
     """
     time = result["time"].values
     stored, coming, lost = (entries(result, kind) for kind in (STORED, SUPPLIED, LOST))
+    supplied, total = (np.sum([each.values for each in kind.values()], axis=0) for kind in (coming, stored))
+    intake = float(np.max(np.abs(supplied) + np.maximum(total[0] - total, 0.0)))
     # There is always one panel: that of the kinetic energy, which comes first.
-    shown = [each for index, each in enumerate(stored.values()) if np.any(each.values) or not index]
-    supplied = np.sum([each.values for each in coming.values()], axis=0)
+    traces = [np.max(np.abs(each.values)) <= _STORED * intake for each in stored.values()]
+    shown = [each for index, each in enumerate(stored.values()) if not (index and traces[index])]
     figure, (left, right) = sheet([(5.1, max(6.6, 1.35 * len(shown))), (5.9, 6.6)], width, titles)
     strips = stack(left, [labelled(each.attrs["label"], "mJ") for each in shown])
     title(strips[0], "(a) stored energy")
@@ -68,30 +72,32 @@ def plot_energy(result: xr.Dataset, *, width: Width = None, titles: bool = True)
         trace(axes, time, _MILLI * energy.values, color=BLUE, linewidth=thin())
     labels = ["energy (mJ)", "|residual| / intake"]
     above, below = stack(right, labels, heights=[2.2, 1.0])
-    total = np.sum([each.values for each in stored.values()], axis=0)
-    _balance(above, time, supplied, lost, total)
+    _balance(above, time, supplied, lost, total, _LOST * intake)
     handles = above.get_legend_handles_labels()[0]
     legend(right, [handles[-1], *handles[-2::-1]])
-    _residual(below, result, float(np.max(np.abs(supplied) + np.maximum(total[0] - total, 0.0))))
+    _residual(below, result, intake)
     return figure
 
 
-def _balance(axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array) -> None:
+def _balance(
+    axes: Axes, time: Array, supplied: Array, lost: dict[str, xr.Variable], stored: Array, least: float
+) -> None:
     level = np.zeros(len(time))
     for each, look in zip(lost.values(), cycle(_COLOURS), strict=False):
         if np.any(each.values):
             above = level + _MILLI * each.values
-            shade(axes, time, level, above, color=look, alpha=0.8, label=each.attrs["label"])
+            named = {"label": each.attrs["label"]} if np.max(np.abs(each.values)) > least else {}
+            shade(axes, time, level, above, color=look, alpha=0.8, **named)
             level = above
     change = _MILLI * (stored - stored[0])
     shade(axes, time, level, level + np.maximum(change, 0.0), color=GREY, alpha=0.35, label="put into store")
-    if np.min(change) < 0.0:
+    if np.min(change) < -_MILLI * least:
         taken = {"facecolor": "none", "edgecolor": colour(BLACK), "hatch": "////", "alpha": 0.5}
         shade(axes, time, level + np.minimum(change, 0.0), level, label="taken from store", **taken)
     trace(axes, time, _MILLI * supplied, label="supplied", color=BLACK, linewidth=thin(1.15))
     if axes.dataLim.y0 >= 0.0:
         axes.set_ylim(bottom=0.0)
-    title(axes, "(b) what was supplied, and where it went")
+    title(axes, "(b) supplied energy and its uses")
 
 
 def _residual(axes: Axes, result: xr.Dataset, scale: float) -> None:

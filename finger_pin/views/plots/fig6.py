@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
-from finger_pin.views.plots.lines import names, passive_proximal, series, trace
+from finger_pin.views.plots.lines import bundle, names, passive_proximal, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
 
@@ -26,8 +26,9 @@ _COLUMNS = (
 def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 6 from a result.
 
-    (a) theta^d and (b) theta^d - theta, deg. (c) One panel per tendon, N: dashed f_hat, solid f; for a passive
-    tendon f is the tension of its distal half (f5_4), and that of its proximal half (f5_3) is dotted.
+    (a) theta^d, or theta where theta^d is constant, and (b) theta^d - theta, deg. (c) One panel per tendon, N: dashed
+    f_hat, solid f; for a passive tendon f is the tension of its distal half (f5_4), and that of its proximal half
+    (f5_3) is dotted.
 
     Of a hand there is a row for each finger, with references, errors and delivered tensions.
 
@@ -47,9 +48,10 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
     tendons = names(result, "tendon")
     height = max(6.6, 1.3 * len(tendons))
     figure, (left, right) = sheet([(5.1, height), (5.9, height)], width, titles)
-    angles = stack(left, ["reference θᵈ (°)", "error θᵈ \N{MINUS SIGN} θ (°)"])
-    title(angles[0], "(a) references")
-    _joints(angles[0], result, "joint_reference")
+    moves = bool(np.ptp(result["joint_reference"].values, axis=0).any())
+    angles = stack(left, ["reference θᵈ (°)" if moves else "angle θ (°)", "error θᵈ \N{MINUS SIGN} θ (°)"])
+    title(angles[0], "(a) references" if moves else "(a) joint angles; the references are constant")
+    _joints(angles[0], result, "joint_reference" if moves else "joint_position")
     title(angles[1], "(b) tracking errors")
     _joints(angles[1], result, "tracking_error")
     legend(left, angles[0].get_lines())
@@ -63,8 +65,7 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
 
 def _joints(axes: Axes, result: xr.Dataset, variable: str) -> None:
     time, values = result["time"].values, np.rad2deg(result[variable].transpose("time", "joint").values)
-    for index, name in enumerate(names(result, "joint")):
-        trace(axes, time, values[:, index], label=name, **series(index))
+    bundle(axes, time, values, names(result, "joint"), range(values.shape[1]))
 
 
 def _tensions(panels: list[Axes], result: xr.Dataset) -> None:

@@ -32,10 +32,7 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
     driven = _panels(names(result, "tendon"), result["tendon_tension"].transpose("time", "tendon").values)
     if "actuator_force" in result:
         driven += _panels(names(result, "actuator"), result["actuator_force"].transpose("time", "actuator").values)
-    columns = (
-        (moved, "position", "(a) joints, rad or m"),
-        (driven, "force", "(b) tendons and actuators, N or N m"),
-    )
+    columns = ((moved, "position", "(a) joints, rad or m"), (driven, "force", "(b) tendons and actuators, N or N m"))
     sizes = [(5.5, 1.0 + 1.5 * max(len(panels), 1)) for panels, _, _ in columns]
     figure, parts = sheet(sizes, width, titles)
     for part, (panels, label, text) in zip(parts, columns, strict=True):

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from finger_pin.exceptions import InputError
-from finger_pin.views.plots.lines import names, series, trace
+from finger_pin.views.plots.lines import bundle, names
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import Width
 
@@ -70,8 +70,7 @@ def plot_by_finger(result: xr.Dataset, columns: Sequence[Column], width: Width, 
 
 
 def _lines(axes: Axes, part: xr.Dataset, kind: str, looks: list[str], values: Array) -> dict[str, Line2D]:
-    time = part["time"].values
-    return {
-        name: trace(axes, time, column, label=name, **series(looks.index(name)))
-        for name, column in zip(names(part, kind), values.T, strict=True)
-    }
+    labels = names(part, kind)
+    return dict(
+        zip(labels, bundle(axes, part["time"].values, values, labels, list(map(looks.index, labels))), strict=True)
+    )

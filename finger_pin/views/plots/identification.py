@@ -55,7 +55,7 @@ def plot_identification(result: xr.Dataset) -> Figure:
 
 
 def _computed(axes: Axes, over: Array, computed: Array) -> None:
-    """Draw the computed values of steady readings: a curve, or marks where one load has several, as to and fro."""
+    """Draw the computed values of steady readings: a curve, or marks for several at one load, as to and fro."""
     _, place = np.unique(over, return_inverse=True)
     means = np.bincount(place, computed) / np.bincount(place)
     if np.allclose(computed, means[place], rtol=0.0, atol=1e-6 * float(np.max(np.abs(computed)))):
@@ -67,7 +67,7 @@ def _computed(axes: Axes, over: Array, computed: Array) -> None:
 
 @styled
 def plot_profiles(result: xr.Dataset) -> Figure:
-    """Draw the profile of every parameter: the misfit of the recordings where it is held at other values.
+    """Draw the profile of every parameter: the misfit of the recordings with it held at other values.
 
     Args:
         result: Dataset of `identify`.

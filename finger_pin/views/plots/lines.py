@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.
 BINS = 640
+# Width of a line, as a share of a panel's height.
+_LINE = 0.005
 
 
 def names(result: xr.Dataset, coordinate: str) -> list[str]:
@@ -66,6 +69,25 @@ def trace(axes: Axes, time: Array, values: Array, **options: Any) -> Line2D:
     if len(values) == 1:
         options["marker"] = "."
     return axes.plot(time[kept], values[kept], **options)[0]
+
+
+def bundle(axes: Axes, time: Array, values: Array, labels: Sequence[str], looks: Sequence[int]) -> list[Line2D]:
+    """Draw signals, shape (m, n), against time; return the lines, dashed if one lies on another.
+
+    Args:
+        axes: The panel.
+        time: Shape (m,).
+        values: Shape (m, n).
+        labels: Of the signals.
+        looks: Of every signal, the index of its `series`.
+    """
+    near = _LINE * np.ptp(values)
+    lines: list[Line2D] = []
+    for index, (column, label, look) in enumerate(zip(values.T, labels, looks, strict=True)):
+        hiding = sum(bool(np.abs(column - other).max() <= near) for other in values.T[:index])
+        dashes = {"dashes": (4, 4 * hiding)} if hiding else {}
+        lines.append(trace(axes, time, column, label=label, **series(look) | dashes))
+    return lines
 
 
 def shade(axes: Axes, time: Array, first: Array, second: Array, **options: Any) -> None:

@@ -10,16 +10,13 @@ from matplotlib.figure import Figure, SubFigure
 
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
-from finger_pin.views.plots.panels import flatten_rounding, labelled, legend, sheet, stack, title
+from finger_pin.views.plots.panels import cut_spikes, flatten_rounding, labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, styled, thin
 
 if TYPE_CHECKING:
     from finger_pin.description.routing import Array
 
-_COLUMNS = (
-    ("tendon friction", "tendon_friction", 1.0, "N"),
-    ("joint friction", "joint_friction", 1e3, "mN m"),
-)
+_COLUMNS = (("tendon friction", "tendon_friction", 1.0, "N"), ("joint friction", "joint_friction", 1e3, "mN m"))
 
 
 @styled
@@ -28,7 +25,8 @@ def plot_losses(result: xr.Dataset, finger: str | None = None, *, width: Width =
 
     (a) One panel per tendon, N: the tension before its friction (the command, or that at a spool; of a passive tendon,
     the proximal half) and after it (what reaches the joints). (b) One panel per joint, mN m: the commanded torque tau^d
-    of (19), the torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f.
+    of (19), the torque of the tendons H_c2^T f of (11), and the latter less joint friction tau^f. A spike of a
+    thousandth of the samples, such as a loop's first one, may leave the panel.
 
     Of a hand there is a row for each finger, with the friction of its tendons and of its joints.
 
@@ -78,6 +76,7 @@ def _joints(part: SubFigure, result: xr.Dataset) -> None:
         trace(axes, time, command[:, index], label="commanded", color=BLACK, linestyle="--", linewidth=thin())
         net = torque[:, index] - friction[:, index]
         _gap(axes, time, torque[:, index], net, "of the tendons", "after joint friction")
+        cut_spikes(axes, command[:, index], torque[:, index], net)
         flatten_rounding(axes)
     title(panels[0], "(b) joint torque before and after joint friction")
     legend(part, panels[0].get_legend_handles_labels()[0])

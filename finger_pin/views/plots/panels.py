@@ -6,8 +6,9 @@ import math
 import textwrap
 from collections.abc import Sequence
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -16,6 +17,9 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from finger_pin.views.plots.style import Width, fit, inches, new_figure, power_of_ten, settings
+
+if TYPE_CHECKING:
+    from finger_pin.description.routing import Array
 
 # Parts are drawn at this share of their own width before they go below each other.
 _NARROWEST = 0.62
@@ -27,6 +31,9 @@ _LETTER, _HANDLE = 0.5, 0.45
 # What is below this in the unit of a panel is zero.
 _ROUNDING = 1e-9
 
+# Share of samples, at either end, that may leave a panel.
+_SPIKE = 0.001
+
 # Steps between ticks, times powers of ten.
 _FEW, _MANY = [1, 2, 5, 10], [1, 2, 2.5, 5, 10]
 
@@ -34,7 +41,7 @@ _FEW, _MANY = [1, 2, 5, 10], [1, 2, 2.5, 5, 10]
 def sheet(
     parts: Sequence[tuple[float, float]], width: Width = None, titles: bool = True
 ) -> tuple[Figure, list[SubFigure]]:
-    """Return a figure and its parts, side by side, or below each other where its width does not hold them.
+    """Return a figure and its parts, side by side, or below each other if its width is too small.
 
     Args:
         parts: Width and height of every part where there is room, in.
@@ -143,6 +150,14 @@ def flatten_rounding(axes: Axes) -> None:
         axes.set_ylim(-1.0, 1.0)
 
 
+def cut_spikes(axes: Axes, *signals: Array) -> None:
+    """Let a spike leave a panel that would be twice as high for a thousandth of the samples."""
+    values = np.concatenate(signals)
+    low, high = np.quantile(values, [_SPIKE, 1.0 - _SPIKE])
+    if np.ptp(values) > 2.0 * (high - low) > _ROUNDING:
+        axes.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
+
+
 def legend(part: Figure | SubFigure, handles: Sequence[Artist]) -> None:
     """Write a legend below a part, in as many columns as its width holds, if there is anything to name."""
     if handles:
@@ -176,6 +191,6 @@ def plain(axis: Axis) -> None:
 
 
 def labelled(name: str, unit: str) -> str:
-    """Return the label of a strip: its name and unit, on two lines where they are long together."""
+    """Return the label of a strip: its name and unit, on two lines if long."""
     whole = unit.replace(" ", "\N{NO-BREAK SPACE}")
     return textwrap.fill(f"{name} ({whole})", 13, break_long_words=False)

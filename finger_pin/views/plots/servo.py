@@ -109,4 +109,4 @@ def _power(axes: Axes, result: xr.Dataset) -> None:
         level = above
     trace(axes, time, result["power_electrical"].values, label="electrical", color=BLACK, linewidth=thin())
     axes.axhline(0.0, color=colour(GREY), linewidth=thin(0.5))
-    title(axes, "(d) electrical power, and where it goes")
+    title(axes, "(d) electrical power and its uses")

@@ -129,7 +129,7 @@ def new_figure(
 
 
 def inches(width: Width) -> float | None:
-    """Return a width in inches; None where neither the caller nor ``figure.figsize`` sets one.
+    """Return a width in inches, of the caller or of ``figure.figsize``, or None.
 
     Raises:
         InputError: If it is neither a length nor the name of one.

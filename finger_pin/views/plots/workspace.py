@@ -25,7 +25,7 @@ _ISOLINES = 7
 
 @styled
 def plot_workspace(finger: FingerLike, *, width: Width = None, titles: bool = True) -> Figure:
-    """Draw Fig. 2: where the fingertip can go when the passive tendons do not stretch, equation (4).
+    """Draw Fig. 2: the workspace of the fingertip with passive tendons that do not stretch, equation (4).
 
     Left the surface in space, right the section in the flexion plane with the finger at three poses; mm, base frame.
 
@@ -94,7 +94,7 @@ def _quads(patches: Array) -> Array:
 
 
 def _lit(quads: Array) -> Array:
-    """Return a shade of blue for every quad, shape (cells, 3), lighter where it faces the light."""
+    """Return a shade of blue for every quad, shape (cells, 3), lighter towards the light."""
     normal = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     light = np.array([0.9, -0.25, 0.75])

@@ -49,7 +49,7 @@ class ForceSet:
         return f"forces at the tip, {1e3 * self.scale:.4g} mm per N"
 
     def commands(self) -> Iterator[Command]:
-        """Yield meshcat's commands: the body where there is one, its edges, and its origin, the fingertip."""
+        """Yield meshcat's commands: the body, if there is one, its edges, and its origin, the fingertip."""
         triangles = self.polytope.triangles()
         if len(triangles):
             normals = np.repeat(_normals(self.polytope.vertices[triangles]), 3, axis=0)

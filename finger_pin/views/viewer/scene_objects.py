@@ -120,7 +120,7 @@ class SceneObjects:
         return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size][::10])
 
     def commands(self) -> Iterator[Command]:
-        """Yield meshcat's commands for all objects, each where it starts."""
+        """Yield meshcat's commands for all objects, each at its start."""
         for name, each in self.by_name.items():
             path = f"{ROOT}/object_{name}"
             for index, (shape, turned, offset, colour) in enumerate(self.parts(name)):

@@ -154,12 +154,7 @@ class LiveView(Viewing):
     """A page that shows a simulation while it runs."""
 
     def __init__(
-        self,
-        finger: FingerLike,
-        *,
-        title: str = "",
-        open_browser: bool | None = None,
-        rate: float = 30.0,
+        self, finger: FingerLike, *, title: str = "", open_browser: bool | None = None, rate: float = 30.0
     ) -> None:
         """Serve the page and print its address; frames come with `update`.
 

@@ -71,5 +71,5 @@ def _grid(axes: Axes, found: PassiveDelivery) -> None:
     axes.set_ylim(0.0, 1.3 * float(np.max(100.0 * found.grid.deviation)))
     axes.set_xlabel("speed over the scenario's own")
     axes.set_ylabel("delivered off planned (% rms)")
-    title(axes, r"(c) without weight, $f_5^d = \lambda f^k_5$")
+    title(axes, "(c) without weight, f₅ᵈ = λ f₅ᵏ")
     axes.legend(loc="upper left", ncols=2, fontsize="x-small")

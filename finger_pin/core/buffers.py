@@ -1,4 +1,4 @@
-"""The memory that the compiled core works in."""
+"""Buffers of the compiled core: the memory that it works in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The books: names, units and kinds of the energies and powers of the rows."""
+"""Energies and powers of the rows: their names, units and kinds."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BASE, GUIDED = Energy("palm", "motion of the palm", SUPPLIED), Energy("objects",
 
 
 @dataclass(frozen=True, eq=False)
-class Books:
+class Energies:
     """The energies and powers of all rows, each once.
 
     Attributes:
@@ -48,7 +48,7 @@ class Books:
     powers: tuple[Energy, ...]
 
     @classmethod
-    def of(cls, rows: Sequence[Rows], moved: bool = False, guided: bool = False) -> Books:
+    def of(cls, rows: Sequence[Rows], moved: bool = False, guided: bool = False) -> Energies:
         """Collect those of tables, and those of moved coordinates and of a base that moves."""
         base = ((GUIDED,) if guided else ()) + ((BASE,) if moved else ())
         return cls(_once(table.stored for table in rows), (*_once(p for table in rows for p in table.powers), *base))

@@ -1,4 +1,4 @@
-"""Touches within a step of any integrator whose interpolants are polynomials: `flights` in Python.
+"""Continuous collision detection in Python, for any integrator whose interpolants are polynomials.
 
 The way of each coordinate is that of its Bernstein coefficients; of a quaternion, twice that over its least length is
 the angle. Only paths are compared with gaps, which costs more looks than the compiled core takes.
@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import comb
 
-from finger_pin.core.evaluation.charts import Charts
+from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.stepping.textbook import Meeting
 from finger_pin.core.tables import build_tables
 from finger_pin.description.routing import Array
@@ -30,7 +30,7 @@ def meetings(mechanism: Mechanism) -> Meeting | None:
 
 
 class _Meetings:
-    """Of every gap, how far it is open at least, kept from step to step."""
+    """The least opening of every gap, kept from step to step."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         tables = build_tables(mechanism)
@@ -46,7 +46,7 @@ class _Meetings:
         self._nodes, self._to_control = nodes, np.linalg.inv(basis)
 
     def __call__(self, start: float, end: float, interpolate: Interpolant) -> float | None:
-        """See `Meeting`; a touch that lasts to the end, where bodies still approach, shows there."""
+        """See `Meeting`; a touch that lasts to the end shows there, in bodies that still approach."""
         if start != self._time:
             # From another moment than that where the last step ended.
             self._clear[:] = 0.0

@@ -1,4 +1,4 @@
-"""Motions near a known one: the derivatives of a motion by the numbers of its mechanism."""
+"""The sensitivity equations of a motion: its derivatives by the numbers of its mechanism."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def fits(motions: Sequence[IslandMotion], parts: Sequence[Part]) -> bool:
 def differentiate(
     motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array, allowed: float
 ) -> Derivative | None:
-    """Return the derivatives of an island's motion by numbers; None where its linear systems are singular.
+    """Return the derivatives of an island's motion by numbers, or None if a linear system is singular.
 
     Args:
         motion: The motion.
@@ -213,7 +213,8 @@ def _bends(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArra
     # Law (9) bends where sliding turns round.
     rubbing = (tables.state >= 0) & (kink < 0)
     rows = np.flatnonzero((kink >= 0) | rubbing)
-    return rows, np.where(kink[rows] >= 0, kink[rows], SPEED), (kink[rows] >= 0).astype(np.int64)
+    # There its slopes are right on either side, held or not; of quick vibrations not every turn is found.
+    return rows, np.where(kink[rows] >= 0, kink[rows], SPEED), (kink[rows] > SPEED).astype(np.int64)
 
 
 def _corners(ends: Array, knots: Array, others: Sequence[Array], changes: Array) -> tuple[NDArray[np.int64], Array]:

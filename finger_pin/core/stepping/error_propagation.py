@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import call_at, compiled
-from finger_pin.core.stepping.interpolation import bend_of_stages
-from finger_pin.core.stepping.law_branches import release
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled
+from finger_pin.core.model import MODEL
+from finger_pin.core.stepping import rosenbrock as at
+from finger_pin.core.stepping.interpolation import between
+from finger_pin.core.stepping.kink_sides import release
 
 # Terms of the flow. With three, vibrations that steps of a radian or two follow would be damped, and with them what a
 # loop that hunts makes of small errors; with six they are not.
@@ -22,6 +24,41 @@ _MOST_SUMS = 64.0
 # Nodes after the start, and weights, of Lobatto's quadrature of fifth order; the first weight is the last one.
 _NODES = (0.5 - np.sqrt(0.05), 0.5 + np.sqrt(0.05), 1.0)
 _WEIGHTS = (5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0)
+
+
+@Unit
+def judge_step(address: int, h: float) -> int:
+    """Carry the error of the run of an `Integration` at an address over a step of a length, or its taken share.
+
+    Its state is that of the step's start, that of its model the one at the end.
+    """
+    integration = bound_at(address, at.INTEGRATION)
+    model, memory = bound_at(integration.model, MODEL), integration.memory
+    drift, k, width = integration.drift, integration.k, model.linear.mass.shape[0]
+    part, turned, last = memory[at.PART], memory[at.SHARE] < 1.0, k.shape[0] - 1
+    again = memory[at.CULPRIT] < 0.0 and model.tables.touching > 0
+    if turned or memory[at.OUTCOME] == at.STRAYED or again:
+        # The two methods may err alike.
+        defect(integration, model, memory[at.TIME], h, part)
+    else:
+        for c in range(drift.size):
+            k[last, c] *= part
+        for c in range(2 * width, drift.size):
+            k[last, c] -= integration.end[c]
+    memory[at.BEHIND] = carry(
+        model.linear,
+        part * h,
+        integration.tableau.gamma / part,
+        drift,
+        k[last],
+        memory[at.BEHIND],
+        turned,
+        integration.r,
+        model.rate,
+    )
+    memory[at.DRIFT] += part * h * weigh(integration.joints, width, drift)
+    memory[at.OBJECT_DRIFT] += part * h * weigh(integration.objects, width, drift)
+    return 1
 
 
 @compiled
@@ -61,7 +98,7 @@ def carry(
 
 
 @compiled
-def defect(integration: Any, model: Any, time: float, h: float) -> None:
+def defect(integration: Any, model: Any, time: float, h: float, share: float) -> None:
     """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 
     At a kink both methods err alike. What a step's interpolant should have grown by is integrated after Lobatto
@@ -71,22 +108,21 @@ def defect(integration: Any, model: Any, time: float, h: float) -> None:
         integration: The integration; its states are those of the step's start.
         model: The model; its state is that of the step's end, where it is evaluated last, and no row is held.
         time: Of the start, s.
-        h: Length of the step, s.
+        h: Length of the step that was tried, s.
+        share: What is taken of it.
     """
     tableau, x, k, state, rate = integration.tableau, integration.x, integration.k, model.state, model.rate
-    r, end, start = integration.r, integration.end, integration.start
+    r, end, start, length = integration.r, integration.end, integration.start, share * h
     last, size = tableau.nodes.size - 1, x.size
     release(model.tables, model.work.rows)
     for c in range(size):
-        r[c], end[c] = state[c] - x[c] - _WEIGHTS[2] * h * start[c], state[c]
+        r[c], end[c] = state[c] - x[c] - _WEIGHTS[2] * length * start[c], state[c]
     for node in range(3):
         s = _NODES[node]
+        between(x, end, integration.dense, s, state)
+        call_at(model.evaluate, integration.model, time + s * length)
         for c in range(size):
-            bend = bend_of_stages(tableau, k, c, s)
-            state[c] = (1.0 - s) * x[c] + s * (end[c] + (1.0 - s) * bend)
-        call_at(model.evaluate, integration.model, time + s * h)
-        for c in range(size):
-            r[c] -= _WEIGHTS[node] * h * rate[c]
+            r[c] -= _WEIGHTS[node] * length * rate[c]
     for c in range(size):
         r[c] /= h * tableau.gamma
     r[size] = 0.0

@@ -7,7 +7,7 @@ import pytest
 from test_contact_motion import G, scene
 
 from finger_pin.core.compiled_finger import CompiledMechanism
-from finger_pin.core.stepping.encounters import meetings
+from finger_pin.core.stepping.interpolant_collision import meetings
 from finger_pin.core.stepping.textbook import integrate
 from finger_pin.description.objects import Object
 

@@ -1,4 +1,4 @@
-"""Bends of a motion: rows that turn round or reach a kink, and another tension that leads in (22); compiled."""
+"""Events of a motion: rows that turn round or reach a kink, and another tension that leads in (22); compiled."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def rate_at(address: int, time: float, state: Any) -> None:
 
 @compiled
 def look(col: Any, model: Any, step: int, time: float, out: Any) -> None:
-    """Fill the functions that change sign where the motion bends, at a time of a step or of a later one."""
+    """Fill the functions that change sign at the motion's kinks, at a time of a step or of a later one."""
     state_at(col.motion, step, time, col.state)
     rate_at(col.model, time, col.state)
     first, control = col.rows.size, model.control
@@ -68,7 +68,7 @@ def turned_after(col: Any, before: Any, after: Any) -> Any:
 
 @compiled
 def _hold(col: Any, address: int) -> None:
-    """Hold the rows of a model on their sides, where they can be."""
+    """Hold the rows of a model on their sides, as far as their laws allow."""
     model = bound_at(address, MODEL)
     for w in range(col.rows.size):
         if col.held[w]:
@@ -77,7 +77,7 @@ def _hold(col: Any, address: int) -> None:
 
 @compiled
 def hold_all(col: Any) -> None:
-    """Hold the rows of all models on their sides, where they can be."""
+    """Hold the rows of all models on their sides, as far as their laws allow."""
     _hold(col, col.model)
     for k in range(col.changed.size):
         if col.changed[k] != 0:

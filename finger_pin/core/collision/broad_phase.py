@@ -23,7 +23,7 @@ _STRAIGHT = 1e-14
 
 @compiled
 def depart(tables: Any, own: Any) -> None:
-    """Note the gaps of all contacts that are awake where a step begins."""
+    """Note the gaps of all contacts that are awake at the beginning of a step."""
     paths = tables.paths
     for e in range(paths.columns.size):
         if paths.columns[e] > 1 and own.asleep[paths.row[e]] == 0:
@@ -41,20 +41,13 @@ def distance(paths: Any, e: int, own: Any) -> Any:
 
 
 @compiled
-def trace(tableau: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
+def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
     """Fill the Bernstein coefficients of the interpolant of a step, and the path of each of n coordinates."""
-    last, rows = tableau.nodes.size - 1, tableau.dense.shape[0]
-    control = own.control
+    last, control = k.shape[0] - 1, own.control
     for j in range(size):
-        first, second, third = 0.0, 0.0, 0.0
-        for i in range(last + 1):
-            first += tableau.dense[0, i] * k[i, j]
-            second += tableau.dense[1, i] * k[i, j]
-        if rows > 2:
-            for i in range(last + 1):
-                third += tableau.dense[2, i] * k[i, j]
         # (1 - s) x + s end + s (1 - s) (first + s second + s^2 third)
-        step = end[j] - x[j]
+        first, second, step = dense[0, j], dense[1, j], end[j] - x[j]
+        third = dense[2, j] if dense.shape[0] > 2 else 0.0
         control[j, 0], control[j, 4] = x[j], end[j]
         control[j, 1] = x[j] + 0.25 * (step + first)
         control[j, 2] = x[j] + 0.5 * step + (first + 0.5 * second) / 3.0
@@ -163,7 +156,7 @@ def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
 
 @compiled
 def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
-    """Let contacts fall asleep or wake up where a step has ended, by bounds of their gaps there.
+    """Let contacts fall asleep or wake up at the end of a step, by bounds of their gaps there.
 
     Returns:
         Whether any did.

@@ -1,9 +1,10 @@
-"""The error of a run where it outgrows a linearised flow: the difference to a motion that starts off by it.
+"""The error of a run that outgrows a linearised flow: the difference to a motion that starts off by it.
 
 Bristles that slip and stick again multiply a small error a hundredfold within a slip, and hold a larger one: it slips
 with them and stops where they stop. The flow linearised along the motion knows of the first only. So where the error
-carried along has grown too large to be believed, the last steps are taken again from the state that is off by the error
-with which they began, and what is apart at their end is the error there.
+carried along has grown too large to be believed, a second motion starts where it was small, off by what it was there,
+and goes along until it is small again. Its steps are more exact, so that what is apart is also what the run's own
+steps add.
 """
 
 from __future__ import annotations
@@ -20,13 +21,12 @@ from finger_pin.description.routing import Array
 _STEPS = 128
 # So many times as many may a second motion take between them.
 _MOST = 8
-# An error of more than so many tolerances, rad or m, or at any tolerance of more than that, is looked into from where
-# it was less than so large a share of that, or from so many looks ago; if it was more than another share then: of what
-# was less, most has been added by the steps themselves since.
-_LARGE, _LARGEST, _SMALL, _LEAST, _LOOKS = 3e3, 3e-2, 1.0 / 30.0, 1.0 / 300.0, 4
-# Of an error beyond the largest such a share is followed, which is what a run at tighter tolerances has left of it: the
-# error is beyond all bounds where the share, too, grows beyond the largest.
-_LEFT = 0.1
+# An error of more than so many tolerances, rad or m, or at any tolerance of more than that, is followed by a second
+# motion until it is less than so large a share of that. It starts where the error was less than another share last,
+# or so many looks ago.
+_LARGE, _LARGEST, _SMALL, _LEAST, _LOOKS = 3e3, 3e-2, 1.0 / 30.0, 1.0 / 300.0, 64
+# Its tolerances are so large a share of the run's. What it is more than so far apart from, rad or m, is another motion.
+_TIGHTER, _OTHER = 0.25, 0.1
 
 
 class Moment(NamedTuple):
@@ -39,7 +39,7 @@ class Moment(NamedTuple):
     drift: Array
 
 
-class Twin:
+class Companion:
     """Follows the error of an island.
 
     Attributes:
@@ -54,52 +54,54 @@ class Twin:
         turning = np.concatenate([part.joints, part.objects])
         self._large = min(_LARGE * max(part.rtol, float(np.max(part.atol[turning], initial=0.0))), _LARGEST)
         self._seen = [self._now()]
+        self._second: Part | None = None
 
-    def look(self) -> None:
-        """Look at the error, if enough steps have been taken since the last time."""
+    def look(self, steps: int = _STEPS) -> None:
+        """Look at the error, if so many steps have been taken since the last time."""
         part, before = self._part, self._seen[-1]
-        if self.lost or part.memory[core.ACCEPTED] - before.memory[core.ACCEPTED] < _STEPS:
+        if self.lost or part.memory[core.ACCEPTED] - before.memory[core.ACCEPTED] < steps:
             return
         self._seen = [*self._seen[-_LOOKS:], self._now()]
         size = _size(part, part.drift)
-        if size > self._large:
-            if _size(part, self._seen[0].drift) > _LEAST * self._large:
-                self._follow()
-            self._seen = [self._now()]
-            return
-        if size < _SMALL * self._large:
+        if self._second is None and size > self._large:
+            self._second = self._off_by_the_error()
+        if self._second is not None:
+            self._follow(self._second)
+        elif size < _LEAST * self._large:
             self._seen = self._seen[-1:]
 
     def _now(self) -> Moment:
         part = self._part
         return Moment(part.time, *(each.copy() for each in (part.x, part.attitude, part.memory, part.drift)))
 
-    def _follow(self) -> None:
-        """Replace the error by the difference to a motion that starts off by that of the first moment seen.
+    def _off_by_the_error(self) -> Part:
+        """Return a second motion that starts off by the error of the first moment seen."""
+        begin = self._seen[0]
+        second = self._part.copy(judged=False, tolerances=_TIGHTER)
+        second.knots = self._part.knots
+        second.restart(begin.x + begin.drift, begin.attitude, begin.time)
+        second.memory[core.STEP] = begin.memory[core.STEP]
+        return second
 
-        Of an error beyond the largest it starts off by a share that is not, and what is apart is that share of it.
-        """
+    def _follow(self, second: Part) -> None:
+        """Replace the error by the difference to the second motion, unless that is another one."""
         part, (begin, *later) = self._part, self._seen
-        share = 1.0
-        while _LARGEST < share * _size(part, begin.drift) < np.inf:
-            share *= _LEFT
-        twin = part.copy(judged=False)
-        twin.knots = part.knots
-        twin.restart(begin.x + share * begin.drift, begin.attitude, begin.time)
-        twin.memory[core.STEP] = begin.memory[core.STEP]
         sums, error, time = begin.memory[[core.DRIFT, core.OBJECT_DRIFT]], begin.drift, begin.time
         # What takes so much longer is no neighbour any more.
         room = part.room(_MOST * _STEPS)
         for moment in later:
-            if twin.advance(moment.time, room)[0] != core.DONE:
-                return
-            other = difference(part, moment, twin) / share
+            if not _size(part, error) < _OTHER or second.advance(moment.time, room)[0] != core.DONE:
+                break
+            other = difference(part, moment, second)
             means = [max(_mean(each[places]) for each in (error, other)) for places in (part.joints, part.objects)]
-            sums, time, error = sums + (moment.time - time) * np.minimum(means, 1.0), moment.time, other
-        found = _size(part, error)
-        self.lost = share < 1.0 and share * found > _LARGEST
-        if found < _size(part, part.drift):
-            part.drift[:], part.memory[[core.DRIFT, core.OBJECT_DRIFT]], part.memory[core.BEHIND] = error, sums, 0.0
+            sums, time, error = sums + (moment.time - time) * np.array(means), moment.time, other
+        self.lost = time < later[-1].time or not _size(part, error) < _OTHER
+        if self.lost:
+            return
+        part.drift[:], part.memory[[core.DRIFT, core.OBJECT_DRIFT]], part.memory[core.BEHIND] = error, sums, 0.0
+        self._seen = [self._now()]
+        if _size(part, error) < _SMALL * self._large:
+            self._second = None
 
 
 def difference(part: Part, moment: Moment, other: Part) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,11 @@ from numpy.typing import NDArray
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import ROTATION
 from finger_pin.core.jit import compiled
+from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
 
-_KNOWN: WeakKeyDictionary[Mechanism, Charts] = WeakKeyDictionary()
+_KNOWN: Remembered[Charts] = Remembered()
 
 
 def place(frame: Any, q: Any, body: Any) -> None:
@@ -155,9 +155,8 @@ class Charts:
     @classmethod
     def of(cls, mechanism: Mechanism) -> Charts:
         """Read a mechanism."""
-        if mechanism not in _KNOWN:
-            _KNOWN[mechanism] = cls._of(mechanism)
-        return _KNOWN[mechanism]
+        parts = mechanism.body.form, mechanism.coordinates, mechanism.state_count
+        return _KNOWN.of(parts, lambda: cls._of(mechanism))
 
     @classmethod
     def _of(cls, mechanism: Mechanism) -> Charts:
@@ -193,10 +192,13 @@ class Charts:
         shift = len(self.quaternions)
         for f, (at, i) in enumerate(zip(self.quaternions, self.angles, strict=True)):
             angles, rates = core[..., i : i + 3], core[..., self.coordinates + i : self.coordinates + i + 3]
-            q = turned(attitude[..., f, :], angles)
+            # What is moved along a path does not turn.
+            turning = angles.any() or rates.any()
+            q = turned(attitude[..., f, :], angles) if turning else attitude[..., f, :]
             packed[..., at : at + 4] = q / np.linalg.norm(q, axis=-1, keepdims=True)
-            velocity = self.coordinates + shift + i
-            packed[..., velocity : velocity + 3] = angular_velocity(angles, rates)
+            if turning:
+                velocity = self.coordinates + shift + i
+                packed[..., velocity : velocity + 3] = angular_velocity(angles, rates)
         return packed
 
     def packed_places(self, core: NDArray[np.int64]) -> NDArray[np.int64]:

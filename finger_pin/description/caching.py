@@ -1,4 +1,4 @@
-"""A memory of things made of descriptions, which are frozen: the same object makes the same thing."""
+"""A cache of values made of descriptions, which are frozen: the same object makes the same value."""
 
 from __future__ import annotations
 
@@ -12,6 +12,17 @@ _Made = TypeVar("_Made")
 _MOST = 128
 
 
+class _Described(dict[type, bool]):
+    """Whether objects of a type are descriptions; to ask an object itself takes longer."""
+
+    def __missing__(self, kind: type) -> bool:
+        self[kind] = issubclass(kind, BaseModel)
+        return self[kind]
+
+
+_DESCRIBED = _Described()
+
+
 class Remembered(Generic[_Made]):
     """The latest things made, by the parts they were made of: descriptions as objects, all else by value."""
 
@@ -23,7 +34,7 @@ class Remembered(Generic[_Made]):
 
     def of(self, parts: tuple[object, ...], make: Callable[[], _Made]) -> _Made:
         """Return the thing made of parts; anew only if it was not made of the same before, or long ago."""
-        key = tuple(id(part) if isinstance(part, BaseModel) else part for part in parts)
+        key = tuple([id(part) if _DESCRIBED[type(part)] else part for part in parts])
         found = self._known.get(key)
         if found is None:
             # The parts are kept: of those that have gone, others may have the identity.

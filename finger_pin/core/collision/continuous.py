@@ -1,4 +1,6 @@
-"""Touches within a step that no stage has seen: looked for until there is none, or one is found.
+"""Continuous collision detection: touches within a step that no stage has seen.
+
+They are looked for until there is none, or one is found.
 
 Bodies that are g_0 and g_1 apart at two moments, and touch in between, move against each other by g_0 + g_1 at least. A
 step is halved until the path of every part is shorter than that. Where bodies slide along each other, close and far,
@@ -12,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.collision.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import call_at, compiled
 from finger_pin.core.path_tables import LOOKS
-from finger_pin.core.stepping.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
 from finger_pin.core.tables import END, FIRST, KINK
 
 # Of a step in which all touches have been seen, and of one with a contact that slept meanwhile.
@@ -140,7 +142,7 @@ def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
 
 @compiled
 def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
-    """Return the share of the step where bodies meet that part again before its end; else `NOTHING`.
+    """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING`.
 
     Those that are not apart at its end have parted too, unless that is ``seen``.
     """
@@ -186,7 +188,7 @@ def survey(integration: Any, model: Any) -> float:
     """
     tables, own, rows, state = model.tables, model.work.paths, model.work.rows, model.state
     paths, size, first, woken = tables.paths, tables.parents.size, NOTHING, False
-    trace(integration.tableau, integration.k, integration.x, state, size, own)
+    trace(integration.dense, integration.k, integration.x, state, size, own)
     for e in range(paths.columns.size):
         if paths.columns[e] == 1:
             continue

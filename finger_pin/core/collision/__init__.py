@@ -1,0 +1,1 @@
+"""Touches that no step misses: bounds of motion, contacts that are asleep, and looks within a step."""

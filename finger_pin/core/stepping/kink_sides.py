@@ -1,0 +1,166 @@
+"""Rows held on one side of their law's kink during a step, so that its rates are smooth.
+
+Those that bend with the sign of their speed are held and released here; where they turn round, `reversals` says.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.law_code import SIDE, SPEED
+from finger_pin.core.jit import call_at, compiled
+from finger_pin.core.stepping.error_norm import step_error
+from finger_pin.core.stepping.interpolation import between, cut
+from finger_pin.core.tables import END, FIRST, KINK
+
+# A step after a kink that is rejected costs as much as two that grow.
+_SHARE = 0.25
+# A step that is cut ends behind the kink by so much of its length at most, and costs so many tolerances; so many ends
+# are tried.
+_BEHIND, _WANTED, _TRIALS = 0.02, 0.5, 6
+
+
+@compiled
+def release(tables: Any, rows: Any) -> None:
+    """Let all rows follow the motion."""
+    for g in range(tables.groups.shape[0]):
+        if tables.groups[g, KINK] >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                rows[SIDE, k] = 0.0
+
+
+@compiled
+def hold(tables: Any, rows: Any, kinks: Any) -> None:
+    """Hold all rows on the present side of their kink."""
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column >= 0:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                kinks[k] = rows[column, k]
+                rows[SIDE, k] = np.sign(rows[column, k])
+
+
+@compiled
+def leaving(tables: Any, rows: Any, kinks: Any) -> Any:
+    """Return the least share of the way to here after which a held row leaves its side; above 1 if none has so far.
+
+    It is taken to go on at its mean rate.
+    """
+    share = np.inf
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column > SPEED:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                nearer = kinks[k] - rows[column, k]
+                if kinks[k] * nearer > 0.0:
+                    share = min(share, kinks[k] / nearer)
+    return share
+
+
+@compiled
+def strayed(tables: Any, rows: Any, kinks: Any) -> Any:
+    """Return the least share of the step after which a held row has left its side; 1 if none has."""
+    return min(1.0, leaving(tables, rows, kinks))
+
+
+@compiled
+def turn(tables: Any, rows: Any, kinks: Any) -> None:
+    """Turn the held rows that have left their side."""
+    for g in range(tables.groups.shape[0]):
+        column = tables.groups[g, KINK]
+        if column > SPEED:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                if kinks[k] * rows[column, k] < 0.0:
+                    rows[SIDE, k] = -rows[SIDE, k]
+
+
+@compiled
+def price(integration: Any, model: Any, time: float, h: float) -> Any:
+    """Return the error made by rows that are held on a side that they have left, as a multiple of the tolerance."""
+    tables, rows, kinks, size = model.tables, model.work.rows, integration.kinks, integration.x.size
+    r = integration.r
+    call_at(model.evaluate, integration.model, time)
+    turn(tables, rows, kinks)
+    for c in range(size):
+        r[c] = model.rate[c]
+    call_at(model.evaluate, integration.model, time)
+    turn(tables, rows, kinks)
+    for c in range(size):
+        r[c] = h * (model.rate[c] - r[c])
+    return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
+
+
+@compiled
+def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) -> Any:
+    """Return the greatest length of the step after a kink, s.
+
+    Stiff methods damp what they are too long for, and both of a pair alike: of a vibration of y radians in a step the
+    difference is at most radian y^order, and falls again as 1 / y. An impact would be swallowed. So the step has a
+    share of those radians by which the difference is the tolerance; one of more would be rejected if the difference
+    told. The jump of the rates, `cost` over the step, has grown over its last 1 - share. Growing on, it adds
+    cost (t / h)^2 / (2 (1 - share)) tolerances; an impact, which turns a speed back, y^2 / 2 of that speed, and so at
+    most y^2 / (2 rtol) tolerances. Of a slower one the difference tells, but for speeds of a few tolerances.
+    """
+    radians = _SHARE * (rtol / tableau.radian) ** (1.0 / tableau.order)
+    return h * radians * np.sqrt((1.0 - share) / max(rtol * cost, 1e-300))
+
+
+@compiled
+def passed(integration: Any, model: Any, time: float, h: float) -> Any:
+    """Return the share of a step after which a row has left its side in the middle, if that costs too much; else 1.
+
+    A row that is back at the end would not be seen there.
+    """
+    x, state, end = integration.x, model.state, integration.end
+    end[:] = state
+    between(x, end, integration.dense, 0.5, state)
+    call_at(model.evaluate, integration.model, time + 0.5 * h)
+    share = strayed(model.tables, model.work.rows, integration.kinks)
+    if share < 1.0 and price(integration, model, time + 0.5 * h, h) <= 1.0:
+        share = 1.0
+    state[:] = end
+    call_at(model.evaluate, integration.model, time + h)
+    return share if share == 1.0 else 0.5 * share
+
+
+@compiled
+def crossing(integration: Any, model: Any, time: float, h: float, share: float, cost: float) -> Any:
+    """Let a step end a little behind the first row's leaving its side, at the interpolant's state.
+
+    Args:
+        integration: The integration; its states are those of the step's start.
+        model: The model; its state is that of the step's end.
+        time: Of the start, s.
+        h: Length of the step that was tried, s.
+        share: Of it after which a row leaves its side, if it does so at a constant rate.
+        cost: At the end, as from `price`.
+
+    Returns:
+        The share that is taken, 1 if no end was found; the share of that after which the row has left its side; the
+        cost; and the number of evaluations.
+    """
+    x, state, end, count = integration.x, model.state, integration.end, 0
+    end[:] = state
+    low, behind = 0.0, min(_BEHIND * share, _WANTED * (1.0 - share) / cost)
+    at = share + behind
+    for _ in range(_TRIALS):
+        between(x, end, integration.dense, at, state)
+        call_at(model.evaluate, integration.model, time + at * h)
+        count += 1
+        share = leaving(model.tables, model.work.rows, integration.kinks)
+        if share < 1.0:
+            count += 2
+            cost = price(integration, model, time + at * h, at * h)
+            if cost <= 1.0:
+                state[:] = end
+                cut(x, state, integration.dense, at)
+                return at, share, cost, count
+            behind = min(behind, _WANTED * (1.0 - share) * at / cost)
+        else:
+            low = at
+        at = min(max(low, share * at) + behind, 1.0)
+    state[:] = end
+    call_at(model.evaluate, integration.model, time + h)
+    return 1.0, share, cost, count + 1

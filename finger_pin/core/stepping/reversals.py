@@ -1,0 +1,109 @@
+"""Steps that end at reversals of sliding.
+
+The rate of bristles bends where the sign of their speed changes. Frictions are held on the side of their speed at the
+start of a step. From where the speed turns on, that misleads the rate in proportion to the speed there, and the
+interpolant of a step tells where that is. What is misled by more than the tolerance is not taken.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED
+from finger_pin.core.jit import call_value, compiled
+from finger_pin.core.tables import END, FIRST, KINK
+
+# A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
+# behind the reversal, so that the next one begins on the other side: by so much at least, by so much if it can be.
+_MOST, _LEAST, _WANTED = 0.7, 0.07, 0.3
+# The speed is looked at so often in a step, and so many ends of a step are tried.
+_LOOKS, _TRIALS = 8, 8
+
+
+@compiled
+def before_reversal(integration: Any, model: Any, h: float) -> Any:
+    """Return the share of a step that is taken: all of it, or to a little behind the first reversal of sliding.
+
+    By how much bristles are misled in that is filled into ``integration.end``.
+    """
+    share, high, cost, low, below = 1.0, 1.0, 0.0, 0.0, 0.0
+    for trial in range(1 + _TRIALS):
+        if trial > 0:
+            # Behind the first reversal it grows as the square, and more where others follow.
+            way = np.sqrt((_WANTED - below) / (cost - below)) if trial < 4 else 0.5
+            share = low + way * (high - low)
+        found, turned = _misled(integration, model, h, share)
+        if found > _MOST:
+            high, cost = share, found
+            if trial == 0:
+                low = turned
+        elif trial == 0 or found >= _LEAST:
+            break
+        else:
+            low, below = share, found
+    return share
+
+
+@compiled
+def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
+    """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
+    tables, rows, off, total, first = model.tables, model.work.rows, integration.end, 0.0, 1.0
+    size, width = integration.x.size, model.linear.mass.shape[0]
+    for c in range(2 * width, size):
+        off[c] = 0.0
+    for g in range(tables.groups.shape[0]):
+        if tables.groups[g, KINK] != SPEED:
+            continue
+        for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+            way, fastest, turned = _way_back(integration, model, k, share)
+            if way > 0.0:
+                c = 2 * width + tables.state[k]
+                off[c] = share * h * way * _more(tables, rows, g, k, fastest) / abs(fastest)
+                scale = integration.atol[c] + integration.rtol * max(abs(integration.x[c]), abs(model.state[c]))
+                total += (off[c] / scale) ** 2
+                first = min(first, turned)
+    return np.sqrt(total / size), first
+
+
+@compiled
+def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
+    """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
+    tables, dense, side = model.tables, integration.dense, model.work.rows[SIDE, k]
+    start, end = side * integration.kinks[k], side * model.work.rows[SPEED, k]
+    width, one, two, three = model.linear.mass.shape[0], 0.0, 0.0, 0.0
+    for e in range(tables.arm_start[k], tables.arm_start[k + 1]):
+        arm, c = side * model.work.arm[e], width + tables.arm_at[e]
+        one += arm * dense[0, c]
+        two += arm * dense[1, c]
+        if dense.shape[0] > 2:
+            three += arm * dense[2, c]
+    way, fastest, turned = 0.0, 0.0, 1.0
+    if 4.0 * min(start, end) >= abs(one) + abs(two) + abs(three):
+        return way, fastest, turned
+    before = start
+    for i in range(1, _LOOKS + 1):
+        s = share * i / _LOOKS
+        after = (1.0 - s) * start + s * (end + (1.0 - s) * (one + s * (two + s * three)))
+        low, high = min(before, after), max(before, after)
+        if low < 0.0:
+            # Of a straight line between two looks what is below zero.
+            way += 0.5 * low * low / (high - low) if high > 0.0 else -0.5 * (low + high)
+            left = after / (after - before) if after < 0.0 < before else 1.0
+            fastest, turned = min(fastest, low), min(turned, share * (i - left) / _LOOKS)
+        before = after
+    return way / _LOOKS, side * fastest, turned
+
+
+@compiled
+def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
+    """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
+    side, own, more = rows[SIDE, k], rows[SPEED, k], 0.0
+    # As it is held, on the other side, and at last as it was.
+    for weight in (-1.0, 1.0, 0.0):
+        rows[SIDE, k] = -side if weight > 0.0 else side
+        rows[SPEED, k] = speed if weight != 0.0 else own
+        call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 1)
+        more += weight * rows[RATE, k]
+    return more

@@ -1,0 +1,86 @@
+"""The parts of a finger and their tables of rows, made anew only for other numbers of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from finger_pin.description.caching import Remembered
+from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array, Routing
+from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.joint_friction import JointFriction
+from finger_pin.mechanism.joint_springs import JointSprings
+from finger_pin.mechanism.routes import Routes
+from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.tree import along_paths
+
+# Most changes of numbers leave most parts, and most tables, as they were.
+_KNOWN: Remembered[Any] = Remembered(1024)
+
+
+class Parts(NamedTuple):
+    """The parts that a description makes, as `Finger` has them."""
+
+    routing: Routing
+    tendons: Tendons
+    actuators: Actuators
+    joint_friction: JointFriction
+    stroke_limiter: StrokeLimiter
+    springs: JointSprings
+
+    @classmethod
+    def of(cls, description: FingerDescription) -> Parts:
+        """Return the parts of a description."""
+        routing, motors = Routing.from_description(description), description.actuators
+        friction, limits, each = description.joint_friction, description.stroke_limiter, description.joints.values()
+        return cls(
+            routing,
+            _KNOWN.of(
+                (routing, description.tendon_friction, description.passive_tendon),
+                lambda: Tendons.from_description(description),
+            ),
+            _KNOWN.of(
+                (routing, *motors, None, *motors.values()), lambda: Actuators.from_description(description, routing)
+            ),
+            _KNOWN.of((routing, friction), lambda: JointFriction.from_description(description, routing.loads)),
+            _KNOWN.of((limits, *each), lambda: StrokeLimiter.from_description(description)),
+            _KNOWN.of(("springs", *each), lambda: JointSprings.from_description(description)),
+        )
+
+    @property
+    def width(self) -> int:
+        """Number of coordinates: joints, masses of passive tendons, motors."""
+        return len(self.routing.joints) + self.routing.passive + len(self.actuators.names)
+
+    def hysteresis_rows(self) -> tuple[Rows, ...]:
+        """Return the tables of the springs' hysteresis."""
+        return tuple(_made(self.springs.hysteresis_rows, self.routing.joints, self.width))
+
+    def drives(self, rows: Sequence[Rows]) -> tuple[Rows, ...]:
+        """Return the tables that pull tendons: those of elastic ones, and those among further tables."""
+        return (*_made(self.actuators.tendon_rows, self.width), *(table for table in rows if table.pulls))
+
+    def tables(
+        self, description: FingerDescription, paths: Routes | None, drives: tuple[Rows, ...], pulled: dict[str, Array]
+    ) -> list[Rows]:
+        """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
+        joints, actuated, width = self.routing.joints, self.routing.actuated, self.width
+        pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.names))
+        if paths:
+            pulling = [along_paths(description, paths, table) for table in pulling]
+        friction = self.joint_friction
+        return [
+            *pulling,
+            _KNOWN.of((friction, *drives, width), lambda: friction.rows(joints, pulled, actuated, width)),
+            _made(self.stroke_limiter.rows, joints, width),
+            _made(self.springs.rows, joints, width),
+            *_made(self.actuators.rotor_rows, width),
+        ]
+
+
+def _made(make: Any, *given: Any) -> Any:
+    """Return a method's result for a part and values, anew only if either differs."""
+    return _KNOWN.of((make.__self__, make.__name__, *given), lambda: make(*given))

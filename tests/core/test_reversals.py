@@ -1,0 +1,45 @@
+"""Steps over which sliding turns round."""
+
+import numpy as np
+
+import finger_pin as fp
+from finger_pin.core.stepping.rosenbrock import DONE
+from finger_pin.simulation.setup import Setup
+
+TOLERANCE = 1e-5
+
+
+def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends():
+    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.4})
+
+    def motion(tolerance):
+        settings = {"rtol": tolerance, "atol_scale": tolerance}
+        simulation = scenario.simulation.model_copy(update=settings)
+        return Setup.of(scenario.model_copy(update={"simulation": simulation})).integrate()
+
+    loose, tight = motion(TOLERANCE), motion(1e-10)
+    ends = np.concatenate([[0.0], loose.ends[0]])
+    within = ends[:-1] + np.outer([0.25, 0.5, 0.75], np.diff(ends))
+    errors = [np.abs(loose.interpolate(at) - tight.interpolate(at))[:, :4] for at in (ends, within.ravel())]
+    assert errors[1].max() < 2.0 * errors[0].max()
+
+
+def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances():
+    """Each is compared with a run from its start at tight tolerances; unseen, reversals make ten of them."""
+    scenario = fp.load_scenario("fig6", {"simulation.duration": 0.4})
+    setup = Setup.of(scenario)
+
+    def part(tolerance):
+        settings = scenario.simulation.model_copy(update={"rtol": tolerance, "atol_scale": tolerance})
+        return setup.stepper(settings).parts[0]
+
+    loose, tight = part(TOLERANCE), part(1e-10)
+    room, start, errors = loose.room(1), loose.x.copy(), []
+    while loose.time < scenario.simulation.duration:
+        begin = loose.time
+        loose.advance(scenario.simulation.duration, room)
+        tight.restart(start, loose.attitude, begin)
+        assert tight.advance(loose.time)[0] == DONE
+        start = loose.x.copy()
+        errors.append(np.sqrt(np.mean(((start - tight.x) / (loose.atol + TOLERANCE * np.abs(start))) ** 2)))
+    assert len(errors) > 50 and max(errors) < 3.0
