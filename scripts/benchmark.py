@@ -17,6 +17,7 @@ import typer
 from finger_pin.commands.application import run_function
 from finger_pin.commands.console import noted, print_text
 from finger_pin.commands.options import Output, wrong
+from finger_pin.files import write_text
 
 PACKAGES = ("finger-pin", "numpy", "scipy", "numba", "pin", "mujoco", "scikit-sundae")
 #: The stages in their order, and the module of each.
@@ -49,7 +50,7 @@ def benchmark(
     ratios are of times from one run. Run it on a quiet machine.
     """
     names, begun = chosen(only), time.monotonic()
-    from benchmarks.store import Store, say, write
+    from benchmarks.store import Store, say
 
     output.mkdir(parents=True, exist_ok=True)
     with noted(f"what was measured is in {output}"):
@@ -67,8 +68,8 @@ def benchmark(
         lines = report.text(stages, reached, quick)
         whole = {"surroundings": around, "quick": quick, "stages": stages}
         whole["targets"] = [each._asdict() for each in reached]
-        write(output / "benchmark.json", json.dumps(whole, indent=1))
-        write(output / "benchmark.txt", lines)
+        write_text(output / "benchmark.json", json.dumps(whole, indent=1) + "\n")
+        write_text(output / "benchmark.txt", lines + "\n")
         draw(stages, output)
     print_text(f"{lines}\n\nMeasured in {(time.monotonic() - begun) / 60.0:.1f} min. Results are in {output}")
 

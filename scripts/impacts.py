@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from validation.impact_scenarios import FAMILIES, at_tolerance, impact_scenario
-from validation.progress import bar
 
 import finger_pin as fp
+from finger_pin.commands.console import count_bar
 from finger_pin.views.plots.style import new_figure, styled
 
 # The truth is a run at a thousandth of the tolerance, or at the tightest; one at ten times that must agree with it to
@@ -151,7 +151,7 @@ def main(given: list[str] | None = None) -> int:
     with (
         ProcessPoolExecutor(chosen.processes) as pool,
         path.open("a", newline="", encoding="utf-8") as file,
-        bar(len(wanted)) as advance,
+        count_bar(sys.stderr.isatty(), len(wanted)) as advance,
     ):
         writer = csv.DictWriter(file, [each.name for each in fields(Judged)])
         if not runs:
@@ -160,7 +160,7 @@ def main(given: list[str] | None = None) -> int:
             runs.append(run)
             writer.writerow(asdict(run))
             file.flush()
-            advance(len(runs) - len(done), f"{run.family} {run.seed}")
+            advance(1)
     for run in runs:
         if run.ratio < 1.0 / 3.0 or run.said:
             numbers = f"{run.tolerance:8.0e}  error {run.error:.1e}  estimate {run.estimate:.1e}"

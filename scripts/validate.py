@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from finger_pin.commands.application import run_function
-from finger_pin.commands.console import noted, print_text, talks
+from finger_pin.commands.console import bar, noted, print_text, talks
 from finger_pin.commands.options import Output, wrong
 
 if TYPE_CHECKING:
@@ -71,14 +71,14 @@ def chosen(names: str) -> tuple[str, ...]:
 def measured(names: tuple[str, ...]) -> tuple[Family, ...]:
     """Return the results of the named families of checks; on a terminal, show progress."""
     from validation.check import Section, failed
-    from validation.progress import bar
     from validation.report import Family
 
     found: list[Family] = []
-    with bar(len(names)) as advance:
+    texts = ("{task.fields[doing]}", "{task.completed} of {task.total} families")
+    with bar(sys.stderr.isatty(), *texts, total=len(names), doing="") as show:
         for name in names:
             module = import_module(f"validation.{FAMILIES[name]}")
-            advance(len(found), module.TITLE)
+            show(completed=len(found), doing=module.TITLE)
             about = " ".join((module.__doc__ or "").strip().split("\n\n")[0].split())
             try:
                 section = module.measure()

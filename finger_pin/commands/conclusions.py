@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -56,8 +55,7 @@ def conclusions(
     chosen = experiments(only or "abc")
     for each in chosen:
         each.check(loaded)
-    bar = count_bar(sum(each.runs for each in chosen)) if shown else nullcontext()
-    with bar as progress, noted(f"what was complete is in {output}"):
+    with count_bar(shown, sum(each.runs for each in chosen)) as progress, noted(f"what was complete is in {output}"):
         for each in chosen:
             found = each.measure(loaded, progress=progress)
             findings += each.judge(found)

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Self
+from typing import Any, Self
 
 import typer
 
@@ -60,51 +60,58 @@ class Interrupts:
 
 
 @contextmanager
-def progress_bar(duration: float) -> Iterator[Callable[[float], None]]:
-    """Show a bar on standard error, and give a function that takes the simulated time, s, out of a duration, s."""
+def bar(shown: bool, *texts: str, **fields: Any) -> Iterator[Callable[..., None]]:
+    """Show a bar on standard error if asked, between two texts and times, and give a function that sets its fields.
+
+    Args:
+        shown: Whether to show it.
+        texts: Before the bar and after it, with fields of ``task``.
+        fields: Those of its task at first, ``total`` among them.
+    """
+    if not shown:
+        yield lambda **fields: None
+        return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
-    text = TextColumn("{task.completed:.3f} of {task.total:g} s simulated")
-    with Progress(BarColumn(), text, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=duration)
-        yield lambda time: bar.update(task, completed=time)
+    before, after = texts
+    columns = (before, BarColumn(), after, TimeElapsedColumn(), "so far, left", TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task, total = progress.add_task("", **fields), fields["total"]
 
-
-@contextmanager
-def count_bar(total: int) -> Iterator[Callable[[int], None]]:
-    """Show a bar on standard error, and give a function that takes the number of further runs that are finished."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("runs"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda further: bar.advance(task, further)
-
-
-@contextmanager
-def runs_bar(what: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Show a bar on standard error, and give a function that takes the numbers of finished, failed and all runs."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    text = TextColumn("{task.completed} of {task.total} runs{task.fields[failed]}")
-    spent, left = TimeElapsedColumn(), TimeRemainingColumn()
-    columns = (TextColumn(what), BarColumn(), text, spent, TextColumn("so far, left"), left)
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        waiting = bar.add_task("", total=None, failed="")
-        tasks: list[TaskID] = []
-
-        def show(finished: int, failed: int, total: int) -> None:
-            note = f", {failed} failed" if failed else ""
-            if not tasks:
-                # Runs that were already finished took no time: the time that is left cannot be estimated from them.
-                bar.remove_task(waiting)
-                tasks.append(bar.add_task("", total=total, completed=finished, failed=note))
-            bar.update(tasks[0], completed=finished, total=total, failed=note)
+        def show(**fields: Any) -> None:
+            nonlocal total
+            # What was finished before there was a total took no time: the time that is left does not follow from it.
+            change = progress.reset if total is None else progress.update
+            total = fields.get("total", total)
+            change(task, **fields)
 
         yield show
+
+
+@contextmanager
+def progress_bar(shown: bool, duration: float) -> Iterator[Callable[[float], None] | None]:
+    """Show a bar if asked, and give a function that takes the simulated time, s, out of a duration, s, or None."""
+    with bar(shown, "", "{task.completed:.3f} of {task.total:g} s simulated", total=duration) as show:
+        yield (lambda time: show(completed=time)) if shown else None
+
+
+@contextmanager
+def count_bar(shown: bool, total: int) -> Iterator[Callable[[int], None]]:
+    """Show a bar if asked, and give a function that takes the number of further runs that are finished."""
+    with bar(shown, "", "{task.completed} of {task.total} runs", total=total) as show:
+        yield lambda further: show(advance=further)
+
+
+@contextmanager
+def runs_bar(shown: bool, what: str) -> Iterator[Callable[[int, int, int], None] | None]:
+    """Show a bar if asked, and give a function that takes the numbers of finished, failed and all runs, or None."""
+    with bar(shown, what, "{task.completed} of {task.total} runs{task.fields[note]}", total=None, note="") as show:
+
+        def count(finished: int, failed: int, total: int) -> None:
+            show(completed=finished, total=total, note=f", {failed} failed" if failed else "")
+
+        yield count if shown else None
 
 
 def complain(program: str, message: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,8 +28,8 @@ def controllers(output: Output = Path("results/controllers"), format: Format = N
 
     from finger_pin.description.loading import load_scenario
     from finger_pin.description.routing import Routing
-    from finger_pin.files import replacing
-    from finger_pin.studies.comparison import compare, to_csv
+    from finger_pin.files import write_table
+    from finger_pin.studies.comparison import compare, csv_rows
     from finger_pin.views.plots import save_figure
     from finger_pin.views.plots.experiments.controllers import plot_controllers
 
@@ -42,8 +41,7 @@ def controllers(output: Output = Path("results/controllers"), format: Format = N
         for name, result in runs(shown):
             rows.append(compare(name, result, coupling))
             joints = [str(each) for each in result["joint"].values]
-            with replacing(output / "controllers.csv") as temporary:
-                Path(temporary).write_text(to_csv(rows, joints, ["T5"]), encoding="utf-8")
+            write_table(output / "controllers.csv", csv_rows(rows, joints, ["T5"]))
             if name in DRAWN:
                 drawn[name] = result
         save_figure(plot_controllers(drawn, rows), output / "controllers", format)
@@ -57,11 +55,10 @@ def runs(shown: bool) -> Iterator[tuple[str, xr.Dataset]]:
     from finger_pin.simulation.simulate import simulate
     from finger_pin.studies.comparison import CASES
 
-    with count_bar(len(CASES)) if shown else nullcontext() as advance:
+    with count_bar(shown, len(CASES)) as advance:
         for name, overrides in CASES.items():
             yield name, simulate(load_scenario("fig6", overrides))
-            if advance is not None:
-                advance(1)
+            advance(1)
 
 
 def note(rows: list[Comparison]) -> str:

@@ -32,7 +32,7 @@ def export(
     settings: Settings = [],  # noqa: B006
 ) -> None:
     """Write a finger as URDF, MJCF or TOML, or the signals of a result as CSV."""
-    from finger_pin.files import replacing
+    from finger_pin.files import write_text
 
     results = Path(source).is_dir() or source.endswith(".nc")
     if target is None:
@@ -59,8 +59,7 @@ def export(
     else:
         text = written(described(source, settings), target.suffix)
         target.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(target) as temporary:
-            Path(temporary).write_text(text, encoding="utf-8", newline="\n")
+        write_text(target, text)
     print_text(f"wrote {target}")
 
 

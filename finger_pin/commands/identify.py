@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from finger_pin.commands.console import Interrupts, noted, print_text, talks
+from finger_pin.commands.console import Interrupts, bar, noted, print_text, talks
 from finger_pin.commands.options import Quiet, Restart, Settings, folder_name, overrides
 
 
@@ -39,7 +39,7 @@ def identify(
     changed = overrides(settings)
     folder = output or Path("results", folder_name(f"identify-{Path(bench).stem}", *settings))
     with Interrupts() as interrupts, noted("the same command goes on from what is finished"):
-        with _bar() if talks(quiet) else nullcontext() as progress, interrupts.patient():
+        with _progress(talks(quiet)) as progress, interrupts.patient():
             result = identify(
                 bench,
                 overrides=changed,
@@ -67,12 +67,7 @@ def _listing() -> str:
 
 
 @contextmanager
-def _bar() -> Iterator[Callable[[str, int, int], None]]:
-    """Show a bar on standard error for each piece of work."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading", total=None)
-        yield lambda words, done, total: bar.update(task, description=words, completed=done, total=total)
+def _progress(shown: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Show a bar if asked, and give a function that takes the piece of work, how much of it is done, and its size."""
+    with bar(shown, "{task.fields[words]}", "{task.completed} of {task.total}", total=None, words="reading") as show:
+        yield lambda words, done, total: show(words=words, completed=done, total=total)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -48,6 +46,7 @@ def reaction(
 
     from finger_pin.analysis import fingertip_loads, joint_reactions
     from finger_pin.description.loading import load_scenario
+    from finger_pin.files import write_table
     from finger_pin.simulation.simulate import simulate
     from finger_pin.views.plots import save_figure
     from finger_pin.views.plots.reaction import plot_reaction
@@ -56,7 +55,7 @@ def reaction(
     cases = {AS_IT_IS: loaded.environment.fingertip_force} | fingertip_loads(sizes)
     studies: dict[str, JointReactions] = {}
     motions: dict[str, list[float]] = {}
-    with count_bar(len(cases)) if shown else nullcontext() as advance, noted("nothing was written"):
+    with count_bar(shown, len(cases)) as advance, noted("nothing was written"):
         for label, force in cases.items():
             entries = changed | {FORCE: list(force)}
             result = simulate(load_scenario(scenario, entries))
@@ -66,10 +65,10 @@ def reaction(
             other = simulate(load_scenario(scenario, entries | corrected(loaded, studies[label])))
             moved = np.rad2deg(other.joint_position.values - result.joint_position.values)
             motions[label] = np.sqrt(np.mean(moved**2, axis=0)).tolist()
-            if advance is not None:
-                advance(1)
+            advance(1)
     rows = [row for label, study in studies.items() for row in table_rows(label, study.differences(), motions[label])]
-    write_csv(rows, output / "reaction.csv")
+    texts = ([f"{each:.6g}" if isinstance(each, float) else each for each in row.values()] for row in rows)
+    write_table(output / "reaction.csv", [rows[0], *texts])
     more = {label: study for label, study in studies.items() if label != AS_IT_IS}
     save_figure(plot_reaction(studies[AS_IT_IS], more), output / "reaction", format)
     if not quiet:
@@ -105,18 +104,6 @@ def table_rows(
             "thrust max, N": each.thrust,
             "tilt mean, mN m": 1e3 * each.tilt,
         }
-
-
-def write_csv(rows: list[dict[str, Any]], path: Path) -> None:
-    """Write all rows, whole or not at all."""
-    from finger_pin.files import replacing
-
-    with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(
-            {key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
-        )
 
 
 def show(rows: list[dict[str, Any]]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +29,7 @@ def reproduce(output: Output = Path("results/paper"), format: Format = None) -> 
         save_figure(plot_workspace(scenario.finger), output / "fig2", format),
         save_figure(plot_friction_law(), output / "fig3", format),
     ]
-    with progress_bar(scenario.simulation.duration) if shown else nullcontext() as progress:
+    with progress_bar(shown, scenario.simulation.duration) as progress:
         result = simulate(scenario, progress=progress)
     paths += draw_all(result, output, format=format)
     print_text("\n".join([*comparison(result), "", *map(str, paths)]))

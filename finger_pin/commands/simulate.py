@@ -115,8 +115,7 @@ def compute(
         from finger_pin.views.viewer import LiveView
 
         watched = LiveView(scenario.finger, title=scenario.title)
-    shown = talks(quiet)
-    bar = progress_bar(scenario.simulation.duration) if shown else nullcontext()
+    bar = progress_bar(talks(quiet), scenario.simulation.duration)
     with bar as progress, watched if live else nullcontext() as viewer, interrupts.patient(), warnings.catch_warnings():
         # The summary says what it would say.
         warnings.simplefilter("ignore", ScenarioWarning)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,7 +44,7 @@ def conduct(
     """
     shown = talks(quiet)
     with Interrupts() as interrupts, noted("the same command continues from what is recorded"):
-        with runs_bar(what) if shown else nullcontext() as progress, interrupts.patient():
+        with runs_bar(shown, what) as progress, interrupts.patient():
             result = run(progress, lambda: interrupts.requested)
         if figures and not interrupts.requested:
             from finger_pin.views import plots

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from finger_pin.files import replacing
+from finger_pin.files import replacing, write_table
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from finger_pin.description.routing import Array
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
@@ -23,8 +24,8 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         OSError: If it cannot be written, such as on a full disk.
     """
     if Path(path).suffix == ".csv":
-        with replacing(path) as temporary:
-            _write_csv(dataset, temporary)
+        columns = _columns(dataset)
+        write_table(path, [columns, *zip(*(column.tolist() for column in columns.values()), strict=True)])
         return
     with replacing(path) as temporary:
         try:
@@ -36,7 +37,8 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
             raise OSError(f"{Path(path).name}: {error}") from error
 
 
-def _write_csv(dataset: xr.Dataset, path: str | Path) -> None:
+def _columns(dataset: xr.Dataset) -> dict[str, Array]:
+    """Return the signals by name, label and unit."""
     columns = {"time (s)": dataset["time"].values}
     for name, signal in dataset.items():
         if "time" not in signal.dims:
@@ -47,10 +49,7 @@ def _write_csv(dataset: xr.Dataset, path: str | Path) -> None:
         for label, column in zip(labels, values.T, strict=True):
             which = f"[{' '.join(map(str, label))}]" if label else ""
             columns[f"{name}{which} ({signal.attrs.get('units', '1')})"] = column
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    return columns
 
 
 def load(path: str | Path) -> xr.Dataset:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -115,33 +113,20 @@ def compare(name: str, result: xr.Dataset, coupling: Array) -> Comparison:
     )
 
 
-def to_csv(rows: list[Comparison], joints: list[str], passive: list[str]) -> str:
-    """Return rows as comma-separated text with a header that has the units."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        [
-            "controller",
-            *(f"rms error {joint} (deg)" for joint in joints),
-            "rms error (deg)",
-            "rms error by passive tendons (deg)",
-            "peak command (N)",
-            "mean command (N)",
-            "tendon loss (mJ)",
-            "joint loss (mJ)",
-            *(f"mean tension {name} (N)" for name in passive),
-        ]
-    )
+_COLUMNS = {
+    "rms error (deg)": "error",
+    "rms error by passive tendons (deg)": "passive_error",
+    "peak command (N)": "peak_tension",
+    "mean command (N)": "mean_tension",
+    "tendon loss (mJ)": "tendon_loss",
+    "joint loss (mJ)": "joint_loss",
+}
+
+
+def csv_rows(rows: list[Comparison], joints: list[str], passive: list[str]) -> Iterator[list[str]]:
+    """Yield a header that has the units, and rows as text."""
+    tensions = (f"mean tension {name} (N)" for name in passive)
+    yield ["controller", *(f"rms error {joint} (deg)" for joint in joints), *_COLUMNS, *tensions]
     for row in rows:
-        numbers = [
-            *row.joint_error,
-            row.error,
-            row.passive_error,
-            row.peak_tension,
-            row.mean_tension,
-            row.tendon_loss,
-            row.joint_loss,
-            *row.passive_tension,
-        ]
-        writer.writerow([row.name, *(f"{number:.6g}" for number in numbers)])
-    return text.getvalue()
+        numbers = [*row.joint_error, *(getattr(row, name) for name in _COLUMNS.values()), *row.passive_tension]
+        yield [row.name, *(f"{number:.6g}" for number in numbers)]

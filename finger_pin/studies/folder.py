@@ -21,7 +21,7 @@ import tomli_w
 import xarray as xr
 
 from finger_pin.exceptions import InputError
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, versions
 from finger_pin.studies.keys import Starting
@@ -178,8 +178,7 @@ class StudyFolder:
             for each in present:
                 each.unlink()
         if self._restart or not present:
-            with replacing(study) as temporary:
-                Path(temporary).write_text(self._text, encoding="utf-8", newline="\n")
+            write_text(study, self._text)
 
     def _leave(self, made: list[Path]) -> None:
         if self._lock.is_locked:

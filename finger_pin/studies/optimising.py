@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
@@ -16,7 +15,7 @@ import xarray as xr
 from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.files import replacing
+from finger_pin.files import write_table, write_text
 from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
@@ -248,15 +247,13 @@ def _write_front(result: xr.Dataset, starting: Starting, folder: Path) -> None:
     scenarios.mkdir(exist_ok=True)
     for old in scenarios.glob("*.toml"):
         old.unlink()
-    with replacing(folder / "front.csv") as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(["design", *(f"{name} ({result[name].attrs['units']})" for name in columns)])
-        for number in range(1, 1 + int(result["front"].max())):
-            row = result.isel(sample=int(np.flatnonzero(result["front"].values == number)[0]))
-            name = f"{number:02d}"
-            table.writerow([name, *(repr(float(row[column])) for column in columns)])
-            scenario = starting.at({key: float(row[key]) for key in keys})
-            title = f"design {name} of the front of a search on {scenario.name}"
-            changed = scenario.model_copy(update={"name": f"{scenario.name[:50]}_front_{name}", "title": title})
-            with replacing(scenarios / f"{name}.toml") as text:
-                Path(text).write_text(to_toml(changed), encoding="utf-8", newline="\n")
+    table: list[list[object]] = [["design", *(f"{name} ({result[name].attrs['units']})" for name in columns)]]
+    for number in range(1, 1 + int(result["front"].max())):
+        row = result.isel(sample=int(np.flatnonzero(result["front"].values == number)[0]))
+        name = f"{number:02d}"
+        table.append([name, *(float(row[column]) for column in columns)])
+        scenario = starting.at({key: float(row[key]) for key in keys})
+        title = f"design {name} of the front of a search on {scenario.name}"
+        changed = scenario.model_copy(update={"name": f"{scenario.name[:50]}_front_{name}", "title": title})
+        write_text(scenarios / f"{name}.toml", to_toml(changed))
+    write_table(folder / "front.csv", table)

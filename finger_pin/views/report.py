@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 from finger_pin.views.plots.identification import plot_identification, plot_profiles
 
 _STYLE = """
@@ -71,8 +71,7 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{title}</title><style>{_STYLE}</style></head><body><main><h1>{title}</h1>{body}</main></body></html>"
     )
-    with replacing(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
+    write_text(path, text)
     return Path(path)
 
 

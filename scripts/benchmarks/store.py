@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import finger_pin
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 
 
 def say(text: str) -> None:
@@ -55,13 +55,7 @@ class Store:
         text = json.dumps({"code": self._code, "value": measure()}, indent=1)
         if digest() == self._code:
             path.parent.mkdir(parents=True, exist_ok=True)
-            write(path, text)
+            write_text(path, text + "\n")
         else:
             say(f"{name}: the code changed meanwhile; used, but not kept")
         return json.loads(text)["value"]
-
-
-def write(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    with replacing(path) as temporary:
-        Path(temporary).write_text(text + "\n", encoding="utf-8")

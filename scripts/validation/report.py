@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 from validation.check import Check, Section, Verdict
 from validation.page import page
 
@@ -140,5 +140,4 @@ def write(report: Report, folder: Path) -> None:
     }
     contents = {DATA: json.dumps(whole, indent=1) + "\n", PAGE: page(report, headline(report))}
     for name, content in contents.items():
-        with replacing(folder / name) as temporary:
-            Path(temporary).write_text(content, encoding="utf-8")
+        write_text(folder / name, content)

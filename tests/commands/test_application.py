@@ -80,10 +80,12 @@ def test_without_a_command_all_of_them_are_listed_and_a_misspelt_one_is_told_the
     assert capsys.readouterr().err == "finger-pin: No such command 'simulat'. Did you mean 'simulate'?\n"
 
 
-def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed(tmp_path):
-    command = [sys.executable, "-m", "finger_pin", "simulate", "--list"]
+def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed_and_lists_without_what_draws(tmp_path):
+    command = [sys.executable, "-X", "importtime", "-m", "finger_pin", "simulate", "--list"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "fig6" in done.stdout
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert "pydantic" in imported and not {"matplotlib", "meshcat", "netCDF4"} & imported
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     module, _, name = project["scripts"]["finger-pin"].partition(":")
     assert getattr(sys.modules[module], name) is application.run

@@ -190,23 +190,6 @@ def test_output_that_cannot_be_printed_is_told_in_one_line_and_results_are_kept(
     assert set(contents(here / "out")) >= ALL
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_ctrl_c_in_a_real_run_ends_it_with_a_trajectory(here):
-    arguments = ("s.toml", "--duration", "1000", "--set", "simulation.sample_rate=100", "--output", "results/s")
-    with subprocess_of(*arguments, folder=here) as process:
-        # The stage appears when the simulation begins.
-        deadline = time.monotonic() + 60.0
-        while not list(here.glob("results/s/.unfinished-*")) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert re.fullmatch(r"simulate.py: interrupted at t = [\d.e-]+ s; what was computed is in results/s\n", err)
-    assert set(contents(here / "results" / "s")) == {"scenario.toml", "trajectory.nc"}
-    assert "Tracking error" in out
-
-
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_a_disk_that_fills_up_in_a_real_run_is_told_in_one_line(here):
     import resource

@@ -168,19 +168,6 @@ def test_wrong_options_are_told_without_importing_anything_heavy(here):
     assert done.stdout == "2 set()\n"
 
 
-def test_listing_imports_neither_matplotlib_nor_meshcat(here):
-    code = (
-        "import runpy, sys\n"
-        f"sys.argv = ['simulate.py', '--list']\n"
-        "try:\n"
-        f"    runpy.run_path({str(SCRIPT)!r}, run_name='__main__')\n"
-        "finally:\n"
-        "    print({'matplotlib', 'meshcat', 'netCDF4'} & set(sys.modules), file=sys.stderr)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=here, capture_output=True, text=True, check=True)
-    assert done.stderr == "set()\n"
-
-
 def test_a_run_without_figures_does_not_import_what_draws_them(here):
     code = (
         "import sys\n"

@@ -1,6 +1,5 @@
 """The comparison of controllers: its figures from their definitions, and the claim that it makes."""
 
-import csv
 from functools import partial
 
 import numpy as np
@@ -9,7 +8,7 @@ import xarray as xr
 
 import finger_pin as fp
 from finger_pin.commands.application import run
-from finger_pin.studies.comparison import CASES, compare, to_csv
+from finger_pin.studies.comparison import CASES, compare, csv_rows
 from finger_pin.views.plots.experiments.controllers import plot_controllers
 
 
@@ -67,7 +66,7 @@ def test_the_figures_are_those_of_their_definitions(runs, rows, coupling):
 
 def test_the_csv_file_has_a_header_and_a_line_per_controller(rows):
     joints = ["abduction", "proximal", "medial", "distal"]
-    lines = list(csv.reader(to_csv(list(rows.values()), joints, ["T5"]).splitlines()))
+    lines = list(csv_rows(list(rows.values()), joints, ["T5"]))
     assert len(lines) == 4 and len({len(line) for line in lines}) == 1
     assert [line[0] for line in lines[1:]] == list(rows)
     column = lines[0].index("peak command (N)")

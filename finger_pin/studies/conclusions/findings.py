@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import shutil
 from collections.abc import Iterable, Sequence
@@ -18,7 +17,7 @@ from rich.text import Text
 
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import expand
-from finger_pin.files import replacing
+from finger_pin.files import write_table
 from finger_pin.studies.conclusions.delivery import BROKEN, PassiveDelivery, crossing
 from finger_pin.studies.conclusions.influence import MOST_TENDON_FRICTION, FrictionInfluence, Sweep, error_at_work
 from finger_pin.studies.conclusions.posture import Transmission
@@ -88,10 +87,8 @@ def write_findings(findings: Sequence[Finding], path: str | Path) -> Path:
     """Write findings as CSV, whole or not at all, and return its path."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(target) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["part", "claim", "measured", "verdict"])
-        writer.writerows([each.part, each.claim, each.measured, each.verdict.value] for each in findings)
+    rows = ([each.part, each.claim, each.measured, each.verdict.value] for each in findings)
+    write_table(target, [["part", "claim", "measured", "verdict"], *rows])
     return target
 
 

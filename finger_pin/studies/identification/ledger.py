@@ -16,7 +16,7 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit, fit
 from finger_pin.studies.identification.intervals import Side
@@ -79,8 +79,7 @@ class Ledger:
             if self._made and not any(self._path.parent.iterdir()):
                 self._path.parent.rmdir()
         elif self._done:
-            with replacing(self._path) as temporary:
-                Path(temporary).write_text(json.dumps({"asked": self._asked, "done": self._done}), encoding="utf-8")
+            write_text(self._path, json.dumps({"asked": self._asked, "done": self._done}))
 
     def fit(self, name: str, problem: Problem, work: Callable[[], Fit]) -> Fit:
         """Return a minimum, or the one found before."""

@@ -15,7 +15,7 @@ from finger_pin.description.family import Family
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.identification.comparing import LawComparison
 from finger_pin.studies.identification.estimate import Fit
@@ -188,8 +188,7 @@ def write_outcome(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem
         OSError: If they cannot be written.
     """
     save(result, folder / "identification.nc")
-    with replacing(folder / "identified.toml") as temporary:
-        Path(temporary).write_text(identified_toml(result, folder, bench, problem), encoding="utf-8")
+    write_text(folder / "identified.toml", identified_toml(result, folder, bench, problem))
 
 
 def identified_toml(result: xr.Dataset, folder: Path, bench: ScenarioLike, problem: Problem) -> str:

@@ -15,7 +15,7 @@ from finger_pin.analysis import ForcePolytope
 from finger_pin.description.embedded import described
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.files import replacing
+from finger_pin.files import write_text
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.mechanism.geometry import LinkPoses
@@ -59,10 +59,8 @@ def write_animation(
     Raises:
         InputError: If the result lacks something that is shown.
     """
-    target, text = Path(path), animation_page(result, forces, ghost, finger)
-    with replacing(target) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8", newline="\n")
-    return target
+    write_text(path := Path(path), animation_page(result, forces, ghost, finger))
+    return path
 
 
 def animation_page(

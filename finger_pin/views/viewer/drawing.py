@@ -13,7 +13,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.scene import SLACK_TENSION, Scene, scale_above
-from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, solid_commands
+from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, set_object, solid_commands
 
 if TYPE_CHECKING:
     import meshcat
@@ -114,13 +114,9 @@ def _tube(name: str, points: Array, radius: float, colours: Array) -> Command:
     }
     attributes = {key: pack_numpy_array(each.reshape(-1, 3).T.astype(np.float32)) for key, each in buffers.items()}
     index = pack_numpy_array(faces.T.astype(np.uint32))
-    path = f"{ROOT}/tendons/{name}"
-    shape = {"uuid": f"{path}:shape", "type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
-    look = {"uuid": f"{path}:look", "type": "MeshPhongMaterial", "vertexColors": True, "shininess": 40}
-    mesh = {"uuid": path, "type": "Mesh", "geometry": shape["uuid"], "material": look["uuid"]}
-    whole = {"metadata": {"version": 4.5, "type": "Object"}, "geometries": [shape], "materials": [look]}
-    matrix = placed(np.eye(3), np.zeros(3))
-    return {"type": "set_object", "path": path, "object": {**whole, "object": {**mesh, "matrix": matrix}}}
+    shape = {"type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
+    look = {"type": "MeshPhongMaterial", "vertexColors": True, "shininess": 40}
+    return set_object(f"{ROOT}/tendons/{name}", "Mesh", shape, look)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from finger_pin.analysis import ForcePolytope
 from finger_pin.description.routing import Array
-from finger_pin.views.viewer.solids import ROOT, Command
+from finger_pin.views.viewer.solids import ROOT, Command, newton_length, set_object
 
 _PATH = f"{ROOT}/forces"
 _COLOUR, _RIM, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22
@@ -34,9 +33,7 @@ class ForceSet:
     def of(cls, polytope: ForcePolytope, length: float) -> ForceSet:
         """Choose a scale at which the set is at most half as large as a finger of some length, m."""
         extent = float(np.max(np.linalg.norm(polytope.vertices, axis=1)))
-        wanted = _SHARE * length / extent if extent > 0.0 else 1.0
-        decade = 10.0 ** math.floor(math.log10(wanted))
-        return cls(polytope, max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-9)))
+        return cls(polytope, newton_length(_SHARE * length, extent) if extent > 0.0 else 1.0)
 
     @property
     def corners(self) -> Array:
@@ -72,22 +69,6 @@ def _object(path: str, kind: str, attributes: dict[str, Array], material: Comman
         name: {"itemSize": 3, "type": "Float32Array", "array": [float(each) for each in values.ravel()]}
         for name, values in attributes.items()
     }
-    shape = {"uuid": f"{path}:geometry", "type": "BufferGeometry", "data": {"attributes": buffers}}
-    look = {"uuid": f"{path}:material", "transparent": True, "depthWrite": False, **material}
-    identity = [float(entry) for entry in np.eye(4).ravel()]
-    return {
-        "type": "set_object",
-        "path": path,
-        "object": {
-            "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [shape],
-            "materials": [look],
-            "object": {
-                "uuid": path,
-                "type": kind,
-                "geometry": shape["uuid"],
-                "material": look["uuid"],
-                "matrix": identity,
-            },
-        },
-    }
+    shape = {"type": "BufferGeometry", "data": {"attributes": buffers}}
+    look = {"transparent": True, "depthWrite": False, **material}
+    return set_object(path, kind, shape, look)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, description_of
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, TreeGeometry, Visual, joint_axes
 from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.solids import ROOT, is_mesh, link_names, root_command, solid_commands
+from finger_pin.views.viewer.solids import ROOT, encode, is_mesh, link_names, root_command, solid_commands
 
 #: Below this tension a tendon is drawn loose, wholly at none, N.
 SLACK_TENSION = 0.05
@@ -195,12 +194,12 @@ class Scene:
         drawn = [none, *(path.points for path in self.geometry.paths(q, self.looseness(f), poses))]
         paths = np.concatenate(drawn, axis=-2)
         return {
-            "time": _encode(time, "<f8"),
+            "time": encode(time, "<f8"),
             "pose": _encode_poses(poses),
-            "path": _encode(np.clip(np.rint(paths / self._quantum), -_LARGEST, _LARGEST), "<i2"),
-            "tension": _encode(f, "<f4"),
-            "tip": _encode(self.tips(poses), "<f4"),
-            "joint": _encode(q, "<f4"),
+            "path": encode(np.clip(np.rint(paths / self._quantum), -_LARGEST, _LARGEST), "<i2"),
+            "tension": encode(f, "<f4"),
+            "tip": encode(self.tips(poses), "<f4"),
+            "joint": encode(q, "<f4"),
         }
 
     def tips(self, poses: LinkPoses) -> Array:
@@ -277,8 +276,4 @@ def scale_above(tension: float) -> float:
 def _encode_poses(poses: LinkPoses) -> str:
     quaternions = np.array([pin.Quaternion(r).coeffs() for r in poses.rotation.reshape(-1, 3, 3)])
     turned = quaternions.reshape(*poses.translation.shape[:-1], 4)
-    return _encode(np.concatenate([poses.translation, turned], axis=-1), "<f4")
-
-
-def _encode(values: ArrayLike, kind: str) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
+    return encode(np.concatenate([poses.translation, turned], axis=-1), "<f4")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -15,7 +13,19 @@ from finger_pin.description.embedded import described
 from finger_pin.description.objects import Object
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.geometry import LinkPoses
-from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Y_TO_Z, Command, cylinder, mesh, placed
+from finger_pin.views.viewer.solids import (
+    ROOT,
+    SOLID_OPACITY,
+    Y_TO_Z,
+    Command,
+    ball,
+    box,
+    cylinder,
+    encode,
+    mesh,
+    newton_length,
+    placed,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,7 +119,7 @@ class SceneObjects:
 
     def chunk(self) -> dict[str, str]:
         """Return the frames for the page."""
-        return {name: _encode(values) for name, values in (("object", self.poses), ("contact", self.contacts))}
+        return {name: encode(values, "<f4") for name, values in (("object", self.poses), ("contact", self.contacts))}
 
     def seen(self) -> Array:
         """Return the places of free objects and of contacts, as far as they are near the finger, shape (m, 3)."""
@@ -145,7 +155,9 @@ class SceneObjects:
         return np.stack([points, points + self._newton() * force], axis=-2)
 
     def _newton(self) -> float:
-        return _length(_ARROW * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0)))
+        return newton_length(
+            _ARROW * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
+        )
 
     @staticmethod
     def _placement(name: str, pose: Array) -> Command:
@@ -162,34 +174,14 @@ class SceneObjects:
             # The part of it that is nearest to the finger.
             side, thick = 2.0 * _WIDE * self.size, _THICK * self.size
             below = rotation.T @ (self.middle - place) * [1.0, 1.0, 0.0] - [0.0, 0.0, 0.5 * thick]
-            parts = [(_box(side, side, thick), np.eye(3), below)]
+            parts = [(box(side, side, thick), np.eye(3), below)]
         elif each.shape == "box":
-            parts = [(_box(*sizes), np.eye(3), np.zeros(3))]
+            parts = [(box(*sizes), np.eye(3), np.zeros(3))]
         elif each.shape == "sphere":
-            parts = [(_ball(sizes[0]), np.eye(3), np.zeros(3))]
+            parts = [(ball(sizes[0]), np.eye(3), np.zeros(3))]
         else:
             parts = [(cylinder(*sizes), Y_TO_Z, np.zeros(3))]
             if each.shape == "capsule":
                 ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
-                parts += [(_ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
+                parts += [(ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
         yield from ((*part, colour) for part in parts)
-
-
-def _length(longest: float, strongest: float) -> float:
-    """Return the length that stands for a newton, m: 1, 2 or 5 times a power of ten, and no arrow too long."""
-    if strongest <= 0.0:
-        return longest
-    decade = 10.0 ** math.floor(math.log10(longest / strongest))
-    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= longest / strongest * (1.0 + 1e-9))
-
-
-def _box(x: float, y: float, z: float) -> Command:
-    return {"type": "BoxGeometry", "width": x, "height": y, "depth": z}
-
-
-def _ball(radius: float) -> Command:
-    return {"type": "SphereGeometry", "radius": radius, "widthSegments": 32, "heightSegments": 24}
-
-
-def _encode(values: Array) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")

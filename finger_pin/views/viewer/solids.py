@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import math
 from collections.abc import Iterator
 from typing import Any
 
 import coal
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -48,7 +51,7 @@ def solid_commands(
     links = link_names(geometry)
     for visual in geometry.visuals:
         placement = visual.placement
-        shape, turn = _primitive(visual.name, visual.shape)
+        shape, turn = primitive(visual.name, visual.shape)
         own, opacity = visual.colour[:3], visual.colour[3] * SOLID_OPACITY
         path = f"{root}/{links[visual.link]}/{visual.name}"
         yield mesh(path, shape, placement.rotation @ turn, placement.translation, colour or own, opacity)
@@ -64,17 +67,21 @@ def root_command(rotation: Array) -> Command:
     return {"type": "set_transform", "path": ROOT, "matrix": placed(rotation, np.zeros(3))}
 
 
-def _primitive(name: str, shape: Any) -> tuple[Command, Array]:
+def primitive(name: str, shape: Any) -> tuple[Command, Array]:
+    """Return meshcat's geometry for one of Pinocchio, and the rotation between them.
+
+    Raises:
+        InputError: If it is no box, cylinder, sphere or mesh.
+    """
     kind = type(shape).__name__
     if kind == "Cylinder":
         return cylinder(shape.radius, 2.0 * shape.halfLength), Y_TO_Z
     if kind == "Sphere":
-        return {"type": "SphereGeometry", "radius": shape.radius, "widthSegments": 40, "heightSegments": 28}, np.eye(3)
+        return ball(shape.radius), np.eye(3)
     if is_mesh(shape):
         return _mesh_geometry(shape), np.eye(3)
     if kind == "Box":
-        width, height, depth = (2.0 * float(half) for half in shape.halfSide)
-        return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, np.eye(3)
+        return box(*(2.0 * float(half) for half in shape.halfSide)), np.eye(3)
     raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere or a mesh", kind)
 
 
@@ -111,7 +118,6 @@ def mesh(
     """Return meshcat's ``set_object`` command for a translucent solid."""
     red, green, blue = (round(255 * float(part)) for part in colour)
     material = {
-        "uuid": f"{path}:material",
         "type": "MeshPhongMaterial",
         "color": (red << 16) + (green << 8) + blue,
         "shininess": 30,
@@ -121,27 +127,44 @@ def mesh(
         # A face is lit as a whole, so that edges show where corners have no normals.
         "flatShading": shape["type"] == "BufferGeometry",
     }
-    solid = {
-        "uuid": path,
-        "type": "Mesh",
-        "geometry": f"{path}:geometry",
-        "material": material["uuid"],
-        "matrix": placed(rotation, translation),
-    }
-    return {
-        "type": "set_object",
-        "path": path,
-        "object": {
-            "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [{"uuid": solid["geometry"], **shape}],
-            "materials": [material],
-            "object": solid,
-        },
-    }
+    return set_object(path, "Mesh", shape, material, placed(rotation, translation))
+
+
+def set_object(path: str, kind: str, shape: Command, material: Command, matrix: list[float] | None = None) -> Command:
+    """Return meshcat's ``set_object`` command for a geometry with a material; without a matrix it is not moved."""
+    shape, material = {"uuid": f"{path}:geometry", **shape}, {"uuid": f"{path}:material", **material}
+    of = {"geometry": shape["uuid"], "material": material["uuid"], "matrix": matrix or np.eye(4).ravel().tolist()}
+    whole = {"metadata": {"version": 4.5, "type": "Object"}, "geometries": [shape], "materials": [material]}
+    return {"type": "set_object", "path": path, "object": {**whole, "object": {"uuid": path, "type": kind, **of}}}
+
+
+def box(x: float, y: float, z: float) -> Command:
+    """Return meshcat's geometry of a box."""
+    return {"type": "BoxGeometry", "width": x, "height": y, "depth": z}
+
+
+def ball(radius: float) -> Command:
+    """Return meshcat's geometry of a sphere."""
+    return {"type": "SphereGeometry", "radius": radius, "widthSegments": 40, "heightSegments": 28}
 
 
 def placed(rotation: Array, translation: Array) -> list[float]:
     """Return a pose as meshcat has it: 16 numbers, column by column."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
-    return [float(entry) for entry in matrix.T.ravel()]
+    found: list[float] = matrix.T.ravel().tolist()
+    return found
+
+
+def newton_length(longest: float, strongest: float) -> float:
+    """Return the length that stands for a newton, m: 1, 2 or 5 times a power of ten, so that no force is too long."""
+    if strongest <= 0.0:
+        return longest
+    wanted = longest / strongest
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-9))
+
+
+def encode(values: ArrayLike, kind: str) -> str:
+    """Return numbers as the page reads them: of a kind such as ``<f4``, in base64."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import scipy.spatial
@@ -33,7 +32,7 @@ from finger_pin.views.viewer.animation import Playback
 from finger_pin.views.viewer.drawing import FORCE_COLOUR, tension_colours
 from finger_pin.views.viewer.scene import Scene, scale_above
 from finger_pin.views.viewer.scene_objects import SceneObjects
-from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, is_mesh
+from finger_pin.views.viewer.solids import GROOVE_COLOUR, SOLID_OPACITY, Y_TO_Z, Command, primitive
 
 _BACKGROUND, _INK, _DIM, _TRACE = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
@@ -236,8 +235,8 @@ class _Film:
 def _solids(scene: Scene) -> Iterator[_Solid]:
     geometry = scene.geometry
     for visual in geometry.visuals:
-        turned = visual.placement.rotation
-        corners = _corners(visual.shape) @ turned.T + visual.placement.translation
+        shape, turn = primitive(visual.name, visual.shape)
+        corners = _corners(shape) @ (visual.placement.rotation @ turn).T + visual.placement.translation
         yield _Solid(visual.link, corners, (*visual.colour[:3], SOLID_OPACITY * visual.colour[3]))
     for pulley in geometry.pulleys:
         ring = _ring(max(abs(pulley.radius) - scene.tube_radius, 0.5 * scene.tube_radius), 0.8 * geometry.lanes.spacing)
@@ -247,31 +246,20 @@ def _solids(scene: Scene) -> Iterator[_Solid]:
 def _objects(objects: SceneObjects, first: int) -> Iterator[_Solid]:
     for index, name in enumerate(objects.by_name):
         for shape, turned, offset, colour in objects.parts(name):
-            corners = _corners_of(shape) @ turned.T + offset
+            corners = _corners(shape) @ turned.T + offset
             yield _Solid(first + index, corners, (*colour, SOLID_OPACITY))
 
 
-def _corners_of(shape: Command) -> Array:
+def _corners(shape: Command) -> Array:
     """Return points whose hull is, or looks like, a geometry of meshcat."""
     if shape["type"] == "BoxGeometry":
-        return np.array(
-            list(product(*((-0.5 * shape[side], 0.5 * shape[side]) for side in ("width", "height", "depth"))))
-        )
+        sides = [0.5 * shape[side] for side in ("width", "height", "depth")]
+        return np.array(list(product(*((-half, half) for half in sides))))
     if shape["type"] == "CylinderGeometry":
         return np.asarray(_ring(shape["radiusTop"], shape["height"]) @ Y_TO_Z)
+    if shape["type"] == "BufferGeometry":
+        return np.reshape(shape["data"]["attributes"]["position"]["array"], (-1, 3))
     return _round(shape["radius"])
-
-
-def _corners(shape: Any) -> Array:
-    """Return points whose hull is, or looks like, a shape that `solids` knows."""
-    kind = type(shape).__name__
-    if kind == "Cylinder":
-        return _ring(shape.radius, 2.0 * shape.halfLength)
-    if is_mesh(shape):
-        return np.asarray(shape.vertices())
-    if kind == "Box":
-        return np.array(list(product(*((-half, half) for half in shape.halfSide))))
-    return _round(shape.radius)
 
 
 def _round(radius: float) -> Array:
