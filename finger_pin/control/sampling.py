@@ -114,4 +114,4 @@ def sampling_settings(scenario: Scenario, period: float | None) -> SamplingSetti
         raise InputError("simulation.method", f"a control period needs one of {', '.join(TABLEAUS)}", method)
     if period is None:
         return settings
-    return (settings or SamplingSettings()).model_copy(update={"period": float(period)})
+    return (settings or SamplingSettings()).updated(period=float(period))

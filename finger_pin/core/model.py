@@ -1,4 +1,4 @@
-"""A mechanism with its inputs and its memory, bound once, and the three functions that step it.
+"""A mechanism with its inputs and its memory, bound once, and the functions that step it.
 
 Each function is compiled once, as a unit that is called through its address: what is linked into a caller would be
 optimised again there.

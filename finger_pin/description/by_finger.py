@@ -55,7 +55,7 @@ def of_finger(settings: _Settings, name: str) -> _Settings:
 
 
 def _of_finger(settings: _Settings, name: str) -> _Settings:
-    whole = settings.model_copy(update={"fingers": None})
+    whole = settings.updated(fingers=None)
     own: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
     if own is None:
         return whole

@@ -113,10 +113,7 @@ class HandSettings(Description):
 
     def parts(self) -> dict[str, HandSettings]:
         """Return hands of one finger each, by name."""
-        return {
-            name: self.model_copy(update={"fingers": {name: placed}, "name": name})
-            for name, placed in self.fingers.items()
-        }
+        return {name: self.updated(fingers={name: placed}, name=name) for name, placed in self.fingers.items()}
 
     def built(self) -> dict[str, FingerDescription]:
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
@@ -164,7 +161,7 @@ class HandSettings(Description):
     def _built(self, name: str, placed: PlacedFinger) -> FingerDescription:
         own = placed.rotation.T @ np.array(self.gravity)
         finger = scaled(placed.finger, placed.scale)
-        return finger.model_copy(update={"name": name, "gravity": tuple(own.tolist())})
+        return finger.updated(name=name, gravity=tuple(own.tolist()))
 
 
 def one_finger(description: FingerDescription) -> None:
@@ -205,14 +202,13 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
 
     def scaled_tendon(tendon: Tendon) -> Tendon:
         crossings = {
-            joint: crossing.model_copy(update={"radius": crossing.radius * scale})
-            for joint, crossing in tendon.crossings.items()
+            joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
         }
-        return tendon.model_copy(update={"crossings": crossings})
+        return tendon.updated(crossings=crossings)
 
     def scaled_joint(joint: Joint) -> Joint:
         link = joint.link and _TABLES.of((joint.link, scale), partial(scaled_link, joint.link))
-        return joint.model_copy(update={"link": link})
+        return joint.updated(link=link)
 
     joints = {name: _TABLES.of((joint, scale), partial(scaled_joint, joint)) for name, joint in finger.joints.items()}
     tendons = {
@@ -222,20 +218,18 @@ def scaled(finger: FingerDescription, scale: float) -> FingerDescription:
     lengths = {
         key: tuple((scale * expand(getattr(friction, key), len(joints))).tolist()) for key in ("coulomb", "stiction")
     }
-    update = {"joints": joints, "tendons": tendons, "joint_friction": friction.model_copy(update=lengths)}
-    return finger.model_copy(update=update)
+    update = {"joints": joints, "tendons": tendons, "joint_friction": friction.updated(**lengths)}
+    return finger.updated(**update)
 
 
 def _of_hand(finger: str, tendon: Tendon) -> Tendon:
     """Return a tendon whose crossings are of the joints of a hand."""
-    return tendon.model_copy(
-        update={"crossings": {f"{finger}.{name}": each for name, each in tendon.crossings.items()}}
-    )
+    return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})
 
 
 def _pulling(finger: str, actuator: Actuator) -> Actuator:
     """Return an actuator whose tendons are those of a hand."""
-    return actuator.model_copy(update={"tendons": tuple(f"{finger}.{tendon}" for tendon in actuator.tendons)})
+    return actuator.updated(tendons=tuple(f"{finger}.{tendon}" for tendon in actuator.tendons))
 
 
 def _joined(parts: dict[str, FingerDescription], group: str, table: type[_Table]) -> _Table:

@@ -161,20 +161,18 @@ class Scenario(Description):
 
         controller = of_finger(self.controller, name)
         if controller.tensions is not None:
-            controller = controller.model_copy(update={"tensions": own(controller.tensions)})
+            controller = controller.updated(tensions=own(controller.tensions))
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
-            update = {"position": own(initial.position), "velocity": own(initial.velocity)}
-            simulation = simulation.model_copy(update={"initial": initial.model_copy(update=update)})
-        return self.model_copy(
-            update={
-                "finger": alone.joined(),
-                "hand": alone,
-                "controller": controller,
-                "reference": self.reference.model_copy(update={"joints": own(self.reference.joints)}),
-                "environment": of_finger(self.environment, name),
-                "simulation": simulation,
-            }
+            start = {"position": own(initial.position), "velocity": own(initial.velocity)}
+            simulation = simulation.updated(initial=start)
+        return self.updated(
+            finger=alone.joined(),
+            hand=alone,
+            controller=controller,
+            reference={"joints": own(self.reference.joints)},
+            environment=of_finger(self.environment, name),
+            simulation=simulation,
         )
 
     def _check_names(self) -> None:

@@ -84,7 +84,7 @@ class SignalSettings(Description):
                 update[entry] = getattr(self, entry) / factor
         if self.times is not None:
             update["times"] = Series(np.asarray(self.times) / factor)
-        return self.model_copy(update=update)
+        return self.updated(**update)
 
     @property
     def greatest(self) -> float:

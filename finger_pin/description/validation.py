@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Any, ClassVar, NoReturn, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,13 @@ class Description(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
     file_keys: ClassVar[tuple[str, ...]] = ()
+
+    def updated(self, **entries: Any) -> Self:
+        """Return a copy with other values of some entries, unchecked; a dictionary updates a part that is there."""
+        for name, entry in entries.items():
+            if isinstance(entry, dict) and isinstance(part := getattr(self, name), Description):
+                entries[name] = part.updated(**entry)
+        return self.model_copy(update=entries)
 
 
 def problem(entry: str, allowed: str, value: Any = None) -> PydanticCustomError:

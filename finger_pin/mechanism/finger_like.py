@@ -35,9 +35,8 @@ def described_by(scenario: Scenario, finger: Finger | None) -> Scenario:
     """Return a scenario with the objects and the description of the finger that replaces its own; a hand's stays."""
     if finger is None:
         return scenario
-    environment = scenario.environment.model_copy(update={"objects": finger.made_of[2]})
-    found = scenario.model_copy(update={"environment": environment})
-    return found if scenario.hand is not None else found.model_copy(update={"finger": finger.description})
+    own = {} if scenario.hand is not None else {"finger": finger.description}
+    return scenario.updated(environment={"objects": finger.made_of[2]}, **own)
 
 
 def is_other_hand(finger: Finger | None, scenario: Scenario) -> bool:

@@ -123,10 +123,7 @@ class Surroundings:
         if self.world or objects is None or [*objects] != [*self.objects]:
             return False
         pairs = [(each, objects[name]) for name, each in self.objects.items()]
-        return all(
-            one is two or (one.moves == two.moves and one.model_copy(update={"path": two.path}) == two)
-            for one, two in pairs
-        )
+        return all(one is two or (one.moves == two.moves and one.updated(path=two.path) == two) for one, two in pairs)
 
     def with_objects(self, objects: Mapping[str, Object]) -> Surroundings:
         """Return the same around a finger with such objects."""

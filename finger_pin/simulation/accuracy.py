@@ -188,7 +188,7 @@ def with_tighter(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with tolerances divided by a factor, as far as tolerances go."""
     settings = scenario.simulation
     tighter = {name: max(getattr(settings, name) / factor, least) for name, least in TOLERANCES.items()}
-    return scenario.model_copy(update={"simulation": settings.model_copy(update=tighter)})
+    return scenario.updated(simulation=tighter)
 
 
 def _patient(trajectory: Trajectory, most: float = np.inf) -> Stop:

@@ -238,5 +238,4 @@ class Prepared:
 def _tight(scenario: Scenario) -> Scenario:
     """Return a scenario whose tolerances are tight."""
     own = scenario.simulation
-    update = {"rtol": min(own.rtol, _TIGHT), "atol_scale": min(own.atol_scale, _TIGHT)}
-    return scenario.model_copy(update={"simulation": own.model_copy(update=update)})
+    return scenario.updated(simulation={"rtol": min(own.rtol, _TIGHT), "atol_scale": min(own.atol_scale, _TIGHT)})

@@ -79,11 +79,9 @@ class Crew:
         """Compile code that other processes then find in the cache, rather than each of them on its own."""
         if self._threads:
             return
-        settings = scenario.simulation
-        shorter = settings.model_copy(update={"duration": min(_GLANCE, settings.duration)})
         # Its run reports why a scenario cannot be simulated.
         with suppress(FingerPinError):
-            simulate(scenario.model_copy(update={"simulation": shorter}))
+            simulate(scenario.updated(simulation={"duration": min(_GLANCE, scenario.simulation.duration)}))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

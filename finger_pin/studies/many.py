@@ -139,7 +139,7 @@ def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
     """Return scenarios of which those with the same finger have the same object, which is then built once."""
     first = runs[0]
     return [
-        run.model_copy(update={"finger": first.finger, "environment": first.environment})
+        run.updated(finger=first.finger, environment=first.environment)
         if run.hand is None and (run.finger, run.environment) == (first.finger, first.environment)
         else run
         for run in runs

@@ -254,6 +254,6 @@ def _write_front(result: xr.Dataset, starting: Starting, folder: Path) -> None:
         table.append([name, *(float(row[column]) for column in columns)])
         scenario = starting.at({key: float(row[key]) for key in keys})
         title = f"design {name} of the front of a search on {scenario.name}"
-        changed = scenario.model_copy(update={"name": f"{scenario.name[:50]}_front_{name}", "title": title})
+        changed = scenario.updated(name=f"{scenario.name[:50]}_front_{name}", title=title)
         write_text(scenarios / f"{name}.toml", to_toml(changed))
     write_table(folder / "front.csv", table)

@@ -58,8 +58,7 @@ class Point:
 
 def settled(scenario: Scenario, **settings: Any) -> Scenario:
     """Return a scenario with other simulation settings."""
-    simulation = scenario.simulation.model_copy(update=settings)
-    return scenario.model_copy(update={"simulation": simulation})
+    return scenario.updated(simulation=settings)
 
 
 def truth(scenario: Scenario) -> tuple[Array, dict[str, float]]:

@@ -140,5 +140,4 @@ def impact_scenario(family: str, seed: int) -> fp.Scenario:
 
 def at_tolerance(scenario: fp.Scenario, tolerance: float) -> fp.Scenario:
     """Return a scenario with another tolerance."""
-    settings = scenario.simulation.model_copy(update={"rtol": tolerance, "atol_scale": tolerance})
-    return scenario.model_copy(update={"simulation": settings})
+    return scenario.updated(simulation={"rtol": tolerance, "atol_scale": tolerance})

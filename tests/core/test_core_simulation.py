@@ -20,7 +20,7 @@ def run(scenario, *, tolerance=1e-6, duration=None, method="Rodas5P", rate=1000.
     settings = {"method": method, "rtol": tolerance, "atol_scale": tolerance, "sample_rate": rate}
     if duration is not None:
         settings["duration"] = duration
-    changed = scenario.model_copy(update={"simulation": scenario.simulation.model_copy(update=settings)})
+    changed = scenario.updated(simulation=settings)
     return fp.simulate(changed, **options)
 
 

@@ -14,8 +14,7 @@ def test_steps_that_end_at_reversals_move_in_between_as_exactly_as_at_their_ends
 
     def motion(tolerance):
         settings = {"rtol": tolerance, "atol_scale": tolerance}
-        simulation = scenario.simulation.model_copy(update=settings)
-        return Setup.of(scenario.model_copy(update={"simulation": simulation})).integrate()
+        return Setup.of(scenario.updated(simulation=settings)).integrate()
 
     loose, tight = motion(TOLERANCE), motion(1e-10)
     ends = np.concatenate([[0.0], loose.ends[0]])
@@ -30,7 +29,7 @@ def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances(
     setup = Setup.of(scenario)
 
     def part(tolerance):
-        settings = scenario.simulation.model_copy(update={"rtol": tolerance, "atol_scale": tolerance})
+        settings = scenario.simulation.updated(rtol=tolerance, atol_scale=tolerance)
         return setup.stepper(settings).parts[0]
 
     loose, tight = part(TOLERANCE), part(1e-10)

@@ -132,7 +132,7 @@ def test_a_scenario_extends_another_and_keeps_its_own_name(tmp_path):
     scenario, base = load_scenario(tmp_path / "softer one.toml"), load_scenario("fig6")
     assert scenario.controller.gain == 0.5
     assert scenario.name == "softer_one"
-    assert scenario.model_copy(update={"controller": base.controller, "name": base.name}) == base
+    assert scenario.updated(controller=base.controller, name=base.name) == base
 
 
 def test_extends_reaches_across_folders_and_generations(tmp_path):

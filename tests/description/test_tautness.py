@@ -59,10 +59,10 @@ def test_no_posture_within_the_ranges_is_worse_than_the_worst_corner(described):
     for point in draw.uniform(0.0, 1.5, (40, 2)):
         single = described(**OPENING, low=0.0, high=1.5)
         at = {
-            name: joint.model_copy(update={"range": (float(angle), float(angle) + 1e-12)})
+            name: joint.updated(range=(float(angle), float(angle) + 1e-12))
             for (name, joint), angle in zip(single.joints.items(), point, strict=True)
         }
-        assert tautness(single.model_copy(update={"joints": at}), 0.3).spare >= least - 1e-9
+        assert tautness(single.updated(joints=at), 0.3).spare >= least - 1e-9
 
 
 def test_a_spring_that_is_relaxed_within_the_range_leaves_the_tendon_slack(described):

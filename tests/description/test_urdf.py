@@ -190,9 +190,9 @@ def test_a_file_from_urdf_is_read_by_pinocchio_as_the_description_is():
 
 def test_a_joint_without_a_link_is_an_error_that_names_it():
     finger = load_finger("planar")
-    joints = {**finger.joints, "distal": finger.joints["distal"].model_copy(update={"link": None})}
+    joints = {**finger.joints, "distal": finger.joints["distal"].updated(link=None)}
     with pytest.raises(InputError) as caught:
-        to_urdf(finger.model_copy(update={"joints": joints}))
+        to_urdf(finger.updated(joints=joints))
     assert caught.value.entry == "finger.joints.distal.link"
 
 
@@ -201,5 +201,5 @@ def test_a_joint_with_a_name_that_the_urdf_needs_is_an_error_that_names_it(name)
     finger = load_finger("planar")
     joints = {"proximal": finger.joints["proximal"], name: finger.joints["distal"]}
     with pytest.raises(InputError) as caught:
-        to_urdf(finger.model_copy(update={"joints": joints}))
+        to_urdf(finger.updated(joints=joints))
     assert caught.value.entry == f"finger.joints.{name}"

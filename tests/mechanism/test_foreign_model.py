@@ -170,7 +170,7 @@ def test_the_finger_follows_its_reference_with_taut_tendons(finger, motion):
 
 
 def test_gravity_is_the_description_s(description, hand):
-    sideways = description.model_copy(update={"gravity": (0.0, 3.0, 0.0)})
+    sideways = description.updated(gravity=(0.0, 3.0, 0.0))
     finger = fp.Finger.from_model(sideways, hand, JOINTS, TIP)
     np.testing.assert_array_equal(finger.rigid_body.model.gravity.linear, [0.0, 3.0, 0.0])
     np.testing.assert_array_equal(hand.gravity.linear, [0.0, 0.0, -9.81])

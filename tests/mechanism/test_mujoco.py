@@ -231,9 +231,9 @@ def test_a_scenario_is_exported_as_its_finger_or_hand_is():
 
 def test_a_joint_without_a_link_is_an_error_that_names_it():
     finger = fp.load_finger("planar")
-    joints = {**finger.joints, "distal": finger.joints["distal"].model_copy(update={"link": None})}
+    joints = {**finger.joints, "distal": finger.joints["distal"].updated(link=None)}
     with pytest.raises(InputError) as caught:
-        to_mjcf(finger.model_copy(update={"joints": joints}))
+        to_mjcf(finger.updated(joints=joints))
     assert caught.value.entry == "finger.joints.distal.link"
 
 

@@ -70,7 +70,7 @@ def test_signals_that_share_knots_are_each_what_they_are_alone():
 
 
 def test_a_sinusoid_is_added_to_every_kind():
-    both = STEP.model_copy(update={"amplitude": 0.2, "frequency": 0.7, "phase": 0.4})
+    both = STEP.updated(amplitude=0.2, frequency=0.7, phase=0.4)
     times = np.linspace(0.0, 2.0, 50)
     expected = values(STEP, times) + 0.2 * np.sin(2.0 * math.pi * 0.7 * times + 0.4)
     np.testing.assert_allclose(values(both, times), expected, atol=1e-14)

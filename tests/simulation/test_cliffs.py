@@ -141,7 +141,7 @@ def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monk
     ) as found:
         fp.simulate(scenario)
     fitting = float(str(found.value).rsplit(" ", 1)[-1])
-    settings = scenario.simulation.model_copy(update={"sample_rate": 0.99 * fitting})
+    settings = scenario.simulation.updated(sample_rate=0.99 * fitting)
     recording.check_memory(settings, fp.Finger("ub"))
 
 
@@ -223,8 +223,7 @@ def test_a_finger_that_exchanges_less_than_a_microjoule_closes_its_account_at_to
     assert 0.0 < sum(works) < 1e-6
     assert share_left_open(result) < 1e-5
     assert (result.attrs["rtol"], result.attrs["atol_scale"]) == (1e-7, 1e-7)
-    tighter = scenario.simulation.model_copy(update={"rtol": 1e-7, "atol_scale": 1e-7})
-    alone = fp.simulate(scenario.model_copy(update={"simulation": tighter}))
+    alone = fp.simulate(scenario.updated(simulation={"rtol": 1e-7, "atol_scale": 1e-7}))
     np.testing.assert_array_equal(result.joint_position, alone.joint_position)
     said = " ".join(summarize(result).split())
     assert "rtol 1e-07" in said and "repeated at rtol 1e-07: at 1e-06 the energy account closes only to" in said

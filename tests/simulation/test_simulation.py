@@ -251,7 +251,7 @@ def test_ctrl_c_in_python_keeps_what_was_computed(late):
 
 def test_runs_of_a_scenario_share_its_finger_and_what_surrounds_it_makes_another():
     around = fp.load_scenario("press")
-    alone = around.model_copy(update={"environment": around.environment.model_copy(update={"objects": None})})
+    alone = around.updated(environment={"objects": None})
     fingers = [ClosedLoop.from_scenario(scenario).finger for scenario in (alone, around, alone)]
     assert fingers[0] is fingers[2]
     assert fingers[0].surroundings is None

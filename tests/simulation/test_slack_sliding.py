@@ -36,6 +36,6 @@ def test_a_tendon_lets_its_bristles_go_in_the_same_way_however_small_the_floor()
 def test_a_passive_tendon_goes_slack_at_great_speed_with_a_small_floor() -> None:
     # Its load falls to the floor of 15 nN within less than the resolution of time.
     scenario = wild_scenario(274)
-    short = scenario.simulation.model_copy(update={"duration": 1.5e-5, "sample_rate": 2e7})
-    tension = fp.simulate(scenario.model_copy(update={"simulation": short})).tendon_tension.sel(tendon="T0")
+    short = scenario.updated(simulation={"duration": 1.5e-5, "sample_rate": 2e7})
+    tension = fp.simulate(short).tendon_tension.sel(tendon="T0")
     assert float(tension[0]) > 0.9 and float(tension.min()) == 0.0 and tension.time[-1] == 1.5e-5

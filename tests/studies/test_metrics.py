@@ -144,10 +144,9 @@ def test_the_settling_time_of_a_first_order_response_is_four_time_constants():
 def test_a_winding_warms_up_as_its_closed_form_and_a_motor_without_its_numbers_is_told():
     scenario = fp.load_scenario("servo")
     motor = scenario.finger.actuators["M1"].motor
-    warm = motor.model_copy(update={"winding": Winding(thermal_resistance=8.0, time_constant=20.0, ambient=30.0)})
-    actuators = {name: each.model_copy(update={"motor": warm}) for name, each in scenario.finger.actuators.items()}
-    finger = scenario.finger.model_copy(update={"actuators": actuators})
-    run, time = Run(scenario.model_copy(update={"finger": finger})), np.array([0.0, 0.1, 5.0, 30.0])
+    warm = motor.updated(winding=Winding(thermal_resistance=8.0, time_constant=20.0, ambient=30.0))
+    actuators = {name: each.updated(motor=warm) for name, each in scenario.finger.actuators.items()}
+    run, time = Run(scenario.updated(finger={"actuators": actuators})), np.array([0.0, 0.1, 5.0, 30.0])
     current = np.array([[0.5], [0.5], [0.5], [0.5]]) * np.array([1.0, 0.2, 0.0, 0.0])
     run.result = xr.Dataset({"motor_current": (("time", "motor"), current)}, {"time": time, "motor": list(actuators)})
     expected = 30.0 + 8.0 * motor.constants[1] * 0.25 * (1.0 - np.exp(-30.0 / 20.0))

@@ -1,8 +1,8 @@
 """Compiled code: the only place that knows the compiler, which is numba.
 
 `functions` compiles, `tables` hands over arguments of the `kinds` there are, `calls` calls what lies at an address, and
-`reach` tells which code on disk still holds. What rests on numba's inside is in `inside`. The rest of the core sees the
-names below.
+`dependencies` tells which code on disk still holds. What rests on numba's inside is in `numba_internals`. The rest of
+the core sees the names below.
 """
 
 from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, numbers, put

@@ -2,7 +2,8 @@
 
 Numba keeps code beside the file that a function stands in, under the function's name, as long as that file is the
 same. It sees neither what a function calls in other files nor which globals it was given: so functions are handed to
-it under a name that tells all that they reach (`reach`), as if they stood in an empty file of the cache's folder.
+it under a name that tells all that they reach (`dependencies`), as if they stood in an empty file of the cache's
+folder.
 Where no folder can be written, everything is compiled anew in each process. What takes its time is said once, as a
 warning of the logger ``finger_pin``, which Python prints on standard error unless logging is set up otherwise.
 """

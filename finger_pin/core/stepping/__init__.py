@@ -1,1 +1,1 @@
-"""Steps: Rosenbrock methods, islands, touches that no step misses, and other integrators."""
+"""Steps: Rosenbrock methods, where steps end, islands, errors and slopes of a run, and other integrators."""

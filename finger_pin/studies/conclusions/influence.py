@@ -191,9 +191,7 @@ def gripping(scenario: Scenario, *, progress: Progress | None = None) -> Grippin
         IntegrationError: If a run could not be finished.
     """
     swing = swinging_to_lock(scenario)
-    law = swing.finger.joint_friction
-    even = swing.finger.model_copy(update={"joint_friction": law.model_copy(update={"coulomb": law.stiction})})
-    swing = swing.model_copy(update={"finger": even})
+    swing = swing.updated(finger={"joint_friction": {"coulomb": swing.finger.joint_friction.stiction}})
     margin = self_locking_margin(swing).margin
     shares = np.array(_SHARES)
     runs = simulated(

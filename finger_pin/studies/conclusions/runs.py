@@ -127,54 +127,42 @@ def scaled(value: Numbers, factor: float) -> Numbers:
 def with_joint_friction(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with M^d and M^c of the joints times a factor."""
     law = scenario.finger.joint_friction
-    update = {"coulomb": scaled(law.coulomb, factor), "stiction": scaled(law.stiction, factor)}
-    finger = scenario.finger.model_copy(update={"joint_friction": law.model_copy(update=update)})
-    return scenario.model_copy(update={"finger": finger})
+    more = {"coulomb": scaled(law.coulomb, factor), "stiction": scaled(law.stiction, factor)}
+    return scenario.updated(finger={"joint_friction": more})
 
 
 def with_tendon_friction(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario with mu_e of the tendons times a factor."""
-    law = scenario.finger.tendon_friction
-    update = {"tendon_friction": law.model_copy(update={"coulomb": scaled(law.coulomb, factor)})}
-    return scenario.model_copy(update={"finger": scenario.finger.model_copy(update=update)})
+    coulomb = scaled(scenario.finger.tendon_friction.coulomb, factor)
+    return scenario.updated(finger={"tendon_friction": {"coulomb": coulomb}})
 
 
 def with_minimum_tension(scenario: Scenario, tension: float) -> Scenario:
     """Return a scenario with f0 in N for all tendons."""
-    return scenario.model_copy(
-        update={"controller": scenario.controller.model_copy(update={"minimum_tension": tension})}
-    )
+    return scenario.updated(controller={"minimum_tension": tension})
 
 
 def with_passive_tension(scenario: Scenario, tension: tuple[float, ...]) -> Scenario:
     """Return a scenario whose references (20) let passive tendons carry f5^d, N."""
-    update = {"passive_tension": tension}
-    return scenario.model_copy(update={"controller": scenario.controller.model_copy(update=update)})
+    return scenario.updated(controller={"passive_tension": tension})
 
 
 def weightless(scenario: Scenario) -> Scenario:
     """Return a scenario without gravity."""
-    finger = scenario.finger.model_copy(update={"gravity": (0.0, 0.0, 0.0)})
-    return scenario.model_copy(update={"finger": finger})
+    return scenario.updated(finger={"gravity": (0.0, 0.0, 0.0)})
 
 
 def lasting(scenario: Scenario, duration: float, samples: int) -> Scenario:
     """Return a scenario of another duration, s, with about so many samples."""
-    update = {"duration": duration, "sample_rate": samples / duration}
-    return scenario.model_copy(update={"simulation": scenario.simulation.model_copy(update=update)})
+    return scenario.updated(simulation={"duration": duration, "sample_rate": samples / duration})
 
 
 def at_speed(scenario: Scenario, factor: float) -> Scenario:
     """Return a scenario whose reference runs through the same motion in its time over a factor."""
     joints = {name: joint.faster(factor) for name, joint in scenario.reference.joints.items()}
     settings = scenario.simulation
-    update = {"duration": settings.duration / factor, "sample_rate": settings.sample_rate * factor}
-    return scenario.model_copy(
-        update={
-            "reference": scenario.reference.model_copy(update={"joints": joints}),
-            "simulation": settings.model_copy(update=update),
-        }
-    )
+    quicker = {"duration": settings.duration / factor, "sample_rate": settings.sample_rate * factor}
+    return scenario.updated(reference={"joints": joints}, simulation=quicker)
 
 
 def swinging_to_lock(scenario: Scenario) -> Scenario:
@@ -190,8 +178,7 @@ def swinging_to_lock(scenario: Scenario) -> Scenario:
         )
         for name, joint in scenario.reference.joints.items()
     }
-    swung = scenario.model_copy(update={"reference": scenario.reference.model_copy(update={"joints": joints})})
-    return lasting(swung, SWING, 200)
+    return lasting(scenario.updated(reference={"joints": joints}), SWING, 200)
 
 
 def internal_passive_tension(scenario: Scenario) -> tuple[float, ...]:

@@ -146,9 +146,7 @@ class RecordedMotion:
             return scenario
         initial = scenario.simulation.initial
         assert initial is not None
-        moved = initial.model_copy(update={"position": {**initial.position, **starts}})
-        settings = scenario.simulation.model_copy(update={"initial": moved})
-        return scenario.model_copy(update={"simulation": settings})
+        return scenario.updated(simulation={"initial": {"position": {**initial.position, **starts}}})
 
     def _setup(self, scenario: Scenario, own: Mapping[str, float]) -> Setup:
         moved = self._with_start(scenario, own)
@@ -259,8 +257,7 @@ def _tuned(scenario: Scenario, factor: float) -> Scenario:
     rtol, atol = (
         min(max(factor * each, min(each, _FINEST)), max(each, _ROUGHEST)) for each in (own.rtol, own.atol_scale)
     )
-    tuned = own.model_copy(update={"rtol": rtol, "atol_scale": atol})
-    return scenario.model_copy(update={"simulation": tuned})
+    return scenario.updated(simulation={"rtol": rtol, "atol_scale": atol})
 
 
 def windows(recording: Recording) -> Sequence[NDArray[np.intp]]:
