@@ -76,8 +76,12 @@ def equilibrium(
         raise InputError("inputs", "a tension must not be negative", command.tolist())
     pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))
     joints = len(finger.routing.joints)
-    limits = np.array([joint.range for joint in finger.description.joints.values()], dtype=float)
-    start = np.clip(0.0, *limits.T) if position is None else np.array(finite_vector("position", position, joints))
+    limiter = finger.stroke_limiter
+    start = (
+        np.clip(0.0, limiter.lower, limiter.upper)
+        if position is None
+        else np.array(finite_vector("position", position, joints))
+    )
     rest = finger.rest_state(start)
 
     def placed(places: Array) -> Array:

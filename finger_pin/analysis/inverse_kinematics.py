@@ -63,12 +63,10 @@ def inverse_kinematics(
     finger = as_finger(finger)
     one_finger(finger.description)
     target = np.array(finite_vector("point", point, 3))
-    limits = np.array([joint.range for joint in finger.description.joints.values()], dtype=float)
-    low, high = np.clip(limits, -np.pi, np.pi).T
+    low, high = (np.clip(each, -np.pi, np.pi) for each in (finger.stroke_limiter.lower, finger.stroke_limiter.upper))
     wanted = np.clip(0.0, low, high) if near is None else np.array(finite_vector("near", near, len(low)))
-    routing = finger.routing
-    coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
-    free = [joint for joint in range(len(low)) if joint not in coupling.followers]
+    coupling = PassiveCoupling.inextensible(finger.routing)
+    free = coupling.free
     followers, moved = list(coupling.followers), coupling.matrix[:, free]
     body = finger.rigid_body
 

@@ -73,8 +73,8 @@ def self_locking_map(
     finger = as_finger(finger)
     one_finger(finger.description)
     routing, limiter = finger.routing, finger.stroke_limiter
-    coupling = PassiveCoupling.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
-    free = [name for index, name in enumerate(routing.joints) if index not in coupling.followers]
+    coupling = PassiveCoupling.inextensible(routing)
+    free = [routing.joints[index] for index in coupling.free]
     chosen = tuple(free[-2:]) if joints is None else tuple(joints)
     if len(chosen) not in (1, 2) or len(set(chosen)) < len(chosen):
         raise InputError("joints", "must be one joint or two different ones", list(chosen))

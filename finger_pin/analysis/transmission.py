@@ -26,7 +26,6 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.routing import Array
 from finger_pin.laws import bristle as friction
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
-from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.tendons import Tendons
 
@@ -125,7 +124,7 @@ def workspace_postures(finger: FingerLike, samples: int = 9) -> Array:
         samples: Angles per free joint.
     """
     finger = as_finger(finger)
-    limiter, coupling = finger.stroke_limiter, _inextensible(finger)
+    limiter, coupling = finger.stroke_limiter, PassiveCoupling.inextensible(finger.routing)
     low, high = limiter.lower, limiter.upper
     axes = [
         [0.0] if index in coupling.followers else np.linspace(a, b, samples)
@@ -147,11 +146,10 @@ def flexion_postures(finger: FingerLike, samples: int = 41) -> Array:
         samples: Angles per joint.
     """
     finger = as_finger(finger)
-    limiter, coupling = finger.stroke_limiter, _inextensible(finger)
+    limiter, coupling = finger.stroke_limiter, PassiveCoupling.inextensible(finger.routing)
     low, high = limiter.lower, limiter.upper
     postures = np.tile(np.clip(np.zeros(len(low)), low, high), (samples, samples, 1))
-    free = [index for index in range(len(low)) if index not in coupling.followers]
-    for axis, joint in enumerate(free[-2:]):
+    for axis, joint in enumerate(coupling.free[-2:]):
         angles = np.linspace(low[joint], high[joint], samples)
         postures[..., joint] = angles[:, None] if axis == 0 else angles
     return np.asarray(postures @ coupling.matrix.T)
@@ -203,8 +201,3 @@ def _since_reversal(time: Array, speed: Array) -> Array:
     )
     turned = np.concatenate([np.ones((1, speed.shape[1]), dtype=bool), np.sign(speed[1:]) != np.sign(speed[:-1])])
     return np.asarray(path - np.maximum.accumulate(np.where(turned, path, 0.0), axis=0))
-
-
-def _inextensible(finger: Finger) -> PassiveCoupling:
-    passive = finger.routing.passive
-    return PassiveCoupling.from_routing(finger.routing, np.zeros(passive), np.ones(passive))

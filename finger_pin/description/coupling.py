@@ -47,6 +47,16 @@ class PassiveCoupling:
         return _COUPLINGS.of(parts, partial(cls._from_routing, routing, tension, stiffness))
 
     @classmethod
+    def inextensible(cls, routing: Routing) -> PassiveCoupling:
+        """Return the coupling by tendons that do not stretch and carry nothing, H_c theta = 0 in their rows: (4)."""
+        return cls.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
+
+    @property
+    def free(self) -> list[int]:
+        """Indices of the joints that are no followers."""
+        return [joint for joint in range(len(self.offset)) if joint not in self.followers]
+
+    @classmethod
     def _from_routing(cls, routing: Routing, tension: Array, stiffness: Array) -> PassiveCoupling:
         size = len(routing.joints)
         rows, followers = [], []

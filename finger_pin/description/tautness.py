@@ -43,7 +43,7 @@ class Tautness:
         joints = list(finger.joints.values())
         stiffness = np.array([joint.spring.stiffness if joint.spring else 0.0 for joint in joints])
         rest = np.array([joint.spring.rest if joint.spring else 0.0 for joint in joints])
-        free = [index for index in range(len(joints)) if index not in coupling.followers]
+        free = coupling.free
         tendons = len(minimum)
         scale = np.max(np.abs(routing.coupling))
         worst = (np.inf, np.zeros(len(joints)))

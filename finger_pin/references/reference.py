@@ -79,7 +79,7 @@ class SignalReference:
             InputError: If shapes or numbers are wrong, or an angle is beyond two turns.
         """
         coupling = scenario.coupling(routing)
-        free = [index for index in range(len(routing.joints)) if index not in coupling.followers]
+        free = coupling.free
         names = [routing.joints[index] for index in free]
         given = Signal.from_samples("reference", samples, names, scenario.simulation.rtol)
         largest = float(np.max(np.abs(np.asarray(samples[1], dtype=float))))

@@ -7,7 +7,6 @@ import shutil
 import time
 import uuid
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from finger_pin.exceptions import InputError
@@ -106,9 +105,7 @@ class ResultFolder:
         """Return itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Remove the rest of the stage."""
         self.discard()
 

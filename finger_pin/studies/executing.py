@@ -16,7 +16,6 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import cloudpickle
@@ -83,13 +82,11 @@ class Crew:
         with suppress(FingerPinError):
             simulate(scenario.updated(simulation={"duration": min(_GLANCE, scenario.simulation.duration)}))
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """End the threads; another executor is its owner's."""
         if self._given is None:
             self._executor.shutdown(cancel_futures=True)
-        self._silence.__exit__(kind, error, trace)
+        self._silence.__exit__(None, None, None)
 
     def do(
         self, function: Callable[[_Item, Stop], _Result], items: Sequence[_Item], stop: Stop

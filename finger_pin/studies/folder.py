@@ -13,7 +13,6 @@ import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import filelock
@@ -79,9 +78,7 @@ class Store:
         """Return itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close the file."""
         if self._file is not None:
             os.close(self._file)
@@ -155,11 +152,9 @@ class StudyFolder:
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close and unlock."""
-        self.store.__exit__(kind, error, trace)
+        self.store.__exit__()
         self._leave([])
 
     def _prepare(self) -> None:

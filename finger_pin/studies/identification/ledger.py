@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -69,9 +68,7 @@ class Ledger:
                 raise InputError("output", reason, str(self._path.parent)) from None
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         """Keep the finished pieces, whatever has happened; none of a wrong question."""
         if self._path is None:
             return

@@ -44,7 +44,7 @@ def fingertip_surface(finger: Finger, samples: int = 45) -> Array:
     Returns:
         Shape (patches, samples, samples, 3), m, base frame; not a number where a driven joint would leave its range.
     """
-    return _patches(finger, _free(finger), _rest(finger), samples)
+    return _patches(finger, _constraint(finger).free, _rest(finger), samples)
 
 
 def flexion_section(finger: Finger, samples: int = 61) -> Section:
@@ -52,11 +52,11 @@ def flexion_section(finger: Finger, samples: int = 61) -> Section:
     held = _rest(finger)
     axes = _joint_axes(finger, held)
     parallel = [j for j in range(len(held)) if np.linalg.norm(np.cross(axes[j], axes[-1])) < _PARALLEL]
-    moving = [j for j in _free(finger) if j in parallel]
+    moving = [j for j in _constraint(finger).free if j in parallel]
     patches = _patches(finger, moving, held, samples)
     normal = int(np.argmax(np.abs(axes[-1])))
     first, second = (axis for axis in range(3) if axis != normal)
-    low, high = _limits(finger)
+    low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
     poses = []
     for share in (0.0, 0.5, 1.0):
         pose = held.copy()
@@ -66,26 +66,16 @@ def flexion_section(finger: Finger, samples: int = 61) -> Section:
 
 
 def _constraint(finger: Finger) -> PassiveCoupling:
-    passive = finger.routing.passive
-    return PassiveCoupling.from_routing(finger.routing, np.zeros(passive), np.ones(passive))
-
-
-def _free(finger: Finger) -> list[int]:
-    followers = _constraint(finger).followers
-    return [j for j in range(len(finger.routing.joints)) if j not in followers]
-
-
-def _limits(finger: Finger) -> Array:
-    return np.array([joint.range for joint in finger.description.joints.values()]).T
+    return PassiveCoupling.inextensible(finger.routing)
 
 
 def _rest(finger: Finger) -> Array:
-    low, high = _limits(finger)
+    low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
     return np.asarray(np.clip(0.0, low, high))
 
 
 def _patches(finger: Finger, moving: list[int], held: Array, samples: int) -> Array:
-    low, high = _limits(finger)
+    low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
     matrix = _constraint(finger).matrix
     # A patch of fewer than two joints is a curve or a point: the missing ones stay where they are.
     pairs: list[tuple[int, ...]] = list(combinations(moving, 2)) or [tuple(moving)]

@@ -8,7 +8,6 @@ import json
 import sys
 import time
 import webbrowser
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -73,9 +72,7 @@ class Viewing:
         """Return itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Stop serving."""
         self.close()
 
