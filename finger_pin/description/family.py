@@ -43,7 +43,7 @@ class Family:
             InputError: If there is no such key.
         """
         self.scenario, self.keys = scenario, tuple(keys)
-        self._names = [_split(key) for key in self.keys]
+        self._names = [split(key) for key in self.keys]
         for name, _ in self._names:
             if name not in ("finger.base", "hand.base"):
                 refuse_other(name, hand=scenario.hand is not None, finger=scenario.hand is None)
@@ -123,23 +123,35 @@ class Family:
         return copy.deepcopy(self.scenario.model_dump(mode="python", exclude_unset=True))
 
     def _value(self, key: int) -> Any:
-        (_, index), places = self._names[key], self._places[key]
+        (name, index), places = self._names[key], self._places[key]
         value = _found(self.scenario, places[0]) if places else None
         if index is None or value is None:
             return value
-        if not isinstance(value, tuple | Series) or index >= len(value):
-            count = f"a list of {len(value)}" if isinstance(value, tuple | Series) else "no list"
-            raise InputError(self.keys[key], f"there is no such number: it is {count}")
-        return value[index]
+        if isinstance(value, tuple | Series) and index < len(value):
+            return value[index]
+        allowed = "there is no such list of numbers"
+        if isinstance(value, int | float):
+            allowed = f"{name} is one number for all; give it a list first, or leave out the index"
+        elif isinstance(value, tuple | Series):
+            allowed = f"{name} has {len(value)} numbers, [0] to [{len(value) - 1}]"
+        raise InputError(self.keys[key], allowed)
 
 
-def _split(key: str) -> tuple[str, int | None]:
-    """Return the name and the index of a key; no index of a whole entry."""
+def split(key: str) -> tuple[str, int | None]:
+    """Return the name of a key, and its index or None.
+
+    Raises:
+        InputError: If it has brackets elsewhere than at its end.
+    """
     found = _INDEXED.fullmatch(key)
-    return (found["name"], int(found["index"])) if found else (key, None)
+    if found:
+        return found["name"], int(found["index"])
+    if "[" in key or "]" in key:
+        raise InputError(key, "an index is a whole number in brackets at the end, such as controller.gain[2]")
+    return key, None
 
 
-def _places(path: Sequence[str], owner: Any, table: Table) -> Iterator[list[str]]:
+def _places(path: Sequence[str], owner: Any, table: Table, above: tuple[str, ...] = ()) -> Iterator[list[str]]:
     """Spell out the tables on the way to a key, and return all entries that it stands for."""
     part, *rest = path
     names = [*table] if part == "*" else [part]
@@ -150,9 +162,9 @@ def _places(path: Sequence[str], owner: Any, table: Table) -> Iterator[list[str]
         inner = table.get(name)
         if not isinstance(inner, dict):
             if inner is not None and not isinstance(inner, Description):
-                raise InputError(".".join(path), f"{name} has no entries of its own")
+                raise InputError(".".join((*above, *path)), f"{'.'.join((*above, name))} has no entries of its own")
             inner = table[name] = {} if inner is None else _spelled(inner)
-        for found in _places(rest, owner, inner):
+        for found in _places(rest, owner, inner, (*above, name)):
             yield [name, *found]
 
 

@@ -15,8 +15,9 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.stats import qmc
 
+from finger_pin.description.family import split
 from finger_pin.exceptions import InputError
-from finger_pin.studies.keys import Point, Value, split
+from finger_pin.studies.keys import Point, Value
 
 SAMPLE = "sample"
 #: More points than this are a mistake.

@@ -6,11 +6,11 @@ in brackets: ``environment.fingertip_force[2]``. A star stands for every name: `
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from finger_pin.description.family import Family, split
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.recordings.series import Series
 from finger_pin.description.scenario import Scenario
@@ -22,7 +22,6 @@ from finger_pin.mechanism.finger_like import FingerLike, described_by, fitted, o
 #: What a key may be given: a number, or a name such as that of a method, or yes or no.
 Value = float | str | bool
 Point = Mapping[str, Value]
-_INDEXED = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>\d{1,6})\]")
 
 
 @dataclass(frozen=True)
@@ -30,14 +29,10 @@ class Starting:
     """The scenario that a study varies.
 
     Attributes:
-        given: Argument of `load_scenario`.
-        overrides: Entries that hold at all points.
-        scenario: Scenario of the two.
+        scenario: The scenario.
         finger: Replaces the finger that it describes; a point's values at keys of a finger change it.
     """
 
-    given: ScenarioLike
-    overrides: Mapping[str, Any]
     scenario: Scenario
     finger: Finger | None = None
 
@@ -52,10 +47,7 @@ class Starting:
         """
         scenario = load_scenario(given, overrides)
         own = own_finger(finger, scenario)
-        if own is None:
-            return cls(given, dict(overrides or {}), scenario)
-        described = described_by(scenario, own)
-        return cls(described, {}, described, own)
+        return cls(described_by(scenario, own), own)
 
     def at(self, point: Point) -> Scenario:
         """Return the scenario with other numbers or names at some keys.
@@ -65,17 +57,7 @@ class Starting:
         Raises:
             InputError: Naming the entry that is wrong.
         """
-        changed = dict(self.overrides)
-        for key, value in point.items():
-            name, index = split(key)
-            if isinstance(value, float) and value.is_integer() and type(self._found(key)) is int:
-                value = int(value)
-            if index is None:
-                changed[name] = value
-            else:
-                changed[name] = [*self._list(key, name, index, changed)]
-                changed[name][index] = value
-        return load_scenario(self.given, changed)
+        return Family(self.scenario, tuple(point)).at(list(point.values()))
 
     def finger_at(self, scenario: Scenario) -> Finger | None:
         """Return the replacement of the finger of a point's scenario, or None."""
@@ -137,30 +119,6 @@ class Starting:
 
     def _found(self, key: str) -> Any:
         return _look_up(self.scenario, key)
-
-    def _list(self, key: str, name: str, index: int, changed: Mapping[str, Any]) -> list[Any]:
-        held = changed.get(name, self._found(name))
-        if isinstance(held, int | float):
-            raise InputError(key, f"{name} is one number for all; give it a list first, or leave out the index")
-        if not isinstance(held, list | tuple | Series):
-            raise InputError(key, "there is no such list of numbers")
-        if index >= len(held):
-            raise InputError(key, f"{name} has {len(held)} numbers, [0] to [{len(held) - 1}]")
-        return list(held)
-
-
-def split(key: str) -> tuple[str, int | None]:
-    """Return the name of a key, and its index or None.
-
-    Raises:
-        InputError: If it has brackets elsewhere than at its end.
-    """
-    found = _INDEXED.fullmatch(key)
-    if found:
-        return found["name"], int(found["index"])
-    if "[" in key or "]" in key:
-        raise InputError(key, "an index is a whole number in brackets at the end, such as controller.gain[2]")
-    return key, None
 
 
 def describe(key: str) -> dict[str, str]:

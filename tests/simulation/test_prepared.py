@@ -139,7 +139,7 @@ def test_one_number_of_a_list_and_a_star_stand_for_themselves():
     [
         (["finger.tendon_friction.coulom"], None, "did you mean finger.tendon_friction.coulomb?"),
         (["finger.joints.elbow.link.mass"], None, "no such joint"),
-        (["finger.gravity[3]"], None, "it is a list of 3"),
+        (["finger.gravity[3]"], None, "[0] to [2]"),
         (["finger.tendon_friction.coulomb"], [-0.1], "finger.tendon_friction.coulomb = -0.1: must be at least 0"),
         (["finger.joint_friction.stiction"], [1e-5], "finger.joint_friction.stiction"),
         (["controller.gain"], [np.nan], "controller.gain = nan: must be a finite number"),

@@ -33,7 +33,7 @@ def test_an_index_means_one_number_of_a_list(fig6):
     assert changed.environment.fingertip_force == (0.1, 0.0, -0.5)
     listed = Starting.load("fig6", {"controller.gain": [1.0, 2.0, 3.0, 4.0]})
     assert listed.at({"controller.gain[1]": 9.0}).controller.gain == (1.0, 9.0, 3.0, 4.0)
-    assert listed.overrides == {"controller.gain": [1.0, 2.0, 3.0, 4.0]}
+    assert listed.scenario.controller.gain == (1.0, 2.0, 3.0, 4.0)
 
 
 def test_a_whole_number_stays_one(fig6):

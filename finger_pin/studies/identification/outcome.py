@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 
-from finger_pin.description.family import Family
+from finger_pin.description.family import Family, split
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
@@ -22,7 +22,7 @@ from finger_pin.studies.identification.estimate import Fit
 from finger_pin.studies.identification.intervals import LEVEL, Side, free_directions
 from finger_pin.studies.identification.problem import Problem, minus_twice_likelihood
 from finger_pin.studies.identification.recordings import RecordedSignal
-from finger_pin.studies.keys import describe, split
+from finger_pin.studies.keys import describe
 
 if TYPE_CHECKING:
     import xarray as xr
