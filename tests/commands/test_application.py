@@ -91,14 +91,18 @@ def test_the_package_runs_as_a_module_and_by_the_name_that_is_installed_and_list
     assert getattr(sys.modules[module], name) is application.run
 
 
-def test_every_public_name_can_be_had_and_importing_the_package_alone_imports_nothing_heavy():
+def test_every_public_name_can_be_had_and_nothing_is_imported_that_is_not_asked_for():
     assert len(fp.__all__) <= 42
     for name in fp.__all__:
         assert getattr(fp, name) is not None
     assert fp.plots.plot_fig6 is fp.plot_fig6 and fp.views.view is fp.view
-    code = "import sys, finger_pin; print({'numpy', 'pydantic', 'matplotlib', 'numba'} & set(sys.modules))"
+    code = (
+        "import sys, finger_pin; print({'numpy', 'pydantic', 'matplotlib', 'numba'} & set(sys.modules))\n"
+        "import finger_pin.views.viewer, finger_pin.mechanism.exchange.mjcf\n"
+        "print({'meshcat', 'IPython', 'zmq', 'tornado', 'mujoco'} & set(sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "set()\n"
+    assert done.stdout == "set()\nset()\n"
     with pytest.raises(AttributeError, match="simulat"):
         _ = fp.simulat
 

@@ -32,6 +32,7 @@ SHORTER = {
     r":6:log": ":2:log",
     r"--samples \d+": "--samples 2",
     r"(cliffs\.py) \d+": r"\1 1",
+    r"(flights\.py --count) \d+": r"\1 1",
     r"(intervals\.py) \d+": r"\1 2",
     r"(validate\.py)( --only \S+)?$": r"\1 --only kinematics",
     r"force_capability\.py$": "force_capability.py ub --posture 0,30,30,20 --limit 15 --force 0,0,1 --view",
@@ -44,6 +45,8 @@ SHORTER = {
     # They train for minutes, with a library that tests do without.
     r"((train|transfer)\.py).*": r"\1 --help",
 }
+#: The duration of runs in Python that take seconds.
+LONG = '"simulation.duration": 4.0'
 #: A fenced block with its kind, or code within a line.
 SHOWN = re.compile(r"^```(\w+)\n(.*?)^```$|(?<!`)`([^`\n]+)`(?!`)", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"(python (-m|scripts/)|finger-pin )")
@@ -143,7 +146,7 @@ def test_what_a_page_shows_works_from_top_to_bottom(page, shown, monkeypatch, ca
         elif kind == "python":
             # A traceback shows the line of the page.
             before = "\n" * (text.count("\n", 0, found.start()) + 1)
-            exec(compile(before + block, str(page), "exec"), names)
+            exec(compile(before + block.replace(LONG, LONG.replace("4.0", str(DURATION))), str(page), "exec"), names)
         elif kind == "toml":
             run_scenario(block, file if file.endswith(".toml") else "shown.toml")
         elif kind == "csv":

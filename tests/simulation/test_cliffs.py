@@ -66,7 +66,7 @@ def test_a_loop_that_diverges_is_stopped_with_the_speed_that_says_so():
 
 def test_the_estimated_error_of_the_main_job_has_the_size_of_its_error_and_is_in_the_summary(fig6_runs):
     result = fig6_runs["Rodas5P"]
-    tight = {"simulation.duration": 0.15, "simulation.rtol": 1e-10, "simulation.atol_scale": 1e-10}
+    tight = {"simulation.duration": 0.1, "simulation.rtol": 1e-10, "simulation.atol_scale": 1e-10}
     exact = fp.simulate(fp.load_scenario("fig6", tight))
     error = float(np.sqrt(np.mean((result.joint_position - exact.joint_position) ** 2)))
     assert 0.1 * error < result.attrs["estimated_error"] < 100.0 * error

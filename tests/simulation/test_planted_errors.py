@@ -15,7 +15,7 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.simulation.account import account
 
 
-def share_left_open(loop, duration=0.03):
+def share_left_open(loop, duration=0.015):
     """Integrate the Python right-hand side, keep its account, and return the residual over the turnover.
 
     A wrong law can make the system unstable; then the account of the first steps must do.

@@ -15,9 +15,14 @@ from finger_pin.description.loading import load_scenario
 from finger_pin.simulation.results import ResultFolder
 
 
+def short(duration):
+    """Return one variable of a result: a file that is written in no time."""
+    return fp.simulate(load_scenario("fig6", {"simulation.duration": duration}))[["joint_position"]]
+
+
 @pytest.fixture(scope="module")
 def result():
-    return fp.simulate(load_scenario("fig6", {"simulation.duration": 0.002, "simulation.sample_rate": 1000}))
+    return short(0.002)
 
 
 @pytest.mark.parametrize("failing", range(1, 13))
@@ -104,7 +109,7 @@ print(number)
 def killed(tmp_path_factory, result):
     """Folders in which a process was killed right before and after every change, and the two sets of results."""
     home = tmp_path_factory.mktemp("killed")
-    other = fp.simulate(load_scenario("fig6", {"simulation.duration": 0.003, "simulation.sample_rate": 1000}))
+    other = short(0.003)
     publish(home / "old", result, figures=["a.png", "b.png"])
     publish(home / "new", other, figures=["b.png", "c.png"], animation=False)
     done = subprocess.run([sys.executable, "-c", KILLED], cwd=home, capture_output=True, text=True, check=True)
@@ -166,7 +171,7 @@ def test_who_finishes_publishing_just_then_is_not_in_the_way(tmp_path, result, m
 
 
 def test_runs_that_publish_at_the_same_time_do_not_mix(tmp_path, result):
-    other = fp.simulate(load_scenario("fig6", {"simulation.duration": 0.003, "simulation.sample_rate": 1000}))
+    other = short(0.003)
     for _ in range(5):
         # netCDF is not for several threads: only what is ready is published at the same time.
         folders = [ResultFolder(tmp_path) for _ in range(4)]

@@ -79,7 +79,13 @@ STUDIES = {
         "fig6", {"controller.gain": GAINS}, overrides=SHORT, executor=Serial(), **options
     ),
     "optimise": lambda **options: fp.optimise(
-        "fig6", ["controller.gain=0.5:4"], overrides=SHORT, constraints=[], executor=Serial(), **options
+        "fig6",
+        ["controller.gain=0.5:4"],
+        overrides=SHORT,
+        constraints=[],
+        executor=Serial(),
+        effort=fp.studies.Effort(population=4),
+        **options,
     ),
 }
 

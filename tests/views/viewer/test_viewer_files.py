@@ -1,8 +1,6 @@
 """The files of the viewer, and its refusals."""
 
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -45,9 +43,3 @@ def test_a_tension_that_is_not_a_number_is_refused(result, tmp_path):
     broken["tendon_tension"][:, 2] = np.nan
     with pytest.raises(fp.InputError, match="tendon_tension"):
         write_animation(broken, tmp_path / "animation.html")
-
-
-def test_importing_the_viewer_loads_neither_meshcat_nor_ipython():
-    code = "import sys, finger_pin.views.viewer; print({'meshcat', 'IPython', 'zmq', 'tornado'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
