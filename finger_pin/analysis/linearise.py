@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.core.compiled_finger import CompiledFinger
@@ -27,9 +27,6 @@ from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import as_finger
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Central differences of sixth order: where to look, in steps, and weights.
 _OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
@@ -198,8 +195,6 @@ def _dataset(
     parameters: list[str],
     dt: float | None,
 ) -> xr.Dataset:
-    import xarray as xr
-
     (a, c), (b, d), (e, f) = found
     whose = {"A": ("state", "by_state"), "B": ("state", "input"), "C": ("output", "by_state"), "D": ("output", "input")}
     whose |= {"E": ("state", "parameter"), "F": ("output", "parameter")}

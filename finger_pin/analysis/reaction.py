@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.analysis.pin_wrench import pin_wrench
 from finger_pin.analysis.printing import BriefRepr
@@ -21,9 +21,6 @@ from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import Groove
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _MOTION = ("joint_position", "joint_velocity", "joint_acceleration")
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from finger_pin.analysis.directions import sliding_velocity
@@ -28,9 +28,6 @@ from finger_pin.laws import bristle as friction
 from finger_pin.laws.capstan import capstan_coefficient, sliding_tension
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.tendons import Tendons
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Since its last reversal a tendon has slid by this many bristle lengths F^n M / s0: exp(-5) from steady sliding.
 _SETTLED = 5.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.stepping.textbook import Stop, Trajectory
@@ -19,9 +19,6 @@ from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
 from finger_pin.simulation.energy import entries
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Steps between two looks at a compiled simulation.
 CHUNK = 128

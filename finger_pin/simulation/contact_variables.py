@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -15,8 +16,6 @@ from finger_pin.mechanism.state import State
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from finger_pin.simulation.motions import SampledMotion
 
 # Dimensions, unit and name.

@@ -6,9 +6,9 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.proportional import Controller
@@ -23,9 +23,6 @@ from finger_pin.references.reference import Reference
 from finger_pin.simulation.accuracy import TOLERANCES, with_tighter
 from finger_pin.simulation.initial_state import own_parts
 from finger_pin.simulation.simulate import simulate
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FACTOR, LIMIT = 100.0, 1e-3
 

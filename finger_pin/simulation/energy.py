@@ -8,18 +8,15 @@ It closes to the integrator's tolerance, or a sign somewhere is wrong.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.energies import SUPPLIED, Energies, Energy
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Kinematics, Motion
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FINGERTIP = Energy("fingertip", "fingertip force", SUPPLIED)
 _KINETIC, _GRAVITY = Energy("kinetic", "kinetic"), Energy("gravity", "gravity")

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.quantity import BASE_FRAME, WORLD_FRAME
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def in_world(result: xr.Dataset) -> xr.Dataset:

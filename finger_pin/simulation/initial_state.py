@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.description.routing import Array
@@ -14,9 +14,6 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.contact_variables import last_touching
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _PARTS = {
     "position": "joint_position",
@@ -63,8 +60,6 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
     Raises:
         InputError: If sizes, names or numbers are not those of a state of this finger.
     """
-    import xarray as xr
-
     if not isinstance(initial, xr.Dataset):
         try:
             return finite_vector("initial", np.array(initial, dtype=float), finger.layout.size)

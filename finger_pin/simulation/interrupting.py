@@ -6,14 +6,13 @@ import signal
 import threading
 from collections.abc import Callable
 from types import FrameType
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import Self, TypeVar
+
+import xarray as xr
 
 from finger_pin.core.stepping.textbook import Stop
 from finger_pin.exceptions import Interrupted
 from finger_pin.simulation.run_arrays import RunArrays
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Found = TypeVar("Found", "xr.Dataset", RunArrays)
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import xarray as xr
+
+from finger_pin.description.routing import Array
 from finger_pin.files import replacing, write_table
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from finger_pin.description.routing import Array
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
@@ -62,6 +59,4 @@ def load(path: str | Path) -> xr.Dataset:
         OSError: If there is no such file, or it cannot be read.
     """
     file = Path(path, "trajectory.nc") if Path(path).is_dir() else path
-    import xarray as xr
-
     return xr.load_dataset(file, engine="netcdf4")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop
@@ -30,9 +31,6 @@ from finger_pin.simulation.running import run
 from finger_pin.simulation.sensitivity import add_slopes, changed, nearby, on_steps_of
 from finger_pin.simulation.setup import Setup
 from finger_pin.simulation.variables import coordinates, variables
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: What a run records unless it is told otherwise.
 RECORDED = ("joint_position", "tendon_tension")

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.core.stepping.textbook import Trajectory
 from finger_pin.description.embedded import embedded
@@ -23,9 +24,6 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.quantity import BASE_FRAME
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _PACKAGES = ("finger-pin", "pin", "numpy", "scipy", "xarray")
 
@@ -74,8 +72,6 @@ def record(
         names: Of the variables; by default all.
         text: The scenario's TOML; written anew unless it is given.
     """
-    import xarray as xr
-
     found = recorded(motions, names)
     texts = {"scenario": to_toml(scenario) if text is None else text, **embedded(scenario)}
     attributes = {**attributes_of(scenario, motions.trajectory, method), **texts}

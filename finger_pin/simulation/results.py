@@ -7,14 +7,13 @@ import shutil
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
+
+import xarray as xr
 
 from finger_pin.exceptions import InputError
 from finger_pin.publishing import NEW, publish
 from finger_pin.simulation.netcdf import save
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _MARK = "# The input that led to the results in this folder, complete: running it again gives the same trajectory.\n"
 _MARK_OF_OWN = (

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.simulation.recording import Recorded
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(eq=False)
@@ -51,6 +49,4 @@ class RunArrays:
 
     def dataset(self) -> xr.Dataset:
         """Return the same as a Dataset."""
-        import xarray as xr
-
         return xr.Dataset(self.variables, self.coordinates, self.attrs)

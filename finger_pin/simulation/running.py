@@ -6,9 +6,9 @@ import math
 import warnings
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
@@ -29,9 +29,6 @@ from finger_pin.simulation.accuracy import CHUNK, close_account, estimate_error,
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import check_memory, finite_part, record
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _MARGINS: Remembered[float] = Remembered()
 _DRIVEN: Remembered[str] = Remembered()

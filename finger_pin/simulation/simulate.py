@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
@@ -19,9 +19,6 @@ from finger_pin.simulation.initial_state import own_parts, packed_state
 from finger_pin.simulation.interrupting import interruptible
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.simulation.running import run
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def simulate(

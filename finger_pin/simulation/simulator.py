@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.control.compiled import Bindings, core_signal
@@ -27,9 +28,6 @@ from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import check_motors, numbers
 from finger_pin.simulation.step_log import Told
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import copy
 from array import array
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.open_loop import OpenLoopTensions
@@ -27,9 +28,6 @@ from finger_pin.references.signal import Signal
 from finger_pin.simulation.accuracy import left_open, open_account
 from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import check_memory, record
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # A sample this close to the end of a step, s, is taken there.
 _SAME = 1e-9

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.description.embedded import described
+from finger_pin.description.routing import Array
 from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from finger_pin.description.routing import Array
 
 _SETTLING = 1.0
 _LONG = 2.0

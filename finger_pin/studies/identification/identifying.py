@@ -5,9 +5,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from finger_pin.description.loading import ScenarioLike, load_bench
@@ -27,9 +28,6 @@ from finger_pin.studies.identification.problem import Problem, RecordingModel, S
 from finger_pin.studies.identification.readings import SteadyReadings
 from finger_pin.studies.identification.recordings import RecordedSignal, Recording, read_recording, unit_of
 from finger_pin.studies.identification.searching import Progress, Work, starting_points
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Data = Mapping[str, Mapping[str, Any]]
 

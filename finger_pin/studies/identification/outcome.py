@@ -6,10 +6,11 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import tomli_w
+import xarray as xr
 
 from finger_pin.description.family import Family, split
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
@@ -24,9 +25,6 @@ from finger_pin.studies.identification.problem import Problem, minus_twice_likel
 from finger_pin.studies.identification.recordings import RecordedSignal
 from finger_pin.studies.keys import describe
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 def outcome(
     problem: Problem,
@@ -38,8 +36,6 @@ def outcome(
     unfinished: str = "",
 ) -> xr.Dataset:
     """Return the Dataset of an identification; unfinished pieces are not a number."""
-    import xarray as xr
-
     count, keys = problem.asked, problem.keys[: problem.asked]
     free = free_directions(problem, best) if spread is not None else []
     variables: dict[str, Any] = {

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Array
@@ -14,9 +15,6 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger_like import FingerLike
 from finger_pin.simulation.prepared import prepare
 from finger_pin.simulation.run_arrays import RunArrays
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def propose(
@@ -53,8 +51,6 @@ def propose(
         InputError: If there are no candidates, parameters or outputs, or one names nothing that there is; if bounds are
             not in order, or a noise or what is known is not positive.
     """
-    import xarray as xr
-
     _check(candidates, parameters, outputs, known or {})
     keys = list(parameters)
     low, high = np.array(list(parameters.values()), dtype=float).T

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from finger_pin.description.routing import Array
 from finger_pin.views.plots.lines import names, series
 from finger_pin.views.plots.panels import legend, logarithmic, sheet, stack, title
 from finger_pin.views.plots.style import GREY, Width, colour, limit_line, styled
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 # A difference changes sign all the time: on a logarithmic axis only its greatest values show something.
 _BINS = 400

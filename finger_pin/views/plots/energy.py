@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from itertools import cycle
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.description.routing import Array
 from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
 from finger_pin.views.plots.lines import shade, trace
@@ -30,9 +30,6 @@ from finger_pin.views.plots.style import (
     styled,
     thin,
 )
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 #: Of losses, in their order; they begin anew where there are more.
 _COLOURS = (

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.description.routing import Array
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 # Lines in a panel that can still be told apart.
 _MOST = 5

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.views.plots.lines import bundle, names
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import Width
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 #: A column of such a figure: its title, variable, factor and unit.
 Column = tuple[str, str, float, str]

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.description.routing import Array
 from finger_pin.views.plots.lines import trace
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, new_figure, styled
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 #: Rise of minus twice the likelihood at the ends of a 95 % interval.
 _LEVEL = 3.841

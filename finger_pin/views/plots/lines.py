@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,10 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from finger_pin.description.routing import Array
 from finger_pin.views.plots.style import DASHES, colour, cycle_colours
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 #: Bins of a decimated line, two points each: more than a panel has columns of pixels.
 BINS = 640

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from finger_pin.description.routing import Array
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import names, passive_proximal, shade, trace
 from finger_pin.views.plots.panels import cut_spikes, flatten_rounding, labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, styled, thin
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 _COLUMNS = (("tendon friction", "tendon_friction", 1.0, "N"), ("joint friction", "joint_friction", 1e3, "mN m"))
 

@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,10 +16,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
+from finger_pin.description.routing import Array
 from finger_pin.views.plots.style import Width, fit, inches, new_figure, power_of_ten, settings
-
-if TYPE_CHECKING:
-    from finger_pin.description.routing import Array
 
 # Parts are drawn at this share of their own width before they go below each other.
 _NARROWEST = 0.62

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.analysis import ForcePolytope
@@ -22,9 +22,6 @@ from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Ghost, Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Indices = NDArray[np.intp]
 

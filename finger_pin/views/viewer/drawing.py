@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -17,7 +18,6 @@ from finger_pin.views.viewer.solids import ROOT, Command, link_names, placed, se
 
 if TYPE_CHECKING:
     import meshcat
-    import xarray as xr
 
 _SIDES = 8
 _LOOSE = (0.62, 0.64, 0.67)

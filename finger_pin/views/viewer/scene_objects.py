@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+import xarray as xr
 
 from finger_pin.description.embedded import described
 from finger_pin.description.objects import Object
@@ -26,9 +27,6 @@ from finger_pin.views.viewer.solids import (
     newton_length,
     placed,
 )
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _FIXED, _FREE = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.

@@ -8,9 +8,10 @@ import json
 import sys
 import time
 import webbrowser
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from finger_pin.analysis import ForcePolytope
@@ -24,9 +25,6 @@ from finger_pin.views.viewer.animation import animation_page, posture_page
 from finger_pin.views.viewer.page import render
 from finger_pin.views.viewer.scene import Scene
 from finger_pin.views.viewer.server import PageServer
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Upper end of the legend before a live tension exceeds it, N.
 LIVE_TENSION = 10.0
