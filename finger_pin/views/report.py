@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import math
 from collections.abc import Sequence
 from html import escape
@@ -11,26 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from finger_pin.files import write_text
+from finger_pin.views.document import document, image
 from finger_pin.views.plots.identification import plot_identification, plot_profiles
-
-_STYLE = """
-body { margin: 0; color: #1d2433; background: #f6f7f9; font: 15px/1.5 system-ui, sans-serif; }
-main { max-width: 62rem; margin: 0 auto; padding: 2rem 1.25rem 4rem; }
-h1 { font-size: 1.6rem; margin: 0; } h2 { font-size: 1.15rem; margin: 0 0 .4rem; }
-section { background: #fff; border: 1px solid #e3e6ec; border-radius: .5rem; padding: 1.1rem;
-  margin-top: 1.1rem; overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: .9rem; }
-th { text-align: left; color: #5d6678; font-weight: 500; border-bottom: 2px solid #e3e6ec; }
-th, td { padding: .3rem .8rem .3rem 0; } td { border-bottom: 1px solid #e3e6ec; }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.soft { color: #5d6678; } .open { color: #a15c00; }
-img { display: block; max-width: 100%; height: auto; }
-@media (max-width: 40rem) { img { max-width: none; } table { font-size: .8rem; }
-  td:first-child { min-width: 7.5rem; overflow-wrap: anywhere; } }
-"""
 
 
 def summarize_identification(result: xr.Dataset) -> str:
@@ -52,26 +34,20 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
     sections = [
         (
             "What was found",
-            ("" if _borne_out(result) else f"<p class='open'><strong>{escape(_agreement(result))}</strong></p>")
+            ("" if _borne_out(result) else f"<p class='doubt'><strong>{escape(_agreement(result))}</strong></p>")
             + _found(result)
-            + _image(plot_profiles(result), "Profiles")
+            + image(plot_profiles(result), "Profiles")
             + f"<p class='soft'>{_PROFILES}</p>",
         ),
         ("What the recordings leave open", "".join(f"<p>{escape(line)}</p>" for line in _words(result))),
-        ("How well every signal is met", _met(result) + _image(plot_identification(result), "Signals")),
+        ("How well every signal is met", _met(result) + image(plot_identification(result), "Signals")),
     ]
     if "law" in result.dims:
         sections.append(("Which law", _laws(result)))
     if result.sizes["parameter"] > 1:
         sections.append(("How the estimates hang together", _correlations(result)))
     body = "".join(f"<section><h2>{title}</h2>{content}</section>" for title, content in sections)
-    title = f"Identification: {escape(str(result.attrs['scenario']))}"
-    text = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{_STYLE}</style></head><body><main><h1>{title}</h1>{body}</main></body></html>"
-    )
-    write_text(path, text)
+    write_text(path, document(f"Identification: {result.attrs['scenario']}", body))
     return Path(path)
 
 
@@ -191,10 +167,3 @@ def _correlations(result: xr.Dataset) -> str:
     values = result["correlation"].values
     rows = [(name, *(f"{value:.2f}" for value in row)) for name, row in zip(names, values, strict=True)]
     return _table(["", *(".".join(name.split(".")[-2:]) for name in names)], rows)
-
-
-def _image(figure: Figure, what: str) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", pil_kwargs={"compress_level": 2})
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
-    return f'<img alt="{what}" src="data:image/png;base64,{data}" width="{100 * figure.get_figwidth():.0f}">'
