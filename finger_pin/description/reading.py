@@ -52,9 +52,8 @@ def _read(kind: str, name: str, folder: Path, entry: str = "") -> tuple[Table, P
     if not is_path(name):
         names = _shipped_texts(f"{kind}s")
         if name not in names:
-            allowed = (
-                f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{suggestion(name, names)}"
-            )
+            near = suggestion(name, [*names, *(_shipped_texts("benches") if kind == "scenario" else ())])
+            allowed = f"no such {kind}; there are {', '.join(names)}, or the path of a .toml file{near}"
             raise InputError(entry or kind, allowed, name)
         return copy.deepcopy(_shipped_table(f"{kind}s", name)), Path(name)
     what, path = f"{kind} file {name}", folder / expand(name)
