@@ -15,13 +15,13 @@ class BriefRepr:
 
     def __repr__(self) -> str:
         """Return the entries, one a line."""
-        entries = [f"  {each.name}: {_told(getattr(self, each.name))}" for each in fields(self)]  # type: ignore[arg-type]
+        entries = [f"  {each.name}: {_brief(getattr(self, each.name))}" for each in fields(self)]  # type: ignore[arg-type]
         return "\n".join([type(self).__name__, *entries])
 
 
-def _told(value: object) -> str:
+def _brief(value: object) -> str:
     if isinstance(value, tuple) and any(isinstance(each, np.ndarray) for each in value):
-        return "; ".join(map(_told, value))
+        return "; ".join(map(_brief, value))
     if not isinstance(value, np.ndarray) or not value.size:
         return f"{value:.4g}" if isinstance(value, float) else str(value)
     if value.size <= _FEW:

@@ -67,7 +67,7 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
     given = list(sys.argv[1:] if arguments is None else arguments)
     app = typer.Typer(help="Tendon-driven robot fingers.", add_completion=False, rich_markup_mode=None)
     for each in COMMANDS if function is None else (function,):
-        app.command(each.__name__.replace("_", "-"))(_told(each, program))
+        app.command(each.__name__.replace("_", "-"))(_with_exit_code(each, program))
     try:
         code = typer.main.get_command(app).main(
             given if given or function else ["--help"], prog_name=program, standalone_mode=False
@@ -78,11 +78,11 @@ def run_function(function: Callable[..., Any] | None, arguments: Sequence[str] |
     return int(code or DONE)
 
 
-def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
+def _with_exit_code(command: Callable[..., Any], program: str) -> Callable[..., int]:
     """Return a command that prints an exception in one line, with all notes, and returns an exit code."""
 
     @wraps(command)
-    def told(*arguments: Any, **options: Any) -> int:
+    def coded(*arguments: Any, **options: Any) -> int:
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = lambda message, *_: complain(program, f"warning: {message}")
@@ -101,7 +101,7 @@ def _told(command: Callable[..., Any], program: str) -> Callable[..., int]:
         complain(program, "; ".join([text, *getattr(problem, "__notes__", ())]))
         return code
 
-    return told
+    return coded
 
 
 def _usage(error: typer.TyperException, given: Sequence[str]) -> str:

@@ -27,7 +27,7 @@ from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.initial_state import check_motors, numbers
-from finger_pin.simulation.step_log import Told
+from finger_pin.simulation.step_log import StepLog
 
 _ADVICE = "a smaller rtol, smaller tensions, or softer contacts and tendons"
 
@@ -117,7 +117,7 @@ class Simulator:
         # Not even what was loaded once is remembered.
         self._stepper.resume(self._fresh)
         self._stepper.restart(x, time)
-        self._told = Told(self._stepper)
+        self._log = StepLog(self._stepper)
 
     def reset(self, initial: State | ArrayLike | None = None) -> State:
         """Begin anew at time zero, with a new record; return the state then.
@@ -179,7 +179,7 @@ class Simulator:
         x = numbers("x", value, (self.finger.layout.size,))
         check_motors(self.finger, x, "x")
         self._stepper.restart(x)
-        self._told = Told(self._stepper)
+        self._log = StepLog(self._stepper)
 
     @property
     def state(self) -> State:
@@ -202,7 +202,7 @@ class Simulator:
         """
         self._hold(*self._checked(inputs, dt, fingertip_force))
         status = self._stepper.advance(self._stepper.time + dt)
-        self._told.add(self._stepper.time, self._tension, self._force)
+        self._log.add(self._stepper.time, self._tension, self._force)
         return self._reached(status)
 
     def _checked(self, inputs: ArrayLike, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
@@ -242,7 +242,7 @@ class Simulator:
             InputError: If nothing has been run, or the sample rate or reference is wrong.
             IntegrationError: If there are more steps than can be kept in memory; its ``result`` holds the first.
         """
-        return self._told.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference)
+        return self._log.result(self.finger, {**self._settings, "sample_rate": sample_rate}, reference)
 
     def signals(self) -> FingerSignals:
         """Return all signals at the present state, under the tensions and force of the last step."""
@@ -254,7 +254,7 @@ class Simulator:
         twin.__dict__ |= self.__dict__
         twin._compiled, twin._stepper = CompiledFinger(self.finger), self._stepper.copy()
         twin._bindings = Bindings(twin._compiled, twin._stepper)
-        twin._told = self._told.copy(twin._stepper)
+        twin._log = self._log.copy(twin._stepper)
         return twin
 
     # Simulators that share what is stepped would step each other.
@@ -294,5 +294,5 @@ def step_many(
         simulator._hold(command, force)
     statuses = Together([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])
     for simulator in simulators:
-        simulator._told.add(simulator._stepper.time, simulator._tension, simulator._force)
+        simulator._log.add(simulator._stepper.time, simulator._tension, simulator._force)
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses.tolist(), strict=True)]

@@ -33,7 +33,7 @@ from finger_pin.simulation.recording import check_memory, record
 _SAME = 1e-9
 
 
-class Told:
+class StepLog:
     """The steps of a simulator since a start, in the order in which they were made."""
 
     def __init__(self, stepper: Stepper) -> None:
@@ -53,7 +53,7 @@ class Told:
         self._numbers.append(end)
         self._numbers.frombytes(inputs.tobytes() + force.tobytes())
 
-    def copy(self, stepper: Stepper) -> Told:
+    def copy(self, stepper: Stepper) -> StepLog:
         """Return the same steps of another stepper, made alike, to go on from independently."""
         twin = copy.copy(self)
         twin._stepper, twin._numbers = stepper, self._numbers[:]

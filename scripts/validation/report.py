@@ -104,7 +104,7 @@ def text(report: Report) -> str:
     width = max(len(family.title) for family in report.families)
     lines = [f"{family.title.ljust(width)}  {_tally(family)}" for family in report.families]
     for family in report.families:
-        lines += [_told(check) for check in family.section.checks if check.verdict is not Verdict.PASS]
+        lines += [_line(check) for check in family.section.checks if check.verdict is not Verdict.PASS]
     return "\n".join([*lines, "", headline(report)])
 
 
@@ -112,7 +112,7 @@ def _tally(family: Family) -> str:
     return ", ".join(f"{count} {verdict}" for verdict in Verdict if (count := family.count(verdict)))
 
 
-def _told(check: Check) -> str:
+def _line(check: Check) -> str:
     if check.measured is None:
         return f"{check.verdict}: {check.what}: {check.note}"
     said = f"{check.verdict}: {check.what}: {check.measured:.6g} {check.unit}, {check.source}: {check.expected:.6g}"
