@@ -81,7 +81,7 @@ def _slopes(duration: float, rounds: int) -> dict[str, float]:
 
 
 def lines(study: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what an identification took, and what slopes cost in runs."""
+    """Yield lines on the cost of an identification, and on that of slopes, in runs."""
     fit, slopes = study["fit"], study["slopes"]
     yield f"identification: {len(PARAMETERS)} numbers in {len(SIGNALS)} signals of {fit['duration']:g} s of fig6"
     yield (

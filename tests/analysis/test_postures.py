@@ -2,19 +2,11 @@
 
 import numpy as np
 import pytest
+from closed_kinematics import equation_1
 from scipy.optimize import nnls
 
 import finger_pin as fp
 from finger_pin.analysis import equilibrium, inverse_kinematics
-
-A1, A2, A3, A4 = 20.2e-3, 45.0e-3, 29.9e-3, 21.8e-3
-
-
-def equation_1(theta):
-    """Fingertip of the paper's finger, written out."""
-    t1, t2, t23, t234 = theta[0], theta[1], theta[1] + theta[2], theta[1] + theta[2] + theta[3]
-    reach = A1 + A2 * np.cos(t2) + A3 * np.cos(t23) + A4 * np.cos(t234)
-    return np.array([np.cos(t1) * reach, np.sin(t1) * reach, A2 * np.sin(t2) + A3 * np.sin(t23) + A4 * np.sin(t234)])
 
 
 def test_the_fingertip_is_put_to_points_of_equation_1_with_the_passive_tendon_slack():

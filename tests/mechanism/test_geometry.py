@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from closed_kinematics import LENGTHS, frames
 
 import finger_pin as fp
 from finger_pin.mechanism.geometry import TendonGeometry, tendon_paths
@@ -17,7 +18,6 @@ PAPER_RADII = {
     "T5": (0.0, 0.0, -3.5, 5.0),
 }
 PLANAR_RADII = {"flexor_proximal": (6.0, 0.0), "flexor_distal": (2.0, 5.5), "extensor": (-8.0, -5.5)}
-LENGTHS = np.array([20.2, 45.0, 29.9, 21.8]) * 1e-3
 POSES = np.radians([[0.0, 0.0, 0.0, 0.0], [8.0, 35.0, 20.0, 50.0], [-9.0, 85.0, 60.0, 5.0], [3.0, 10.0, 88.0, 88.0]])
 
 
@@ -28,20 +28,6 @@ def finger():
 
 def lengths(geometry, q):
     return np.array([np.linalg.norm(np.diff(path.points, axis=-2), axis=-1).sum(axis=-1) for path in geometry.paths(q)])
-
-
-def frames(q):
-    """Rotation and origin of the four links of the paper's finger: Rz(theta1) Rx(90 deg), then turns about z."""
-    c, s = np.cos(q[0]), np.sin(q[0])
-    result = [(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]), np.zeros(3))]
-    rotation = result[0][0] @ np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    origin = result[0][0] @ [LENGTHS[0], 0, 0]
-    for angle, length in zip(q[1:], LENGTHS[1:], strict=True):
-        c, s = np.cos(angle), np.sin(angle)
-        rotation = rotation @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-        result.append((rotation, origin))
-        origin = origin + rotation @ [length, 0, 0]
-    return result
 
 
 def radial_distance(points, frame):
@@ -74,7 +60,7 @@ def test_a_path_touches_each_of_its_pulleys_and_cuts_into_none(finger, q):
 def test_positive_radii_lie_on_the_side_to_which_the_joint_turns():
     geometry = TendonGeometry(fp.load_finger("ub"))
     paths = {path.name: path.points for path in geometry.paths(np.zeros(4))}
-    medial = LENGTHS[:2].sum()
+    medial = sum(LENGTHS[:2])
     at = {name: points[np.argmin(np.abs(points[:, 0] - medial))] for name, points in paths.items()}
     assert at["T3"][2] == pytest.approx(6.3e-3, abs=1e-4)
     assert at["T4"][2] == pytest.approx(-5.3e-3, abs=1e-4)
@@ -125,7 +111,7 @@ def test_half_of_the_passive_tendon_lies_beyond_its_mass_and_none_of_the_others(
     change = np.flatnonzero(np.diff(flags["T5"].astype(int)))
     points = {path.name: path.points for path in finger.paths(np.zeros(4))}["T5"]
     assert len(change) == 1
-    assert LENGTHS[:2].sum() < points[change[0], 0] < LENGTHS[:3].sum()
+    assert sum(LENGTHS[:2]) < points[change[0], 0] < sum(LENGTHS[:3])
 
 
 def test_a_slack_tendon_hangs_below_its_taut_path_and_keeps_its_ends():

@@ -20,11 +20,6 @@ TENSION = np.array([1.2, 1.0, 4.4, 3.1])
 START = np.array([0.05, 0.4, 0.5, 0.35])
 
 
-@pytest.fixture(scope="module")
-def finger() -> fp.Finger:
-    return fp.Finger(fp.load_finger("ub"))
-
-
 @pytest.fixture
 def simulator(finger: fp.Finger) -> Simulator:
     return Simulator(finger, START)

@@ -16,11 +16,6 @@ TENSION = np.array([1.2, 1.0, 4.4, 3.1])
 START = np.array([0.05, 0.4, 0.5, 0.35])
 
 
-@pytest.fixture(scope="module")
-def finger() -> fp.Finger:
-    return fp.Finger("ub")
-
-
 def pushed(simulator: fp.Simulator, steps: int, seed: int) -> fp.Simulator:
     """Step under tensions that jump, with a force on the fingertip now and then."""
     random = np.random.default_rng(seed)

@@ -4,7 +4,8 @@ import time
 
 import numpy as np
 import pytest
-from motion import DURATION, fingertip, joint_position, tensions
+from closed_kinematics import equation_1
+from motion import DURATION, joint_position, tensions
 from pages import console_errors, seek, until
 
 import finger_pin as fp
@@ -93,6 +94,6 @@ def test_a_running_simulation_is_shown_live_and_can_be_replayed_afterwards(brows
         "fingerPlayer.viewer.scene.updateMatrixWorld(true);"
         "return fingerPlayer.scene.links.at(-1).localToWorld(new MeshCat.THREE.Vector3(0.0218, 0, 0)).toArray()"
     )
-    x, y, z = fingertip(joint_position(1.1))
+    x, y, z = equation_1(joint_position(1.1))
     assert tip == pytest.approx([x, z, -y], abs=1e-6)
     assert console_errors(browser) == []

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import matplotlib
 import numpy as np
 import pytest
-from motion import DURATION, fingertip, joint_position, link_frames, tensions
+from closed_kinematics import equation_1, frames
+from motion import DURATION, joint_position, tensions
 from pages import Clock
 
 import finger_pin as fp
@@ -48,7 +49,7 @@ def test_it_is_played_in_real_time_and_touches_nothing_but_the_finger(played):
 def test_links_stand_where_the_kinematics_say_and_tendons_have_the_colour_of_their_tension(played):
     sent = dict((command["path"], command) for _, command in played())
     q = joint_position(DURATION)
-    for name, (rotation, origin) in zip(fp.load_finger("ub").joints, link_frames(q), strict=False):
+    for name, (rotation, origin) in zip(fp.load_finger("ub").joints, frames(q), strict=False):
         matrix = np.reshape(sent[f"/meshcat/bench/finger_pin/{name}_link"]["matrix"], (4, 4)).T
         np.testing.assert_allclose(matrix[:3, :3], rotation, atol=1e-9)
         np.testing.assert_allclose(matrix[:3, 3], origin, atol=1e-9)
@@ -76,7 +77,7 @@ def test_meshcat_shows_it(result, browser):
         const node = viewer.scene_tree.find(["meshcat", "finger_pin", "distal_link"]).object;
         viewer.scene.updateMatrixWorld(true);
         return node.localToWorld(new MeshCat.THREE.Vector3(0.0218, 0, 0)).toArray();"""
-        x, y, z = fingertip(joint_position(DURATION))
+        x, y, z = equation_1(joint_position(DURATION))
         assert browser.execute_script(script) == pytest.approx([x, z, -y], abs=1e-6)
     finally:
         visualizer.window.zmq_socket.close()

@@ -6,7 +6,8 @@ import time
 
 import numpy as np
 import pytest
-from motion import DURATION, fingertip
+from closed_kinematics import equation_1
+from motion import DURATION
 from pages import console_errors, opened, seek
 from PIL import Image
 
@@ -49,7 +50,7 @@ def scale_on_the_panel(page):
 
 
 def test_every_vertex_stands_at_the_fingertip_plus_its_force_at_the_scale_that_the_panel_says(forces_page, polytope):
-    expected = fingertip(np.array(POSTURE)) + scale_on_the_panel(forces_page) * polytope.vertices
+    expected = equation_1(np.array(POSTURE)) + scale_on_the_panel(forces_page) * polytope.vertices
     for name in ("body", "edges"):
         drawn = corners(forces_page, name)
         gaps = np.linalg.norm(drawn[:, None] - expected[None], axis=-1)

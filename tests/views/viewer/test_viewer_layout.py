@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import xarray as xr
-from motion import fingertip, joint_position
+from closed_kinematics import equation_1
+from motion import joint_position
 from pages import opened, seek
 
 import finger_pin as fp
@@ -63,7 +64,7 @@ def test_in_a_window_of_any_size_nothing_overflows_and_the_finger_is_clear_of_pa
 
 def test_the_ghost_moves_as_the_other_result_does(both):
     seek(both, 1.3)
-    x, y, z = fingertip(0.5 * joint_position(1.3))
+    x, y, z = equation_1(0.5 * joint_position(1.3))
     tip = both.execute_script("""
     fingerPlayer.viewer.scene.updateMatrixWorld(true);
     return fingerPlayer.scene.ghostLinks.at(-1).localToWorld(new MeshCat.THREE.Vector3(0.0218, 0, 0)).toArray()""")

@@ -8,7 +8,8 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
-from motion import DURATION, fingertip, joint_position, link_frames, table, tensions
+from closed_kinematics import equation_1, frames
+from motion import DURATION, joint_position, table, tensions
 from pages import console_errors, opened, ring_centres, seek, tendon_colour
 from PIL import Image
 
@@ -57,7 +58,7 @@ def test_the_links_stand_where_table_i_puts_them(page, t):
     matrices = np.reshape(page.execute_script(script), (5, 4, 4))
     assert matrices[0] == pytest.approx(np.eye(4), abs=1e-7)
     # Frames are 1/60 s apart, and positions between them are interpolated.
-    for matrix, (rotation, origin) in zip(matrices[1:], link_frames(joint_position(t)), strict=False):
+    for matrix, (rotation, origin) in zip(matrices[1:], frames(joint_position(t)), strict=False):
         assert matrix[:3, :3] == pytest.approx(rotation, abs=5e-4)
         assert matrix[:3, 3] == pytest.approx(origin, abs=2e-5)
 
@@ -117,9 +118,9 @@ def test_the_trace_follows_equation_1_and_ends_at_the_present(page):
     seek(page, 2.5)
     positions, count = page.execute_script(script)
     centres = np.reshape(positions, (-1, 10, 3)).mean(axis=1)
-    assert centres[0] == pytest.approx(fingertip(joint_position(0.0)), abs=1e-4)
-    assert centres[-1] == pytest.approx(fingertip(joint_position(DURATION)), abs=1e-4)
-    assert centres[count // 60] == pytest.approx(fingertip(joint_position(2.5)), abs=2e-3)
+    assert centres[0] == pytest.approx(equation_1(joint_position(0.0)), abs=1e-4)
+    assert centres[-1] == pytest.approx(equation_1(joint_position(DURATION)), abs=1e-4)
+    assert centres[count // 60] == pytest.approx(equation_1(joint_position(2.5)), abs=2e-3)
 
 
 @pytest.mark.parametrize("name", ["oblique", "side", "top"])
@@ -129,7 +130,7 @@ def test_the_camera_frames_the_finger_beside_the_panel(page, name):
     scene.frame(arguments[0]); viewer.render();
     return arguments[1].map((p) => scene.root.localToWorld(new MeshCat.THREE.Vector3(...p)).project(viewer.camera))
         .map((v) => [(v.x + 1) / 2 * innerWidth, (1 - v.y) / 2 * innerHeight, v.z]);"""
-    points = [origin.tolist() for t in np.linspace(0, 4, 30) for _, origin in link_frames(joint_position(t))]
+    points = [origin.tolist() for t in np.linspace(0, 4, 30) for _, origin in frames(joint_position(t))]
     pixels = np.array(page.execute_script(script, name, points))
     width = page.execute_script("return innerWidth")
     panel = page.find_element("id", "panel").rect

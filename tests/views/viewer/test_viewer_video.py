@@ -5,7 +5,8 @@ import sys
 
 import numpy as np
 import pytest
-from motion import fingertip, joint_position
+from closed_kinematics import equation_1
+from motion import joint_position
 from PIL import Image
 
 import finger_pin as fp
@@ -32,7 +33,7 @@ def test_a_gif_lasts_as_long_as_the_motion_and_traces_the_fingertip(result, tmp_
     frames, duration = pictures(write_video(part, tmp_path / "film.gif", rate=10.0))
     assert len(frames) == 7 and duration == 100
     # The trace is pink and bright where it is past, and the fingertip moves up all the time, by equation (1).
-    assert np.all(np.diff([fingertip(joint_position(t))[2] for t in np.arange(0.0, 0.65, 0.1)]) > 0.0)
+    assert np.all(np.diff([equation_1(joint_position(t))[2] for t in np.arange(0.0, 0.65, 0.1)]) > 0.0)
     tops = []
     for frame in frames[3:]:
         red, green, blue = np.moveaxis(frame, -1, 0)
