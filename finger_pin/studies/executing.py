@@ -141,7 +141,7 @@ class Crew:
 def _call(work: bytes) -> Any:
     function, item = pickle.loads(work)
     with quiet():
-        return function(item, _never)
+        return function(item, lambda: False)
 
 
 @contextmanager
@@ -152,10 +152,6 @@ def quiet() -> Iterator[None]:
         return
     with warnings.catch_warnings(action="ignore", category=ScenarioWarning):
         yield
-
-
-def _never() -> bool:
-    return False
 
 
 def _answer(answers: queue.SimpleQueue[tuple[int, Future[Any]]], index: int, future: Future[Any]) -> None:

@@ -63,7 +63,7 @@ def outcome(
         "searches": len(fits),
         "searches_alike": alike,
         "evaluations": problem.evaluations,
-        "bic": least + count * math.log(max(sum(w * len(e) for e, w in _pairs(best)), 1.0)),
+        "bic": least + count * math.log(max(float(best.weights @ [len(e) for e in best.residuals]), 1.0)),
     }
     attrs |= {"unfinished": unfinished} if unfinished else {}
     return xr.Dataset(variables, coordinates, attrs)
@@ -108,10 +108,6 @@ def _estimates(
             {"units": "1", "long_name": "rise of minus twice the likelihood, the others fitted anew; 3.841 at 95 %"},
         ),
     }
-
-
-def _pairs(best: Fit) -> list[tuple[Array, float]]:
-    return list(zip(best.residuals, best.weights.tolist(), strict=True))
 
 
 def _profiles(problem: Problem, best: Fit, sides: Mapping[tuple[int, int], Side]) -> tuple[Array, Array]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
@@ -36,7 +35,9 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
             axes = stack(part, [label] * len(panels))
             title(axes[0], text)
             for each, panel in zip(axes, panels, strict=True):
-                _draw(each, result["time"].values, panel)
+                for index, (name, values) in enumerate(panel.items()):
+                    trace(each, result["time"].values, values, label=name, **series(index))
+                each.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)
     return figure
 
 
@@ -44,9 +45,3 @@ def _panels(labels: list[str], values: Array) -> list[dict[str, Array]]:
     """Return lines by their labels, a few for each panel."""
     lines = list(zip(labels, values.T, strict=True))
     return [dict(lines[first : first + _MOST]) for first in range(0, len(lines), _MOST)]
-
-
-def _draw(axes: Axes, time: Array, lines: dict[str, Array]) -> None:
-    for index, (label, values) in enumerate(lines.items()):
-        trace(axes, time, values, label=label, **series(index))
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="x-small", frameon=False)
