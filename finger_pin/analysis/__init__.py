@@ -3,8 +3,6 @@
 It reads descriptions, fingers, scenarios and results, and nothing of the simulation.
 """
 
-from __future__ import annotations
-
 from finger_pin.analysis.closure import ClosureRange, closure_over_range, locking_over_range, posed
 from finger_pin.analysis.equilibrium import Equilibrium, equilibrium
 from finger_pin.analysis.inverse_kinematics import TipPosture, inverse_kinematics

@@ -5,8 +5,6 @@ distribution over tendons (`PseudoInverse`, or `LimitedDistribution` of `limited
 passive tendons' tension (`PassiveTensionLoop`). `build_controller` makes them from the entries of a scenario.
 """
 
-from __future__ import annotations
-
 from finger_pin.control.build import build_controller
 from finger_pin.control.compensated import CompensatedController
 from finger_pin.control.distribution import Plan, PseudoInverse, TensionDistribution

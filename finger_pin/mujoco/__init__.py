@@ -3,8 +3,6 @@
 Importing this registers the plugin that computes it, so that models that have it can be loaded.
 """
 
-from __future__ import annotations
-
 from finger_pin.exceptions import InputError
 
 try:

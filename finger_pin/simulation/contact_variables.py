@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,9 +14,7 @@ from finger_pin.laws.law import Touch
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import State
 from finger_pin.mechanism.surroundings import POSE, VELOCITY
-
-if TYPE_CHECKING:
-    from finger_pin.simulation.motions import SampledMotion
+from finger_pin.simulation.motions import SampledMotion
 
 # Dimensions, unit and name.
 Variables = dict[str, tuple[tuple[str, ...], str, str]]

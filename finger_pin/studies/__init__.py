@@ -7,8 +7,6 @@ put these together. ``many`` returns whole runs instead of metrics. ``comparison
 their own.
 """
 
-from __future__ import annotations
-
 from finger_pin.studies.designs import Grid, LatinHypercube, Listing, Range
 from finger_pin.studies.metrics import DEFAULT_METRICS, METRICS, Metric, Run
 from finger_pin.studies.optimising import DEFAULT_CONSTRAINTS, DEFAULT_OBJECTIVES, Effort, optimise

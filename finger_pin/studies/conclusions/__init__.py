@@ -3,8 +3,6 @@
 Every experiment takes a scenario, so that the same questions can be put to any finger.
 """
 
-from __future__ import annotations
-
 from finger_pin.studies.conclusions.delivery import DELIVERY_RUNS, PassiveDelivery, check_delivery, passive_delivery
 from finger_pin.studies.conclusions.findings import (
     Finding,

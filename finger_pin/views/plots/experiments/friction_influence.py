@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
+from finger_pin.studies.conclusions.influence import FrictionInfluence, Sweep
+from finger_pin.studies.conclusions.runs import Measures
 from finger_pin.views.plots.panels import grid, plain, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, colour, limit_line, styled
-
-if TYPE_CHECKING:
-    from finger_pin.studies.conclusions.influence import FrictionInfluence, Sweep
-    from finger_pin.studies.conclusions.runs import Measures
 
 _MILLI = 1e3
 _JOINTS, _TENDONS = VERMILLION, BLUE

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.studies.conclusions.delivery import PassiveDelivery
 from finger_pin.views.plots.lines import series, trace
 from finger_pin.views.plots.panels import grid, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, colour, limit_line, styled
-
-if TYPE_CHECKING:
-    from finger_pin.studies.conclusions.delivery import PassiveDelivery
 
 
 @styled

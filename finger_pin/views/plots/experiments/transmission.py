@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,12 +11,10 @@ from matplotlib.figure import Figure
 from finger_pin.analysis.transmission import flexion_postures, transmission_efficiency
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
+from finger_pin.studies.conclusions.posture import Transmission
 from finger_pin.views.plots.panels import grid, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, cycle_colours, styled, thin
 from finger_pin.views.plots.workspace_surfaces import flexion_section
-
-if TYPE_CHECKING:
-    from finger_pin.studies.conclusions.posture import Transmission
 
 _MILLI = 1e3
 _AXES = "xyz"
