@@ -19,7 +19,7 @@ th { text-align: left; color: #5d6678; font-weight: 500; border-bottom: 2px soli
 th, td { padding: .3rem .8rem .3rem 0; vertical-align: top; } td { border-bottom: 1px solid #e3e6ec; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .soft { color: #5d6678; } .doubt { color: #a15c00; }
-img { display: block; max-width: 100%; height: auto; }
+img { display: block; max-width: 100%; height: auto; margin-top: .6rem; }
 @media (max-width: 45rem) { section { overflow-x: auto; } img { max-width: none; } table { font-size: .8rem; }
   td:first-child { min-width: 7.5rem; overflow-wrap: anywhere; } }
 """
