@@ -239,10 +239,10 @@ class ClosedLoop:
             objects = around.energies(state.object_pose, state.object_velocity, base)
         if self.palm is not None:
             higher = found.potential_energy + self.palm.lifted(time, self.finger.rigid_body.mass)
-            found = replace(found, potential_energy=higher)
+            found = found._replace(potential_energy=higher)
             if around is not None and objects is not None:
                 objects = objects[0], objects[1] + self.palm.lifted(time, float(np.sum(around.mass)))
-        return replace(found, objects=objects)
+        return found._replace(objects=objects)
 
     def powers(self, time: Array, x: Array) -> Array:
         """Return powers of the rows and of the fingertip force, shape (m, powers + 1), W, at times (m,) and states."""

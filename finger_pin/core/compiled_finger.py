@@ -23,6 +23,8 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import RowSignals
 
+_Asked = tuple[Motions, Array, NDArray[np.uint8], int]
+
 
 class CompiledMechanism:
     """Evaluates a mechanism without Python inside; not to be shared between threads.
@@ -41,7 +43,7 @@ class CompiledMechanism:
         self.tables = build_tables(mechanism)
         laws = [table.law for table in mechanism.rows]
         self.models = Models(self.tables, laws, mechanism.channels, mechanism.moved)
-        self._motions: dict[int, tuple[Motions, NDArray[np.uint8], int]] = {}
+        self._motions: dict[int, _Asked] = {}
 
     def renew(self, mechanism: Mechanism) -> bool:
         """Take the numbers of another mechanism in place; return False if more than numbers differ."""
@@ -164,25 +166,26 @@ class CompiledMechanism:
         # A few postures after the other are asked for in loops: what is bound once serves them all.
         kept = count < FEW and base is None
         found = self._motions.get(count) if kept else None
-        motions, block, address = found or self._bound_motions(count, base)
+        motions, tips, block, address = found or self._bound_motions(count, base)
         if kept:
-            self._motions[count] = motions, block, address
+            self._motions[count] = motions, tips, block, address
         motions.positions[:], motions.velocities[:] = position, velocity
         motion_many(address)
-        at = 0 if alone else slice(None)
-        tips = motions.tips[at] if motions.tips.shape[1] != 1 else motions.tips[at][..., 0, :]
-        return Motion(tips.copy(), motions.kinetic[at].copy(), motions.potential[at].copy())
+        if alone:
+            return Motion(tips[0].copy(), motions.kinetic[0].copy(), motions.potential[0].copy())
+        return Motion(tips.copy(), motions.kinetic.copy(), motions.potential.copy())
 
-    def _bound_motions(self, count: int, base: Array | None) -> tuple[Motions, NDArray[np.uint8], int]:
-        """Return room for postures, the block that compiled code finds it by, and its address."""
+    def _bound_motions(self, count: int, base: Array | None) -> _Asked:
+        """Return room for postures, its tips, the block that compiled code finds it by, and its address."""
         tables = self.tables
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
         motions = Motions(
             self.models.model().address, np.zeros(shape), np.zeros(shape), *filled, path_motions(base, count, 0)
         )
-        block = bound(motions, MOTIONS)
-        return motions, block, int(block.ctypes.data)
+        block, tips = bound(motions, MOTIONS), motions.tips
+        # Of one tip there is no axis.
+        return motions, tips if tips.shape[1] != 1 else tips[:, 0], block, int(block.ctypes.data)
 
 
 class CompiledFinger:

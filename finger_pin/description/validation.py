@@ -168,6 +168,12 @@ def finite_vector(name: str, value: Sequence[float] | NDArray[np.float64], size:
     return found
 
 
+def all_finite(values: NDArray[np.float64]) -> bool:
+    """Return whether all numbers of an array are finite; of few numbers sooner than NumPy says it."""
+    # The sum of their squares tells in most cases.
+    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
+
+
 def check_size(value: Numbers, names: Sequence[str], entry: str, what: str) -> None:
     """Raise the error of an entry whose list does not have one number per name."""
     if isinstance(value, tuple) and len(value) != len(names):

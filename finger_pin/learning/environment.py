@@ -76,8 +76,8 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """
         self.task, self.render_mode = Task.of(task), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, 1, finger)
-        self.observation_space, self._actions = self._worlds.spaces()
-        self.action_space = self._actions
+        self.observation_space, actions = self._worlds.spaces()
+        self.action_space, self._limits = actions, (actions.low.astype(float), actions.high.astype(float))
         self._begun = False
 
     def reset(
@@ -100,7 +100,7 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if not self._begun:
             raise ResetNeeded("there is no episode yet: call reset before step")
         worlds, world = self._worlds, self._worlds.each[0]
-        worlds.act(read_actions(action, self._actions)[None], (0,))
+        worlds.act(read_actions(action, *self._limits)[None], (0,))
         observations, signals = worlds.observe(_ALONE)
         reward, done = self.task.judge(signals, 1)
         info: dict[str, Any] = {"reason": world.reason} if world.reason else {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -33,12 +33,26 @@ def instant(loop: ClosedLoop, time: float, x: Array) -> SampledMotion:
     return SampledMotion(loop, Trajectory(_EVER, lambda _: x[None], _NOTHING), np.array([time]))
 
 
+# What a step changes in place, and views of it.
+_STAYING = {"loop", "times", "packed", "state", "_accelerated"}
+
+
 class Present(SampledMotion):
     """Worlds at the states that they have reached, and all that follows from these."""
 
-    def __init__(self, loop: SideBySide, times: Array, x: Array) -> None:
-        """Take times, shape (w,), s, and packed states, shape (w, size)."""
-        self.loop, self.times, self.packed, self._accelerated = loop, times, x, loop.accelerated
+    def __init__(self, loop: SideBySide) -> None:
+        """Make room for the present times, shape (w,), s, and packed states, shape (w, size)."""
+        self.loop, self._accelerated, count = loop, loop.accelerated, len(loop.loops)
+        self.times, self.packed = np.zeros(count), np.zeros((count, loop.finger.layout.size))
+
+    def forget(self) -> None:
+        """Forget what followed from earlier states; views of the states remain."""
+        for name in vars(self).keys() - _STAYING:
+            delattr(self, name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but views, which a copy makes of its own states."""
+        return {name: value for name, value in vars(self).items() if name in _STAYING and name != "state"}
 
 
 def known_variables(loop: ClosedLoop) -> dict[str, Quantity]:

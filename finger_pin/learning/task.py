@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import suggestion
+from finger_pin.description.validation import all_finite, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.learning.distributions import Distribution
 from finger_pin.learning.sensors import Sensor
@@ -109,17 +109,21 @@ class Task:
             InputError: If a function returns another shape, or what is not finite.
         """
         found = {}
-        for name, function in self._observed.items():
-            if isinstance(function, Sensor):
-                continue
-            value = _numbers(f"observation.{name}", _told(f"observation.{name}", function, told))
+        for name, (entry, function) in self._derived.items():
+            value = _numbers(entry, function, told)
             if value.shape[:1] != (worlds,):
                 allowed = f"must return arrays with the worlds in front, shape ({worlds}, ...); see per_world"
-                raise InputError(f"observation.{name}", allowed, list(value.shape))
-            if not np.isfinite(value).all():
-                raise InputError(f"observation.{name}", "must return finite numbers", value.tolist())
+                raise InputError(entry, allowed, list(value.shape))
+            if not all_finite(value):
+                raise InputError(entry, "must return finite numbers", value.tolist())
             found[name] = value
         return found
+
+    @cached_property
+    def _derived(self) -> Mapping[str, tuple[str, Function]]:
+        """The functions among the observations, with their entries."""
+        given = self._observed.items()
+        return {name: (f"observation.{name}", each) for name, each in given if not isinstance(each, Sensor)}
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
@@ -133,7 +137,7 @@ class Task:
             InputError: If a function returns another shape, or a reward is not finite.
         """
         reward = _shaped("reward", self.reward, signals, worlds)
-        if not np.isfinite(reward).all():
+        if not all_finite(reward):
             raise InputError("reward", "must return finite numbers", reward.tolist())
         if self.done is None:
             return reward, np.zeros(worlds, dtype=bool)
@@ -157,19 +161,16 @@ def per_world(function: Callable[[Signals], Any]) -> Function:
     return together
 
 
-def _told(name: str, function: Function, signals: Signals) -> ArrayLike:
+def _numbers(name: str, function: Function, signals: Signals) -> Array:
     """Return the result of a function of signals; refuse one that asks for a name that is not among them."""
     try:
-        return function(signals)
+        value = function(signals)
     except KeyError as error:
         asked = error.args[0] if error.args else None
         if asked in signals:
             raise
         allowed = f"asks for a signal that it is not told; there are {', '.join(signals)}"
         raise InputError(name, allowed, asked) from None
-
-
-def _numbers(name: str, value: Any) -> Array:
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -178,7 +179,7 @@ def _numbers(name: str, value: Any) -> Array:
 
 def _shaped(name: str, function: Function, signals: Signals, worlds: int) -> Array:
     """Return the result of a function of signals, one number per world."""
-    found = _numbers(name, _told(name, function, signals))
+    found = _numbers(name, function, signals)
     if found.shape != (worlds,):
         allowed = f"must return one value per world, shape ({worlds},): signals have the worlds in front; see per_world"
         raise InputError(name, allowed, list(found.shape))

@@ -51,11 +51,11 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             raise InputError("num_envs", "must be a whole number above 0", num_envs)
         self.task, self.num_envs, self.render_mode = Task.of(task), int(num_envs), read_render_mode(render_mode)
         self._worlds = Worlds(scenario, self.task, self.num_envs, finger)
-        self.single_observation_space, self._single = self._worlds.spaces()
-        self.single_action_space = self._single
+        self.single_observation_space, single = self._worlds.spaces()
+        self.single_action_space = single
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        low, high = (np.tile(each, (self.num_envs, 1)) for each in (self._single.low, self._single.high))
-        self.action_space = self._actions = Box(low, high, dtype=np.float32)
+        low, high = (np.tile(each, (self.num_envs, 1)) for each in (single.low, single.high))
+        self.action_space, self._limits = Box(low, high, dtype=np.float32), (low.astype(float), high.astype(float))
         self.metadata = {
             "autoreset_mode": AutoresetMode.NEXT_STEP,
             "render_modes": ["rgb_array"],
@@ -104,7 +104,7 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """
         if not self._randoms:
             raise ResetNeeded("there are no episodes yet: call reset before step")
-        commands, worlds = read_actions(actions, self._actions), self._worlds
+        commands, worlds = read_actions(actions, *self._limits), self._worlds
         begun = self._ended.copy()
         at_start = np.flatnonzero(begun)
         worlds.begin(at_start.tolist(), self._randoms)

@@ -224,27 +224,26 @@ class World:
                 return x
         raise problem
 
-    def act(self, action: Array) -> None:
-        """Take an action, which holds from the next period on, or later by its delay."""
+    def act(self, action: Array) -> float:
+        """Take an action for a control period; return the time until which the inputs act that it begins with, s."""
         self.action.take(action, self.time)
+        self._step += 1
+        return self._next_end()
 
-    def next_end(self) -> float:
-        """Hold the inputs that act now, and return the time of their end, s; `RESTING` after the period."""
-        end = (self._step + 1) * self.task.period
-        if self.reason or self.now >= end:
-            return RESTING
-        return self.action.next_piece(self.stepper, self.now, end)
-
-    def reach(self, end: float, status: int) -> None:
-        """Note the status with which a stepper ended a piece."""
+    def reach(self, end: float, status: int) -> float:
+        """Note the status with which a stepper ended a piece; return the end of the next, s, or `RESTING`."""
         self.now = end
         if status:
             self.now = self.stepper.time
             self.reason = self.stepper.failure(status, self.origin.finger.layout.names)
+        return self._next_end()
 
-    def end_period(self) -> None:
-        """Count a control period."""
-        self._step += 1
+    def _next_end(self) -> float:
+        """Hold the inputs that act now, and return the time of their end, s; `RESTING` after the period."""
+        end = self._step * self.task.period
+        if self.reason or self.now >= end:
+            return RESTING
+        return self.action.next_piece(self.stepper, self.now, end)
 
     def result(self, sample_rate: float) -> xr.Dataset:
         """Return the episode so far, integrated again step by step, as a Dataset with its energy account."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from finger_pin.core.stepping.batch import RESTING, Together
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.routing import Array
+from finger_pin.description.validation import all_finite
 from finger_pin.exceptions import InputError
 from finger_pin.learning.instant import Present, SideBySide, known_variables
 from finger_pin.learning.sensors import measurements
@@ -40,6 +41,7 @@ class Worlds:
         self.task, self.each = task, [first, *(first.twin() for _ in range(count - 1))]
         loops, actions = [world.origin for world in self.each], [world.action for world in self.each]
         self._now = SideBySide.of(loops, actions, task.variables, apart=first.rebuilt)
+        self._present = Present(self._now)
         self._name_variables()
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
@@ -102,18 +104,12 @@ class Worlds:
         """
         each, ends = self.each, [RESTING] * len(self.each)
         for i in places:
-            each[i].act(actions[i])
-        while True:
-            for i in places:
-                ends[i] = each[i].next_end()
-            if max(ends) == RESTING:
-                break
-            statuses = self._steppers.advance(ends).tolist()
+            ends[i] = each[i].act(actions[i])
+        while max(ends) != RESTING:
+            statuses = self._steppers.advance(ends)
             for i in places:
                 if ends[i] != RESTING:
-                    each[i].reach(ends[i], statuses[i])
-        for i in places:
-            each[i].end_period()
+                    ends[i] = each[i].reach(ends[i], statuses[i])
 
     def observe(self, places: _Places, *, judged: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
@@ -123,8 +119,10 @@ class Worlds:
         Raises:
             InputError: If a function that is observed returns another shape, or what is not finite.
         """
-        times = np.array([world.now for world in self.each])
-        motions = Present(self._now, times, self._steppers.states())
+        motions = self._present
+        motions.forget()
+        motions.times[:] = [world.now for world in self.each]
+        self._steppers.read(motions.packed)
         wanted = self._variables if judged else self.task.sensors
         signals = {name: np.array(self._variables[name].value(motions)) for name in wanted}
         count = len(places)
@@ -133,7 +131,8 @@ class Worlds:
         for name, measurement in self._measurements.items():
             told[name] = measurement.sample(signals[name] if whole else signals[name][places], places, self._randoms)
         told |= self.task.derive(told, count)
-        flat = [told[name].reshape(count, -1) for name in (*self.task.observed, *self._context)]
+        seen = [told[name] for name in (*self.task.observed, *self._context)]
+        flat = [each if each.ndim == 2 else each.reshape(count, -1) for each in seen]
         signals |= {name: value.copy() for name, value in self._context.items()}
         signals["action"] = np.array([world.action.given for world in self.each])
         return np.concatenate(flat, axis=1, dtype=np.float32), signals
@@ -144,8 +143,8 @@ class Worlds:
         return np.array([world.over for world in self.each])
 
 
-def read_actions(actions: Any, space: Box) -> Array:
-    """Return actions as an array within their bounds.
+def read_actions(actions: Any, low: Array, high: Array) -> Array:
+    """Return actions as an array within their bounds, of their shape.
 
     Raises:
         InputError: If they have another shape, or are not finite.
@@ -154,11 +153,11 @@ def read_actions(actions: Any, space: Box) -> Array:
         found = np.asarray(actions, dtype=float)
     except (TypeError, ValueError):
         raise InputError("action", "must be numbers", actions) from None
-    if found.shape != space.shape:
-        raise InputError("action", f"must have shape {space.shape}", list(found.shape))
-    if not np.isfinite(found).all():
+    if found.shape != low.shape:
+        raise InputError("action", f"must have shape {low.shape}", list(found.shape))
+    if not all_finite(found):
         raise InputError("action", "must be finite", found.tolist())
-    return np.asarray(np.minimum(np.maximum(found, space.low), space.high), dtype=float)
+    return np.asarray(np.minimum(np.maximum(found, low), high))
 
 
 def read_render_mode(mode: str | None) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from finger_pin.description.routing import Array
 
@@ -28,8 +29,7 @@ class Kinematics:
     potential_energy: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(NamedTuple):
     """Place of the fingertip and energies of the rigid body; leading dimensions are kept.
 
     Attributes:

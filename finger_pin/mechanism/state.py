@@ -191,6 +191,10 @@ class Layout:
         return dict(zip(self._blocks, parts, strict=True))
 
     @cached_property
+    def _filled(self) -> list[tuple[str, slice]]:
+        return [(name, part) for name, part in self._parts.items() if part.stop > part.start]
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """A name for every number of the packed state."""
         prefixes = dict.fromkeys(("position", "velocity"), "joint_")
@@ -217,8 +221,9 @@ class Layout:
         if x.shape[-1] != self.size:
             raise ValueError(f"a packed state has {self.size} numbers, not {x.shape[-1]}")
         # Of a frozen class the constructor takes longer than all else in a step's answer.
-        state = object.__new__(State)
-        vars(state).update([(name, x[..., part]) for name, part in self._parts.items()])
+        state, nothing = object.__new__(State), x[..., :0]
+        vars(state).update(dict.fromkeys(self._parts, nothing))
+        vars(state).update([(name, x[..., part]) for name, part in self._filled])
         return state
 
     def scales(self) -> Array:

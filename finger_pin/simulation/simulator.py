@@ -295,4 +295,4 @@ def step_many(
     statuses = Together([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])
     for simulator in simulators:
         simulator._log.add(simulator._stepper.time, simulator._tension, simulator._force)
-    return [simulator._reached(status) for simulator, status in zip(simulators, statuses.tolist(), strict=True)]
+    return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]

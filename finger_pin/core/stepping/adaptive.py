@@ -113,7 +113,7 @@ def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) 
     memory = integration.memory
     factor = _growth(integration, h, error, clipped)
     if memory[at.JUMPED] > 0.0 and not clipped:
-        memory[at.HELD_STEP] = h * min(factor, 1.5)
+        memory[at.HELD_STEP] = h * min(factor, 3.0)
     memory[at.STEP] = max(memory[at.STEP], h * factor) if final and factor >= 1.0 else h * factor
     memory[at.LAST_STEP], memory[at.LAST_ERROR] = h, max(error, 1e-2)
     if memory[at.WHOLE] > 0.0:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound, bound_at, call_at
 from finger_pin.core.stepping.stepper import Stepper
@@ -60,6 +60,7 @@ class Together:
         parts = [part for stepper in steppers for part in stepper.parts]
         self._owners = np.repeat(np.arange(len(steppers)), [len(stepper.parts) for stepper in steppers])
         self._first = np.searchsorted(self._owners, np.arange(len(steppers)))
+        self._whole = len(parts) == len(steppers)
         ready = [part.ready() for part in parts]
         # What the addresses lead to lives as long as this.
         self._steppers, self._parts = steppers, parts
@@ -75,33 +76,29 @@ class Together:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
         return Together, (self._steppers,)
 
-    def advance(self, ends: ArrayLike) -> Indices:
-        """Advance each to a time, or not at all if that is `RESTING`; return the status of each, as `advance` does.
-
-        Args:
-            ends: Shape (m,), s.
-        """
-        self._batch.ends[:] = np.asarray(ends)[self._owners]
+    def advance(self, ends: Sequence[float]) -> list[int]:
+        """Advance each to a time, s, or not at all if that is `RESTING`; return their statuses, as `advance` does."""
+        batch = self._batch
+        batch.ends[:] = ends if self._whole else np.asarray(ends)[self._owners]
         threads = min(usable_cores(), len(self._parts)) if len(self._parts) > 1 else 1
         # Whoever is free takes the next piece.
         pieces = iter(self._bound(threads))
-
-        def work() -> None:
-            for piece in pieces:
-                advance_batch(piece)
-
-        others = [_workers().submit(work) for _ in range(threads - 1)]
-        work()
+        others = [_workers().submit(_advance_all, pieces) for _ in range(threads - 1)]
+        _advance_all(pieces)
         for other in others:
             other.result()
-        return np.maximum.reduceat(self._batch.statuses, self._first)
+        found = batch.statuses if self._whole else np.maximum.reduceat(batch.statuses, self._first)
+        return list(found.tolist())
 
-    def states(self) -> Array:
-        """Return the packed states of all, shape (m, size)."""
-        if len(self._parts) != len(self._steppers):
-            return np.array([stepper.x for stepper in self._steppers])
-        states, attitudes = np.array([part.x for part in self._parts]), [part.attitude for part in self._parts]
-        return states if not len(attitudes[0]) else self._steppers[0].joined([states], [np.array(attitudes)])
+    def read(self, out: Array) -> None:
+        """Fill the packed states of all, shape (m, size), contiguous."""
+        if not self._whole:
+            out[:] = [stepper.x for stepper in self._steppers]
+        elif len(self._parts[0].attitude):
+            states, attitudes = (np.array([getattr(part, name) for part in self._parts]) for name in ("x", "attitude"))
+            out[:] = self._steppers[0].joined([states], [attitudes])
+        else:
+            np.concatenate([part.x for part in self._parts], out=out.reshape(-1))
 
     def _bound(self, threads: int) -> list[int]:
         """Return the addresses of pieces of the batch, for some threads."""
@@ -117,6 +114,11 @@ class Together:
     def _part(self, at: slice) -> Batch:
         batch = self._batch
         return Batch(batch.units[at], batch.blocks[at], batch.ends[at], batch.statuses[at])
+
+
+def _advance_all(pieces: Iterator[int]) -> None:
+    for piece in pieces:
+        advance_batch(piece)
 
 
 @cache

@@ -125,12 +125,14 @@ def interpolant(tableau: Any, k: Any, dense: Any) -> None:
 @compiled
 def cut(before: Any, after: Any, dense: Any, share: float) -> None:
     """Let a step end after a share of it: the state at its end and its row of ``dense`` become those of that part."""
+    highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
     for c in range(before.size):
-        bend, last, new = 0.0, 0.0, 0.0
+        bend, last, new, power = 0.0, 0.0, 0.0, highest
         for row in range(dense.shape[0] - 1, -1, -1):
             old = dense[row, c]
             bend = old + share * bend
-            new += share ** (row + 2) * (old - last)
+            new += power * (old - last)
+            power *= inverse
             dense[row, c], last = new, old
         after[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
 

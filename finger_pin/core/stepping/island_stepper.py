@@ -169,12 +169,12 @@ class Part:
 
     def _place(self, record: Record) -> None:
         """Hand a record to compiled code, with the loops of motors and the knots, if any."""
-        placed = record, self.drives, self.knots
-        if all(one is other for one, other in zip(self._placed, placed, strict=True)):
+        before, drives, knots = self._placed
+        if before is record and drives is self.drives and knots is self.knots:
             return
         room = (record.times, record.states, record.attitudes, record.dense)
         stretch = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
-        self._placed, self._blocks, self._advance = placed, [stretch], advance
+        self._placed, self._blocks, self._advance = (record, self.drives, self.knots), [stretch], advance
         if self.drives is not None:
             driven = Driven(self.drives, stretch.ctypes.data, self._advance.address)
             self._blocks.append(bound(driven, DRIVEN))

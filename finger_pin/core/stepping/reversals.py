@@ -17,7 +17,7 @@ from finger_pin.core.tables import END, FIRST, KINK
 
 # A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
 # behind the reversal, so that the next one begins on the other side: by so much at least, by so much if it can be.
-_MOST, _LEAST, _WANTED = 0.7, 0.07, 0.3
+_MOST, _LEAST, _WANTED = 0.18, 0.018, 0.08
 # The speed is looked at so often in a step, and so many ends of a step are tried.
 _LOOKS, _TRIALS = 8, 8
 

@@ -178,7 +178,7 @@ class Stepper:
     @property
     def time(self) -> float:
         """Time that all have reached, s."""
-        return min(part.time for part in self.parts)
+        return min([part.time for part in self.parts])
 
     @property
     def x(self) -> Array:
