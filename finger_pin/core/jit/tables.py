@@ -57,15 +57,18 @@ def indices(table: tuple[Any, ...]) -> bytes:
     return b"".join(found)
 
 
-def alike(table: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
-    """Return whether two tables that fit have the same integers."""
+def alike(table: tuple[Any, ...], other: tuple[Any, ...], *, numbers: bool = False) -> bool:
+    """Return whether two tables that fit have the same integers, and numbers too if those are asked for."""
     for own, new in zip(table, other, strict=True):
         if own is new:
             continue
         if isinstance(own, tuple):
-            if not alike(own, new):
+            if not alike(own, new, numbers=numbers):
                 return False
-        elif isinstance(own, np.ndarray) and own.dtype == np.int64 and not np.array_equal(own, new):
+        elif isinstance(own, np.ndarray):
+            if (numbers or own.dtype == np.int64) and not np.array_equal(own, new):
+                return False
+        elif numbers and own != new:
             return False
     return True
 
@@ -108,14 +111,23 @@ def numbered(table: _Table) -> _Table:
     return type(table)(*(numbered(each) if isinstance(each, tuple) else each for each in numbers))
 
 
-def taken(like: _Table, places: _Table, table: tuple[Any, ...]) -> _Table:
-    """Return a table like one, with the numbers that stand at some places, as `numbered` has them, in another."""
+def taken(like: _Table, places: _Table, table: tuple[Any, ...], before: tuple[Any, ...]) -> _Table:
+    """Return a table with the numbers that stand at some places, as `numbered` has them, in another.
+
+    Args:
+        like: Such a table, of the same places in ``before``: what both have in common stays.
+        places: The places.
+        table: The other one.
+        before: The one before.
+    """
     found = []
-    for own, at, others in zip(like, places, table, strict=True):
-        if isinstance(own, tuple):
-            found.append(taken(own, at, others))
+    for own, at, new, old in zip(like, places, table, before, strict=True):
+        if new is old:
+            found.append(own)
+        elif isinstance(own, tuple):
+            found.append(taken(own, at, new, old))
         else:
-            found.append(others.ravel()[at.astype(np.int64)] if _is_of_numbers(own) else own)
+            found.append(new.ravel()[at.astype(np.int64)] if _is_of_numbers(own) else own)
     return type(like)(*found)
 
 

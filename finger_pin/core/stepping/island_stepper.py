@@ -15,7 +15,7 @@ from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.control import Control
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
-from finger_pin.core.jit import Unit, bound, copied, fits
+from finger_pin.core.jit import Unit, bound, copied
 from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
@@ -198,10 +198,6 @@ class Part:
             self.memory[[core.TIME, core.WINDOW_START, core.WINDOW_END]] = time, 0.0, 0.0
             if self.drives is not None:
                 self.drives.taken[0] = math.ceil(time / self.drives.period * (1.0 - 1e-12))
-
-    def fits(self, tables: Tables, control: Control) -> bool:
-        """Return whether other tables and another control have room in the bound ones."""
-        return fits(self.tables, tables._replace(loaded=self.tables.loaded)) and fits(self.control, control)
 
     def renew(self, tables: Tables, control: Control, x: Array, attitude: Array, atol: Array) -> None:
         """Begin anew at time zero with other numbers, which fit, as a new part of them would."""

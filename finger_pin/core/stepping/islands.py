@@ -120,6 +120,13 @@ def select(tables: Tables, island: Island) -> Tables:
     return part.of(tables)._replace(groups=groups, touching=touching, paths=part.of(paths))
 
 
+def groups_of(tables: Tables, island: Island) -> list[int]:
+    """Return the groups of rows that an island has some of."""
+    return [
+        g for g, (begin, end) in enumerate(tables.groups[:, :2]) if np.any((island.rows >= begin) & (island.rows < end))
+    ]
+
+
 def _groups(tables: Tables, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the groups of some rows, and their entries with these rows one after the other."""
     counts = np.array([np.isin(rows, np.arange(*group[:2])).sum() for group in tables.groups], dtype=np.int64)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.control import HELD, Control
 from finger_pin.core.evaluation.attitude_charts import Charts
-from finger_pin.core.jit import copied, numbered, taken
+from finger_pin.core.jit import alike, copied, fits, numbered, taken
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, Part, failure
-from finger_pin.core.stepping.islands import Island, find_islands, select, select_control, wiring
+from finger_pin.core.stepping.islands import Island, find_islands, groups_of, select, select_control, wiring
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
 from finger_pin.core.threads import in_threads
@@ -77,11 +77,12 @@ class Stepper:
         self._islands = _islands(self._wiring, tables, control)
         self._free = [np.isin(tables.charts, island.coordinates) for island in self._islands]
         self._made_of, self._tables = (mechanism, control, x, tableau, rtol, atol, force, time), self._selected(tables)
+        self._whole, self._inputs = tables, self._selected_inputs(control)
         self.mechanism, self.parts = mechanism, list[Part]()
         for island, (own, inputs, start, attitude, tolerances) in zip(self._islands, self._begun(), strict=True):
             memory = np.zeros(core.MEMORY_SIZE)
             memory[[core.TIME, core.STEP]] = time, FIRST_STEP
-            followed = laws if len(self._islands) == 1 else [laws[g] for g in _groups_of(tables, island)]
+            followed = laws if len(self._islands) == 1 else [laws[g] for g in groups_of(tables, island)]
             given = copied(own), copied(inputs), start, attitude, tableau, float(rtol), tolerances, memory
             self.parts.append(Part(island, followed, *given, judged))
 
@@ -95,24 +96,22 @@ class Stepper:
         atol: Array,
         force: Array | None = None,
     ) -> bool:
-        """Begin anew at time zero, bit by bit as a new stepper that is given the same, if only numbers differ.
-
-        Returns:
-            Whether it did. Where more differs than numbers, nothing has changed.
-        """
-        before, tables = (self._made_of, self._tables), build_tables(mechanism)
-        if before[0][3] is not tableau or before[0][4] != rtol or wiring(tables, control) != self._wiring:
+        """Begin anew, bit by bit as a new stepper of these; return False, unchanged, if more than numbers differ."""
+        whole, (_, inputs, _, method, tolerance, *_) = self._whole, self._made_of
+        tables = build_tables(mechanism)
+        if method is not tableau or tolerance != rtol or not (fits(whole, tables) and fits(inputs, control)):
+            return False
+        driven_alike = alike(inputs, control, numbers=True)
+        if not (driven_alike and alike(whole, tables)) and wiring(tables, control) != self._wiring:
             return False
         self._made_of = (mechanism, control, x, tableau, rtol, atol, force, 0.0)
         if mechanism is not self.mechanism:
             pairs = zip(self._tables, self._numbered, strict=True)
-            self._tables = [tables] if len(self._islands) == 1 else [taken(*each, tables) for each in pairs]
-        begun = [*self._begun()]
-        if not all(part.fits(*each[:2]) for part, each in zip(self.parts, begun, strict=True)):
-            self._made_of, self._tables = before
-            return False
-        self.mechanism = mechanism
-        for index, each in enumerate(begun):
+            self._tables = [tables] if len(self._islands) == 1 else [taken(*each, tables, whole) for each in pairs]
+            self.mechanism, self._whole = mechanism, tables
+        if not driven_alike:
+            self._inputs = self._selected_inputs(control)
+        for index, each in enumerate(self._begun()):
             if each[0].loaded != self.parts[index].tables.loaded:
                 self.parts[index] = self.parts[index].with_loads(each[0].loaded)
             self.parts[index].renew(*each)
@@ -122,6 +121,11 @@ class Stepper:
         """Return the tables of every island."""
         return [tables] if len(self._islands) == 1 else [select(tables, island) for island in self._islands]
 
+    def _selected_inputs(self, control: Control) -> list[Control]:
+        """Return the inputs of every island."""
+        alone = len(self._islands) == 1
+        return [control] if alone else [select_control(control, island) for island in self._islands]
+
     @cached_property
     def _numbered(self) -> list[Tables]:
         """The places of the numbers of every island's tables in those of the whole."""
@@ -129,14 +133,14 @@ class Stepper:
 
     def _begun(self) -> Iterator[tuple[Tables, Control, Array, Array, Array]]:
         """Yield of every island its tables, inputs, state, quaternions and absolute tolerances at the start."""
-        mechanism, control, x, _, _, atol, force, _ = self._made_of
+        mechanism, _, x, _, _, atol, force, _ = self._made_of
         forces = np.zeros((len(mechanism.body.tips), 3))
         forces[:] = 0.0 if force is None else force
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
         whole = len(self._islands) == 1
-        for tables, island, free in zip(self._tables, self._islands, self._free, strict=True):
-            inputs, pushed = (control, forces) if whole else (select_control(control, island), forces[island.tips])
+        for tables, inputs, island, free in zip(self._tables, self._inputs, self._islands, self._free, strict=True):
+            pushed = forces if whole else forces[island.tips]
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
             own, at = tables._replace(tip_force=pushed, loaded=loaded), self._places(island)
@@ -292,9 +296,3 @@ def _islands(wires: bytes, tables: Tables, control: Control) -> list[Island]:
     """Return the islands of a mechanism under its inputs, found anew only for another wiring."""
     arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
     return _ISLANDS.of((wires, control.kind, *map(len, arrays)), partial(find_islands, tables, control))
-
-
-def _groups_of(tables: Tables, island: Island) -> list[int]:
-    return [
-        g for g, (begin, end) in enumerate(tables.groups[:, :2]) if np.any((island.rows >= begin) & (island.rows < end))
-    ]
