@@ -78,7 +78,7 @@ class _Steps:
 
 def _simulator(rounds: int) -> dict[str, float]:
     """Return the times of a simulator on steps of 20 ms, s, and the error of its angles there, rad rms."""
-    sim = fp.Simulator("ub", _START, method="Rodas4", rtol=1e-2, atol_scale=1e-2)
+    sim = fp.Simulator("ub", _START, method="Rodas4", rtol=3e-2, atol_scale=3e-2)
     tension, period, many = np.array([1.0, 1.0, 4.4, 3.1]), 0.02, 64
     # Tensions that change at every step, as a policy's do.
     pulls = tension * np.random.default_rng(0).uniform(0.9, 1.1, (100, 4))
