@@ -112,7 +112,7 @@ def _linear(
         derivative = differentiate(motion, [each.parts[island] for each in steppers], knots, changes, allowed)
         if derivative is None:
             return []
-        return [NearbyMotion(motion, derivative, k, float(change)) for k, change in enumerate(changes)]
+        return [NearbyMotion(derivative, k, float(change)) for k, change in enumerate(changes)]
 
     by_island = in_threads(of, range(len(motions)))
     return [list(each) for each in zip(*by_island, strict=True)] if all(by_island) else []

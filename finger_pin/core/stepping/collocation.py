@@ -55,10 +55,11 @@ class Collocation(NamedTuple):
         before, between, after: Scratch, what changes its sign at each, shape (w,).
         derivative: S, changed in place, shape (p, n).
         rate: Memory, its rate, shape (p, n).
+        bend: Memory, the rate of that, as far as it is known, shape (p, n).
         largest: Memory, the largest S so far, shape (p, n).
         scale: Sizes of the states, shape (n,).
         allowed: How curved S may be in an interval, of its largest.
-        matrix, sweep, back: Of the method, as in `radau`; s nodes.
+        matrix, sweep, back, slope: Of the method, as in `radau`; s nodes.
         state: Scratch, shape (n,).
         right: Scratch, shape (n + 1,).
         part: Scratch, shape (n,).
@@ -89,12 +90,14 @@ class Collocation(NamedTuple):
     after: Vector
     derivative: Matrix
     rate: Matrix
+    bend: Matrix
     largest: Matrix
     scale: Vector
     allowed: float
     matrix: Matrix
     sweep: Matrix
     back: Vector
+    slope: Vector
     state: Vector
     right: Vector
     part: Vector
@@ -201,7 +204,7 @@ def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: 
 
 
 @compiled
-def _keep(col: Any, taken: int, end: float) -> None:
+def _keep(col: Any, taken: int, begin: float, end: float) -> None:
     """Take an interval that is solved."""
     nodes = col.nodes.size
     first, last = taken * (nodes + 1), nodes - 1
@@ -212,6 +215,10 @@ def _keep(col: Any, taken: int, end: float) -> None:
     copy(col.rates[last], col.rate)
     for k in range(col.largest.shape[0]):
         for c in range(col.largest.shape[1]):
+            value = 0.0
+            for a in range(nodes):
+                value += col.slope[a] * col.rates[a, k, c]
+            col.bend[k, c] = value / (end - begin)
             col.largest[k, c] = max(col.largest[k, c], abs(col.derivative[k, c]))
     col.ends[taken] = end
 
@@ -276,7 +283,7 @@ def collocate(address: int, _time: float) -> int:
         if bends == SINGULAR:
             return SINGULAR
         if end > begin + _NOTHING * max(1.0, abs(begin)):
-            _keep(col, taken, end)
+            _keep(col, taken, begin, end)
             taken += 1
         memory[TIME], anew = end, bends == 1
         if anew:
@@ -289,6 +296,8 @@ def collocate(address: int, _time: float) -> int:
             _turn(col, step)
             step += 1
             memory[SPLIT] = 0.0
+        if anew:
+            col.bend[:] = 0.0
         if anew and step <= last:
             memory[LENGTH] = b.ends[step] - begin_of(b, step)
         memory[STEP] = step

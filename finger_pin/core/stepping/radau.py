@@ -26,6 +26,8 @@ _POWERS = np.arange(1, _COUNT + 1)
 MATRIX = (NODES[:, None] ** _POWERS / _POWERS) @ np.linalg.inv(np.vander(NODES, increasing=True))
 #: What continues it to the begin.
 BACK = np.linalg.inv(np.vander(NODES, increasing=True))[0]
+#: What gives its slope at the end, by the share.
+SLOPE = np.arange(_COUNT) @ np.linalg.inv(np.vander(NODES, increasing=True))
 
 
 def _lower(matrix: Any) -> Any:
@@ -104,10 +106,14 @@ def sweep(col: Any, h: float) -> Any:
                     row[c] += weight * earlier[c]
             for c in range(size):
                 source[c], found[c] = g * row[c] + given[c], 0.0
-            for j in range(size):
-                factor, column = source[j], resolvent[j]
+            # Two columns at a time, so that what is found is read and written half as often.
+            for j in range(0, size - 1, 2):
+                one, two, first, second = source[j], source[j + 1], resolvent[j], resolvent[j + 1]
                 for c in range(size):
-                    found[c] += factor * column[c]
+                    found[c] += one * first[c] + two * second[c]
+            if size % 2 == 1:
+                for c in range(size):
+                    found[c] += source[size - 1] * resolvent[size - 1, c]
             for c in range(size):
                 rate[c] = g * (found[c] - row[c])
         if a == nodes - 1:
@@ -134,9 +140,12 @@ def distance(col: Any, one: Any, other: Any) -> Any:
 
 @compiled
 def relax(col: Any, h: float) -> None:
-    """Solve for S at the nodes, from its rate at the begin."""
+    """Solve for S at the nodes, from its rate at the begin and that rate's own."""
     for a in range(col.nodes.size):
-        copy(col.rate, col.rates[a])
+        ahead, rates = col.nodes[a] * h, col.rates[a]
+        for k in range(rates.shape[0]):
+            for c in range(rates.shape[1]):
+                rates[k, c] = col.rate[k, c] + ahead * col.bend[k, c]
     for _ in range(_MOST):
         if sweep(col, h) <= _CLOSE * col.allowed:
             break

@@ -23,7 +23,7 @@ from finger_pin.core.stepping.collocation import (
 from finger_pin.core.stepping.interpolation import Between
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part
-from finger_pin.core.stepping.radau import BACK, MATRIX, NODES, SWEEP
+from finger_pin.core.stepping.radau import BACK, MATRIX, NODES, SLOPE, SWEEP
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 from finger_pin.description.routing import Array
 
@@ -35,27 +35,28 @@ _BEFORE = 1.0 - 2.0**-53
 _POLYNOMIAL = np.linalg.inv(np.vander(np.array([0.0, *NODES]), increasing=True))
 
 
-@dataclass(frozen=True, eq=False)
 class Derivative:
-    """S of an island over time, by p numbers.
+    """The motion of an island, and S over time, by p numbers."""
 
-    Attributes:
-        ends: Ends of the intervals, shape (m,), s.
-        begins: Their begins, shape (m,), s.
-        solution: S at the begin and the nodes of each, shape (m, s + 1, p, n).
-    """
+    def __init__(self, motion: IslandMotion, ends: Array, solution: Array) -> None:
+        """Keep the ends of the intervals, shape (m,), s, and S at begin and nodes of each, shape (m, s + 1, p, n)."""
+        self._motion, self._ends, self._solution = motion, ends, solution
+        self._begins = np.concatenate([[motion.begin], ends[:-1]])
+        self._last: tuple[Array, tuple[Array, Array], NDArray[np.intp], Array] | None = None
 
-    ends: Array
-    begins: Array
-    solution: Array
+    def at(self, times: Array, k: int) -> tuple[Array, Array, Array]:
+        """Return states and quaternions at times, as the motion does, and S of a number there, shape (t, n).
 
-    def at(self, times: Array, k: int) -> Array:
-        """Return S of a number, shape (t, n)."""
-        place = np.clip(np.searchsorted(self.ends, times, side="right"), 0, len(self.ends) - 1)
-        share = (times - self.begins[place]) / (self.ends[place] - self.begins[place])
-        weights = np.vander(np.clip(share, 0.0, 1.0), len(_POLYNOMIAL), increasing=True) @ _POLYNOMIAL
-        found: Array = np.einsum("tj,tjn->tn", weights, self.solution[place, :, k])
-        return found
+        All numbers ask for the same times in turn: what they share of the latest is remembered.
+        """
+        last = self._last
+        if last is None or not np.array_equal(last[0], times):
+            place = np.clip(np.searchsorted(self._ends, times, side="right"), 0, len(self._ends) - 1)
+            share = (times - self._begins[place]) / (self._ends[place] - self._begins[place])
+            weights = np.vander(np.clip(share, 0.0, 1.0), len(_POLYNOMIAL), increasing=True) @ _POLYNOMIAL
+            self._last = last = times.copy(), self._motion.interpolate(times), place, weights
+        _, (states, attitudes), place, weights = last
+        return states, attitudes, np.einsum("tj,tjn->tn", weights, self._solution[place, :, k])
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,21 +64,19 @@ class NearbyMotion:
     """The motion of an island with one number changed.
 
     Attributes:
-        motion: The motion without.
-        derivative: S.
+        derivative: The motion without, and S.
         number: Which.
         change: By how much.
     """
 
-    motion: IslandMotion
     derivative: Derivative
     number: int
     change: float
 
     def interpolate(self, at: Array) -> tuple[Array, Array]:
         """Return states at times and the quaternions from which angles count, as the motion does."""
-        states, attitudes = self.motion.interpolate(at)
-        return states + self.change * self.derivative.at(np.asarray(at, dtype=float), self.number), attitudes
+        states, attitudes, derivatives = self.derivative.at(np.asarray(at, dtype=float), self.number)
+        return states + self.change * derivatives, attitudes
 
 
 def fits(motions: Sequence[IslandMotion], parts: Sequence[Part]) -> bool:
@@ -100,11 +99,7 @@ def differentiate(
         changes: By how much each number is changed, shape (p,).
         allowed: Relative error of the derivatives, roughly.
     """
-    begins, ends, solutions = (
-        [motion.begin],
-        [np.zeros(0)],
-        [np.zeros((0, len(NODES) + 1, len(parts) - 1, len(motion.start)))],
-    )
+    ends, solutions = [np.zeros(0)], [np.zeros((0, len(NODES) + 1, len(parts) - 1, len(motion.start)))]
     collocation = _collocation(motion, parts, knots, changes, allowed)
     while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
         ends.append(collocation.ends[:taken].copy())
@@ -112,8 +107,7 @@ def differentiate(
             collocation.solution[: (len(NODES) + 1) * taken].reshape(taken, *solutions[0].shape[1:]).copy()
         )
         if taken < _ROOM:
-            found = np.concatenate(ends)
-            return Derivative(found, np.concatenate([begins, found[:-1]]), np.concatenate(solutions))
+            return Derivative(motion, np.concatenate(ends), np.concatenate(solutions))
     return None
 
 
@@ -151,12 +145,14 @@ def _collocation(
         after=np.zeros(bends),
         derivative=_start(motion, others, changes, width),
         rate=np.zeros((count, size)),
+        bend=np.zeros((count, size)),
         largest=np.zeros((count, size)),
         scale=own.atol,
         allowed=allowed,
         matrix=MATRIX,
         sweep=SWEEP,
         back=BACK,
+        slope=SLOPE,
         state=np.zeros(size),
         right=np.zeros(size + 1),
         part=np.zeros(size),

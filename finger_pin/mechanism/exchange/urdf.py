@@ -102,8 +102,9 @@ def build_rigid_body(description: FingerDescription) -> RigidBody:
     hand, joints = description.hand, description.joints
     if hand is not None:
         return build_hand(hand)
-    links = (description.name, description.gravity, *joints, *(joint.link for joint in joints.values()))
-    return _BODIES.of(links, partial(_build, description))
+    # By value: numbers that change elsewhere make new descriptions of the same links.
+    links = [joint.link and tuple(getattr(joint.link, name) for name in Link.model_fields) for joint in joints.values()]
+    return _BODIES.of((description.name, description.gravity, *joints, *links), partial(_build, description))
 
 
 def _build(description: FingerDescription) -> RigidBody:
