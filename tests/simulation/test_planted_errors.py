@@ -99,7 +99,7 @@ def wrong_gravity(loop, monkeypatch):
 
     def flipped(*arguments):
         found = original(*arguments)
-        return replace(found, potential_energy=-found.potential_energy)
+        return found._replace(potential_energy=-found.potential_energy)
 
     monkeypatch.setattr(Finger, "motion", flipped)
 
