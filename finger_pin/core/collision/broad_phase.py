@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import RATE
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import compiled, compiled_within
 from finger_pin.core.path_tables import COLUMNS
 
 # A gap is known so well, m; and a contact is awake where so many steps as the last one might close it.
@@ -21,7 +21,7 @@ KNOWN, _AHEAD = 1e-9, 3.0
 _STRAIGHT = 1e-14
 
 
-@compiled
+@compiled_within
 def depart(tables: Any, own: Any) -> None:
     """Note the gaps of all contacts that are awake at the beginning of a step."""
     paths = tables.paths
@@ -40,7 +40,7 @@ def distance(paths: Any, e: int, own: Any) -> Any:
     return np.sqrt(total) + paths.cores[e]
 
 
-@compiled
+@compiled_within
 def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
     """Fill the Bernstein coefficients of the interpolant of a step, and the path of each of n coordinates."""
     last, control = k.shape[0] - 1, own.control
@@ -58,7 +58,7 @@ def trace(dense: Any, k: Any, x: Any, end: Any, size: int, own: Any) -> None:
             own.travel[j] += abs(control[j, i + 1] - control[j, i])
 
 
-@compiled
+@compiled_within
 def glide(x: Any, end: Any, size: int, own: Any) -> None:
     """Fill the same for a motion along a straight line."""
     for j in range(size):
@@ -120,7 +120,7 @@ def list_awake(tables: Any, own: Any) -> None:
     own.awake_count[0] = awake
 
 
-@compiled
+@compiled_within
 def wake(tables: Any, own: Any) -> None:
     """Wake the contacts that may close on the way that was traced; note the paths of all."""
     paths = tables.paths
@@ -134,7 +134,7 @@ def wake(tables: Any, own: Any) -> None:
                     set_asleep(k, 0, own.asleep)
 
 
-@compiled
+@compiled_within
 def arrive(tables: Any, own: Any) -> None:
     """Note the gaps of contacts that are awake at the end of a way that was traced."""
     paths = tables.paths
@@ -143,7 +143,7 @@ def arrive(tables: Any, own: Any) -> None:
             own.ahead[e], own.far[e] = own.out[e, 0] - KNOWN, distance(paths, e, own)
 
 
-@compiled
+@compiled_within
 def _straighten(tables: Any, rows: Any, k: int, states: Any) -> bool:
     """Return whether the bristles of an open contact are straight; the rest of their bend is then cleared."""
     for m in range(k + 1, k + 3):

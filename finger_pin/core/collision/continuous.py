@@ -16,7 +16,7 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import KNOWN, distance, path_of, set_asleep, trace, widened
 from finger_pin.core.evaluation.law_code import SIDE
-from finger_pin.core.jit import call_at, compiled
+from finger_pin.core.jit import call_at, compiled, compiled_within
 from finger_pin.core.path_tables import LOOKS
 from finger_pin.core.tables import END, FIRST, KINK
 
@@ -36,7 +36,7 @@ def _difference(own: Any, j: int, other: int, i: int) -> Any:
     return own.control[j, i] if other < 0 else own.control[j, i] - own.control[other, i]
 
 
-@compiled
+@compiled_within
 def _between(start: float, end: float, b: Any) -> Any:
     """Return the Bernstein coefficients of a part of a polynomial."""
     b0, b1, b2, b3, b4 = b
@@ -51,7 +51,7 @@ def _between(start: float, end: float, b: Any) -> Any:
     return b0, b1, b2, b3, b4
 
 
-@compiled
+@compiled_within
 def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     """Return bounds of the path between two moments, and of its distance from its chord, m."""
     paths, far = tables.paths, max(one[_FAR], two[_FAR])
@@ -91,7 +91,7 @@ def _bounds(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     return path, 1.5 * bends + 4.0 * turns * moves
 
 
-@compiled
+@compiled_within
 def _clear(tables: Any, own: Any, e: int, one: Any, two: Any) -> Any:
     """Return whether bodies that are apart at two moments, or inside each other, do not touch and part in between."""
     path, bend = _bounds(tables, own, e, one, two)
@@ -126,7 +126,7 @@ def _look(integration: Any, model: Any, e: int, share: float, seen: Any) -> None
         seen[_NORMAL + r] = own.out[e, 1 + r] if near else 0.0
 
 
-@compiled
+@compiled_within
 def _meeting(integration: Any, model: Any, e: int, one: Any, two: Any) -> Any:
     """Return the time just after bodies have met that are apart at one moment and not at another."""
     looks = model.work.paths.looks
@@ -170,7 +170,7 @@ def _scan(integration: Any, model: Any, e: int, seen: bool) -> float:
     return NOTHING if seen else met
 
 
-@compiled
+@compiled_within
 def _pressed(tables: Any, rows: Any, k: int) -> bool:
     """Return whether a contact presses, or would if it were not held open."""
     pressed = False
@@ -180,7 +180,7 @@ def _pressed(tables: Any, rows: Any, k: int) -> bool:
     return pressed
 
 
-@compiled
+@compiled_within
 def survey(integration: Any, model: Any) -> float:
     """Return the share of a step that was tried after which bodies touch, and part before its end; `NOTHING` for none.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import ROTATION
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import compiled, compiled_within
 from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
@@ -53,7 +53,7 @@ _place = inlined(place)
 place_bodies = inlined(place_all)
 
 
-@compiled
+@compiled_within
 def rechart(tables: Any, x: Any, attitude: Any, drift: Any) -> None:
     """Move the angles of all free bodies into their quaternions (x, y, z, w), and into the bodies' placements.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from finger_pin.core.control import Control
 from finger_pin.core.evaluation import law_code as at
-from finger_pin.core.jit import Indices, Vector, compiled
+from finger_pin.core.jit import Indices, Vector, compiled, compiled_within
 from finger_pin.core.stepping.islands import find_islands
 from finger_pin.core.tables import Tables
 
@@ -103,7 +103,7 @@ def extent(blocks: Any, b: int) -> Any:
     return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
 
 
-@compiled
+@compiled_within
 def _join(tables: Any, work: Any, blocks: Any) -> None:
     """Fill the block of every atom."""
     paths, label = tables.paths, blocks.label
@@ -131,7 +131,7 @@ def _join(tables: Any, work: Any, blocks: Any) -> None:
     blocks.number[0] = count
 
 
-@compiled
+@compiled_within
 def partition(tables: Any, work: Any, blocks: Any, gain: Any) -> None:
     """Find the blocks of a step, after the slopes of all laws; of contacts that have opened, clear the rows' gains."""
     paths = tables.paths

@@ -16,7 +16,7 @@ from typing import Any
 
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
-from finger_pin.core.jit import call_at, compiled, compiled_loosely
+from finger_pin.core.jit import call_at, compiled, compiled_loosely, compiled_within
 
 
 @compiled
@@ -30,7 +30,7 @@ def _terms(tables: Any, begin: int, end: int, slope: float, gain: Any, wide: int
             out[c] += weight * source[c]
 
 
-@compiled
+@compiled_within
 def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) -> None:
     """Fill A^T d phi of a block by forces other than its rows': inertial forces, those at tips, and contacts."""
     tables, work, linear, force = model.tables, model.work, model.linear, model.linear.force
@@ -49,7 +49,7 @@ def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) 
         call_at(model.touch, address, g)
 
 
-@compiled
+@compiled_within
 def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) -> None:
     """Fill the change of a row's load."""
     tables, linear, load = model.tables, model.linear, model.linear.load
@@ -62,7 +62,7 @@ def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) 
             call_at(model.press, address, float(k))
 
 
-@compiled
+@compiled_within
 def _command(model: Any, k: int, places: Any, width: int, wide: int) -> None:
     """Fill the change of a row's input."""
     tables, control, linear, command = model.tables, model.control, model.linear, model.linear.command
@@ -148,7 +148,7 @@ def _gains(model: Any, address: int, g: float, b: int, width: int, wide: int) ->
                 target[c] += arm * row[c]
 
 
-@compiled
+@compiled_within
 def factorise(matrix: Any, size: int, pivots: Any) -> bool:
     """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
     for c in range(size):
@@ -170,7 +170,7 @@ def factorise(matrix: Any, size: int, pivots: Any) -> bool:
     return True
 
 
-@compiled
+@compiled_within
 def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> None:
     """Replace right-hand sides, one a column, by solutions."""
     for r in range(size):

@@ -7,11 +7,11 @@ from typing import Any
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.paths import passes, push
-from finger_pin.core.jit import call_value, compiled
+from finger_pin.core.jit import call_value, compiled, compiled_within
 from finger_pin.core.tables import END, FIRST
 
 
-@compiled
+@compiled_within
 def exert_contacts(tables: Any, v: Any, z: Any, work: Any) -> None:
     """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
     rows, paths = work.rows, work.paths
@@ -52,7 +52,7 @@ def _add_inputs(tables: Any, k: int, weights: Any, linear: Any, width: int, out:
             out[width + j] += by_speed * linear.arm[e]
 
 
-@compiled
+@compiled_within
 def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width: int, wide: int) -> None:
     """Fill the gains of the three rows of a contact and of its two states, in the columns of its block."""
     slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
@@ -89,7 +89,7 @@ def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width:
                     target[column] += arm * row[column]
 
 
-@compiled
+@compiled_within
 def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
     """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
     blocks = linear.blocks
@@ -99,7 +99,7 @@ def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
         _contact_gains(tables, g, blocks.touches[index], work, linear, width, wide)
 
 
-@compiled
+@compiled_within
 def add_pushes(tables: Any, work: Any, k: int, linear: Any) -> None:
     """Add to the change of a pin's load that of the forces of the closed contacts of its block."""
     paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load

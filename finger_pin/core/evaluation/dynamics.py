@@ -11,11 +11,11 @@ from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGT
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import call_at, call_value, compiled
+from finger_pin.core.jit import call_at, call_value, compiled, compiled_within
 from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
 
-@compiled
+@compiled_within
 def _tips(tables: Any, work: Any) -> None:
     """Fill positions and Jacobians of the tips, and J^T F, after `move`."""
     size = tables.parents.size
@@ -40,7 +40,7 @@ def _tips(tables: Any, work: Any) -> None:
             j = tables.parents[j]
 
 
-@compiled
+@compiled_within
 def _pin_load(tables: Any, k: int, load: float, work: Any) -> Any:
     """Return |-e S + F| of (17) for row k, and keep the vector and e."""
     body = tables.pins[k]
@@ -72,7 +72,7 @@ def _sum_of_terms(tables: Any, begin: int, end: int, work: Any) -> Any:
     return total
 
 
-@compiled
+@compiled_within
 def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
     """Fill the arguments of all rows' laws but contacts': positions, velocities, states and inputs from outside.
 
@@ -96,7 +96,7 @@ def _see(tables: Any, q: Any, v: Any, z: Any, work: Any) -> None:
         rows[COMMAND, k] = work.command[tables.channel[k]] if tables.channel[k] >= 0 else 0.0
 
 
-@compiled
+@compiled_within
 def _act(tables: Any, work: Any) -> None:
     """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
     rows = work.rows
@@ -118,7 +118,7 @@ def _act(tables: Any, work: Any) -> None:
         call_value(tables.laws[g, 0], rows, tables.parameters, begin, end)
 
 
-@compiled
+@compiled_within
 def _drive(tables: Any, work: Any, rate: Any) -> None:
     """Add to A^T phi, and fill the rates of the rows' states, after `_act`."""
     rows, torque = work.rows, work.torque
@@ -149,7 +149,7 @@ def exert(model: Any, address: int, time: float) -> None:
     _drive(tables, work, model.rate[2 * width :])
 
 
-@compiled
+@compiled_within
 def evaluate(model: Any, address: int, time: float) -> None:
     """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
     tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate

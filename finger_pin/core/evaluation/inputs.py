@@ -10,7 +10,7 @@ from finger_pin.core.control import HELD, SCHEDULED
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
 from finger_pin.core.evaluation.trigonometry import sine_cosine
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import compiled, compiled_within
 from finger_pin.laws import controller as controller_laws
 from finger_pin.laws import palm as palm_laws
 
@@ -71,7 +71,7 @@ def inputs(control: Any, time: float, position: Any, velocity: Any, out: Any) ->
             out[control.channel[i]] = planned[i]
 
 
-@compiled
+@compiled_within
 def input_slopes(control: Any, time: float) -> None:
     """Fill du/dq, du/dv and du/dt after `inputs`, for the active minimum of (22)."""
     by_position, by_time = control.by_position, control.by_time
@@ -121,7 +121,7 @@ def _coordinates(signal: Any, time: float, order: int) -> Any:
     )
 
 
-@compiled
+@compiled_within
 def move_base(control: Any, time: float, tables: Any, work: Any) -> None:
     """Fill velocity and acceleration of a moving base, and their rates."""
     if control.palm.harmonics.shape[0] == 0:

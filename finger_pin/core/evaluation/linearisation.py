@@ -13,7 +13,7 @@ from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import Indices, Matrix, Vector, call_at, call_filling, compiled
+from finger_pin.core.jit import Indices, Matrix, Vector, call_at, call_filling, compiled, compiled_within
 from finger_pin.core.tables import END, FIRST, Tables
 
 
@@ -115,7 +115,7 @@ def take_numbers(linear: Linear, tables: Tables) -> None:
     linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend
 
 
-@compiled
+@compiled_within
 def _turning_tips(tables: Any, work: Any, linear: Any) -> None:
     """Subtract d(J^T F)/dq from by_position: a column turns with the joints below it and moves with the tip."""
     axes = work.spatial[AXIS]
@@ -136,7 +136,7 @@ def _turning_tips(tables: Any, work: Any, linear: Any) -> None:
             i = tables.parents[i]
 
 
-@compiled
+@compiled_within
 def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
     """Fill the derivatives of all loads by the sum of earlier forces, and by the posture that turns the pins' links."""
     axes = work.spatial[AXIS]

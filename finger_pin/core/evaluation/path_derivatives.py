@@ -11,11 +11,11 @@ from finger_pin.core.evaluation.law_code import FORCE, LOAD
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
 from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
-from finger_pin.core.jit import call_shape, compiled
+from finger_pin.core.jit import call_shape, compiled, compiled_within
 from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
-@compiled
+@compiled_within
 def _seen_from(axis: Any, rotation: Any, point: Any, weight: float, out: Any) -> None:
     """Fill a frame's view of a point's velocity, for a unit rate of a coordinate."""
     x = weight * (axis[3] + axis[1] * point[2] - axis[2] * point[1])
@@ -79,7 +79,7 @@ def _slopes_of_piece(paths: Any, e: int, work: Any) -> None:
                     add_force_cross(axis, wrench[6 * p : 6 * p + 6], out[6 * p : 6 * p + 6])
 
 
-@compiled
+@compiled_within
 def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
     paths, own = tables.paths, work.paths
@@ -109,7 +109,7 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
         gather[j] = 0.0
 
 
-@compiled
+@compiled_within
 def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
     """Add to a pin's load the change from contacts that turn with the posture at constant forces."""
     paths, own = tables.paths, work.paths
@@ -126,7 +126,7 @@ def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
                     by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
 
 
-@compiled
+@compiled_within
 def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
     """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
     paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.touching

@@ -9,7 +9,7 @@ import numpy as np
 from finger_pin.core.evaluation.law_code import FORCE, SIDE
 from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import dot
-from finger_pin.core.jit import call_shape, compiled
+from finger_pin.core.jit import call_shape, compiled, compiled_within
 from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
@@ -21,7 +21,7 @@ def add_moment(point: Any, force: Any, out: Any) -> None:
     out[2] += point[0] * force[1] - point[1] * force[0]
 
 
-@compiled
+@compiled_within
 def _frame(paths: Any, e: int, work: Any) -> None:
     """Place a piece's frame, its points, and its points as the frame sees them."""
     own = work.paths
@@ -123,7 +123,7 @@ def angle_between(first: Any, second: Any) -> Any:
     return cosine, np.sqrt(x * x + y * y + z * z)
 
 
-@compiled
+@compiled_within
 def measure_paths(tables: Any, work: Any) -> None:
     """Fill lengths, turns and arms of all rows with paths, after `move`; of contacts, which come first, if awake."""
     paths, own, first = tables.paths, work.paths, tables.touching
@@ -174,7 +174,7 @@ def measure_paths(tables: Any, work: Any) -> None:
         own.length[k], own.turn[k] = length, turn
 
 
-@compiled
+@compiled_within
 def push(tables: Any, work: Any) -> None:
     """Fill the forces of all contacts, after their law."""
     paths, own = tables.paths, work.paths

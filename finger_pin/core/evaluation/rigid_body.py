@@ -15,7 +15,7 @@ import numpy as np
 
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
 from finger_pin.core.evaluation.trigonometry import sine_cosine
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import compiled, compiled_within
 
 # Columns of the table of bodies.
 ROTATION, TRANSLATION, MASS, CENTRE, INERTIA, ARMATURE, BODY_COLUMNS = 0, 9, 12, 13, 16, 22, 23
@@ -25,7 +25,7 @@ AXIS, AXIS_RATE, AXIS_CURVE, MOTION, SPATIAL_ACCELERATION, FORCE, MOMENTUM, SPAT
 MASS_MATRIX, CHOLESKY, BY_POSITION, BY_VELOCITY, SQUARE_LAYERS = range(5)
 
 
-@compiled
+@compiled_within
 def _place(tables: Any, i: int, angle: float, work: Any) -> None:
     """Place body i: rotation, origin and joint axis in the base frame."""
     body, parent, rotation, origin = tables.bodies[i], tables.parents[i], work.rotation[i], work.origin[i]
@@ -54,7 +54,7 @@ def _massless(tables: Any, i: int) -> Any:
     return body[MASS] == 0.0 and body[INERTIA] == 0.0 and body[INERTIA + 3] == 0.0 and body[INERTIA + 5] == 0.0
 
 
-@compiled
+@compiled_within
 def _inertia_about_origin(tables: Any, i: int, work: Any) -> None:
     """Express the inertia of body i about O in base axes."""
     body, rotation, origin, out = tables.bodies[i], work.rotation[i], work.origin[i], work.inertia[i]
@@ -140,7 +140,7 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
                 work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
 
 
-@compiled
+@compiled_within
 def base_power(tables: Any, velocity: Any, work: Any) -> Any:
     """Return the power that a moving base supplies, W, after an evaluation: its velocity times its wrench."""
     inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
@@ -151,7 +151,7 @@ def base_power(tables: Any, velocity: Any, work: Any) -> Any:
     return power
 
 
-@compiled
+@compiled_within
 def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
     """Fill the time derivative of inverse dynamics at a given motion on a moving base, shape (n,).
 
@@ -178,7 +178,7 @@ def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
                 work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
 
 
-@compiled
+@compiled_within
 def mass_matrix(tables: Any, work: Any) -> None:
     """Fill work.square[MASS_MATRIX] = M after `move`; entries between trees are zero from the start."""
     size = tables.parents.size
@@ -194,7 +194,7 @@ def mass_matrix(tables: Any, work: Any) -> None:
         work.square[MASS_MATRIX, i, i] += tables.bodies[i, ARMATURE]
 
 
-@compiled
+@compiled_within
 def factorise_mass(tables: Any, size: int, work: Any) -> None:
     """Fill work.square[CHOLESKY] with the Cholesky factor of M, whose diagonal is inverted, tree by tree."""
     factor = work.square[CHOLESKY]
@@ -206,7 +206,7 @@ def factorise_mass(tables: Any, size: int, work: Any) -> None:
             factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
 
 
-@compiled
+@compiled_within
 def solve_mass(tables: Any, size: int, work: Any, vector: Any) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
     factor = work.square[CHOLESKY]

@@ -20,10 +20,10 @@ from finger_pin.core.evaluation.rigid_body import (
     SPATIAL_ACCELERATION,
 )
 from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import compiled, compiled_within
 
 
-@compiled
+@compiled_within
 def _coriolis_block(inertia: Any, motion: Any, out: Any) -> None:
     """Fill the upper left block of the body's Coriolis matrix, and its linear momentum in out[9:12].
 

@@ -11,7 +11,19 @@ from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.law_code import FORCE
 from finger_pin.core.evaluation.paths import turn_out
 from finger_pin.core.evaluation.rigid_body import ARMATURE, MOTION, move
-from finger_pin.core.jit import Kind, Layers, Matrix, Unit, Vector, bound_at, call_at, call_filling, compiled
+from finger_pin.core.jit import (
+    Kind,
+    Layers,
+    Matrix,
+    Unit,
+    Vector,
+    bound_at,
+    call_at,
+    call_filling,
+    compiled,
+    compiled_within,
+    copy,
+)
 from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FIRST
 
@@ -144,7 +156,7 @@ def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
         before[c] = state[c]
 
 
-@compiled
+@compiled_within
 def _touch(paths: Any, work: Any, out: Any) -> None:
     """Fill the forces of contacts on the second body, the points, and the normals; zero for open ones."""
     own = work.paths
@@ -163,7 +175,7 @@ def _touch(paths: Any, work: Any, out: Any) -> None:
                 touch[r] -= work.rows[FORCE, k + i] * own.wrench[e, i, 3 + r]
 
 
-@compiled
+@compiled_within
 def _set(many: Any, model: Any, m: int) -> None:
     """Set inputs, forces at the tips and state to the m-th."""
     for i in range(many.commands.shape[1]):
@@ -175,13 +187,13 @@ def _set(many: Any, model: Any, m: int) -> None:
         model.state[c] = many.states[m, c]
 
 
-@compiled
+@compiled_within
 def _evaluate(many: Any, model: Any, m: int) -> None:
     """Evaluate the state that is set."""
     if many.rates.shape[0] > 0 or many.bases.shape[0] > 0:
         call_at(model.evaluate, many.model, 0.0)
     else:
-        model.work.command[:] = many.commands[m]
+        copy(many.commands[m], model.work.command)
         exert_alone(model, many.model, 0.0)
 
 
@@ -195,7 +207,7 @@ def exert_alone(model: Any, address: int, time: float) -> None:
     call_at(model.exert, address, time)
 
 
-@compiled
+@compiled_within
 def _keep(many: Any, model: Any, m: int) -> None:
     """Fill the m-th place with the latest evaluation."""
     tables, work, rates, rows = model.tables, model.work, many.rates, many.rows

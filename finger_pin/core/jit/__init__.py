@@ -5,8 +5,8 @@
 the core sees the names below.
 """
 
-from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, numbers, put
-from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely
+from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, copy, copy_matrix, numbers, put
+from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely, compiled_within
 from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
 from finger_pin.core.jit.tables import alike, bound, bound_at, call, copied, fits, indices, numbered, refill, taken
 
@@ -30,7 +30,10 @@ __all__ = [
     "call_value",
     "compiled",
     "compiled_loosely",
+    "compiled_within",
     "copied",
+    "copy",
+    "copy_matrix",
     "fits",
     "indices",
     "numbered",

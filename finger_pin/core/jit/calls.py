@@ -84,3 +84,18 @@ def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(table, types.int64, types.int64, values), generate
+
+
+@compiled
+def copy(source: Any, target: Any) -> None:
+    """Copy a vector; an assignment to a slice would take a second more to compile, for its error's text."""
+    for index in range(source.size):
+        target[index] = source[index]
+
+
+@compiled
+def copy_matrix(source: Any, target: Any) -> None:
+    """Copy a matrix, as `copy` does."""
+    for r in range(source.shape[0]):
+        for c in range(source.shape[1]):
+            target[r, c] = source[r, c]

@@ -38,8 +38,17 @@ _INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, **INTERNA
 
 
 def compiled(function: _Function) -> _Function:
-    """Return the function compiled, to be inlined into compiled code."""
+    """Return the function compiled once, to be inlined by the optimiser at each of the places that call it."""
     return numba.njit(**_INLINED)(function)  # type: ignore[no-any-return]
+
+
+def compiled_within(function: _Function) -> _Function:
+    """Return the function, to be compiled with its caller: for what is called at one place, else it is compiled twice.
+
+    Numba optimises each function that is `compiled` with all that it calls, and makes machine code of it, though only
+    what calls it is ever run: of a chain of calls, the last function would be optimised as often as the chain is long.
+    """
+    return numba.njit(inline="always", **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
 def compiled_loosely(function: _Function) -> _Function:

@@ -10,7 +10,7 @@ from finger_pin.core.collision.broad_phase import list_awake, settle
 from finger_pin.core.collision.continuous import NOTHING, UNSEEN
 from finger_pin.core.control import HELD
 from finger_pin.core.evaluation.attitude_charts import rechart
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within, copy_matrix
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.error_norm import step_error, worst
@@ -19,7 +19,7 @@ from finger_pin.core.stepping.rosenbrock import try_step
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
 
-@compiled
+@compiled_within
 def _begin(integration: Any, model: Any, end: float) -> None:
     """Make ready to advance to a time, with all contacts awake that may be."""
     memory, control = integration.memory, model.control
@@ -35,7 +35,7 @@ def _begin(integration: Any, model: Any, end: float) -> None:
         memory[at.GOAL], memory[at.WINDOW_END] = end, 0.0
 
 
-@compiled
+@compiled_within
 def _hopeless(integration: Any, width: int) -> int:
     """Return `RUNAWAY` or `CREEPING` if there is no sense in another try, else `DONE`."""
     memory, x = integration.memory, integration.x
@@ -87,7 +87,7 @@ def _fitting(integration: Any, error: float) -> Any:
     return min(_GROW, max(_SHRINK, _SAFETY * max(error, 1e-10) ** (-1.0 / integration.tableau.order)))
 
 
-@compiled
+@compiled_within
 def _growth(integration: Any, h: float, error: float, clipped: bool) -> Any:
     """Return the factor by which the step after one that is taken may be longer."""
     memory, factor = integration.memory, _fitting(integration, error)
@@ -107,7 +107,7 @@ def _shorten(integration: Any, h: float, whole: float) -> None:
     memory[at.CULPRIT], memory[at.STEP], memory[at.WHOLE] = -1.0, h, whole
 
 
-@compiled
+@compiled_within
 def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) -> None:
     """Count a step that is taken, and set the length of the next."""
     memory = integration.memory
@@ -125,7 +125,7 @@ def _pace(integration: Any, h: float, error: float, final: bool, clipped: bool) 
     memory[at.CULPRIT], memory[at.WHOLE] = max(memory[at.CULPRIT], 0.0), 0.0
 
 
-@compiled
+@compiled_within
 def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
     """Go to the end of a step, and keep it, if there is a record."""
     x, attitude, tables, taken = integration.x, integration.attitude, model.tables, stretch.taken[0]
@@ -138,7 +138,7 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
     integration.memory[at.TIME] = time
     if taken < stretch.times.size:
         stretch.times[taken] = time
-        stretch.dense[taken] = integration.dense
+        copy_matrix(integration.dense, stretch.dense[taken])
         for c in range(x.size):
             stretch.states[taken, c] = x[c]
     rechart(tables, x, attitude, integration.drift)
@@ -149,7 +149,7 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
         stretch.taken[0] += 1
 
 
-@compiled
+@compiled_within
 def _still(integration: Any, model: Any, first: int) -> None:
     """Clear the rates and errors of the states of contacts that sleep, which are zero and stay so."""
     tables = model.tables

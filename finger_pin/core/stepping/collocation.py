@@ -16,12 +16,23 @@ from typing import Any, NamedTuple
 
 from finger_pin.core.collision.broad_phase import list_awake
 from finger_pin.core.evaluation.attitude_charts import place_bodies, turn_small
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled
+from finger_pin.core.jit import (
+    Indices,
+    Kind,
+    Layers,
+    Matrix,
+    Unit,
+    Vector,
+    bound_at,
+    compiled,
+    compiled_within,
+    copy_matrix,
+)
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.interpolation import Between, begin_of
 from finger_pin.core.stepping.kink_sides import release
-from finger_pin.core.stepping.radau import copy, curvature, node, relax
+from finger_pin.core.stepping.radau import curvature, node, relax
 
 # Entries of the memory.
 STEP, TIME, SPLIT, LENGTH, MEMORY_SIZE = range(5)
@@ -115,7 +126,7 @@ class Collocation(NamedTuple):
 COLLOCATION = Kind(Collocation)
 
 
-@compiled
+@compiled_within
 def _place(col: Any, step: int) -> None:
     """Place free bodies of all models by their attitudes at the begin of a step."""
     b = col.motion
@@ -139,7 +150,7 @@ def _awake(address: int) -> None:
     list_awake(model.tables, paths)
 
 
-@compiled
+@compiled_within
 def _jump(col: Any, model: Any, step: int, corner: int) -> None:
     """Add to S the effect of a later jump of the inputs: (f before - f after) dt/dp."""
     moves = False
@@ -158,7 +169,7 @@ def _jump(col: Any, model: Any, step: int, corner: int) -> None:
             col.derivative[k, c] += (col.part[c] - model.rate[c]) * col.shifts[corner, k]
 
 
-@compiled
+@compiled_within
 def _turn(col: Any, step: int) -> None:
     """Let the angles of free bodies begin anew in S too, after a step."""
     b = col.motion
@@ -174,7 +185,7 @@ def _turn(col: Any, step: int) -> None:
                 col.derivative[k, i + r], col.derivative[k, b.width + i + r] = angles[r], rates[r]
 
 
-@compiled
+@compiled_within
 def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: bool) -> Any:
     """Solve for S at the nodes between two times, of which the first is in a step.
 
@@ -203,16 +214,16 @@ def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: 
     return 0.0
 
 
-@compiled
+@compiled_within
 def _keep(col: Any, taken: int, begin: float, end: float) -> None:
     """Take an interval that is solved."""
     nodes = col.nodes.size
     first, last = taken * (nodes + 1), nodes - 1
-    copy(col.derivative, col.solution[first])
+    copy_matrix(col.derivative, col.solution[first])
     for a in range(nodes):
-        copy(col.nodal[a], col.solution[first + 1 + a])
-    copy(col.nodal[last], col.derivative)
-    copy(col.rates[last], col.rate)
+        copy_matrix(col.nodal[a], col.solution[first + 1 + a])
+    copy_matrix(col.nodal[last], col.derivative)
+    copy_matrix(col.rates[last], col.rate)
     for k in range(col.largest.shape[0]):
         for c in range(col.largest.shape[1]):
             value = 0.0
@@ -223,7 +234,7 @@ def _keep(col: Any, taken: int, begin: float, end: float) -> None:
     col.ends[taken] = end
 
 
-@compiled
+@compiled_within
 def _latest(col: Any, step: int) -> Any:
     """Return the latest end of the interval that begins in a step: a knot of the inputs, or a restart of the angles."""
     b, close = col.motion, col.motion.charts.size > 0 or col.memory[SPLIT] >= _SPLITS
@@ -232,7 +243,7 @@ def _latest(col: Any, step: int) -> Any:
     return b.ends[step]
 
 
-@compiled
+@compiled_within
 def _solved(col: Any, model: Any, step: int, begin: float) -> Any:
     """Solve over an interval from a time in a step, as long as S is smooth enough.
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.jit import Indices, Kind, Matrix, Unit, Vector, bound_at, call_at, compiled
+from finger_pin.core.jit import Indices, Kind, Matrix, Unit, Vector, bound_at, call_at, compiled_within
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.rosenbrock import DONE, FULL, INTEGRATION, STRETCH, TIME
 
@@ -60,7 +60,7 @@ class Driven(NamedTuple):
 DRIVEN = Kind(Driven)
 
 
-@compiled
+@compiled_within
 def _sample(drives: Any, x: Any, tension: Any) -> None:
     """Take a sample of all motors, and set their voltages."""
     last = drives.goals.shape[0] - 1

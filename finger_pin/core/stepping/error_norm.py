@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.jit import compiled
+from finger_pin.core.jit import compiled, compiled_within
 
 
 @compiled
@@ -24,7 +24,7 @@ def step_error(x: Any, end: Any, difference: Any, rtol: float, atol: Any) -> Any
     return np.sqrt(total / x.size)
 
 
-@compiled
+@compiled_within
 def worst(x: Any, difference: Any, rtol: float, atol: Any) -> Any:
     """Return the index of the first state whose error is no number, else of that with the largest error.
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import between
@@ -61,7 +61,7 @@ def judge_step(address: int, h: float) -> int:
     return 1
 
 
-@compiled
+@compiled_within
 def carry(
     linear: Any, h: float, gamma: float, drift: Any, difference: Any, behind: float, turned: bool, r: Any, u: Any
 ) -> Any:
@@ -97,7 +97,7 @@ def carry(
     return behind + h - time
 
 
-@compiled
+@compiled_within
 def defect(integration: Any, model: Any, time: float, h: float, share: float) -> None:
     """Replace the difference of the two methods in the last stage by the integrated defect of the rates along a step.
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import SIDE
-from finger_pin.core.jit import bound_at, call_at, compiled
+from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import begin_step, within
 
@@ -84,7 +84,7 @@ def hold_all(col: Any) -> None:
             _hold(col, col.changed[k])
 
 
-@compiled
+@compiled_within
 def last_before(col: Any, model: Any, step: int, begin: float, end: float) -> Any:
     """Return a time just before the first change of sign between two times; ``after`` is just behind it."""
     first, low, high = begin, begin, end
@@ -109,7 +109,7 @@ def last_before(col: Any, model: Any, step: int, begin: float, end: float) -> An
     return low
 
 
-@compiled
+@compiled_within
 def cross(col: Any) -> None:
     """Go over to the other side of every bend that is behind, by ``after``."""
     for w in range(col.sides.size):

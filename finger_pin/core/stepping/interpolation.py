@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled, compiled_within
 
 
 class Between(NamedTuple):
@@ -109,7 +109,7 @@ def between(before: Any, after: Any, dense: Any, share: float, out: Any) -> None
         out[c] = rest * before[c] + share * (after[c] + rest * out[c])
 
 
-@compiled
+@compiled_within
 def interpolant(tableau: Any, k: Any, dense: Any) -> None:
     """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
     for row in range(dense.shape[0]):
@@ -137,7 +137,7 @@ def cut(before: Any, after: Any, dense: Any, share: float) -> None:
         after[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
 
 
-@compiled
+@compiled_within
 def begin_anew(charts: Any, width: int, x: Any) -> None:
     """Let the angles of free bodies begin anew, as `rechart` does: their rates become the angular velocity."""
     for f in range(charts.size):

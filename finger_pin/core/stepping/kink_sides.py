@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import SIDE, SPEED
-from finger_pin.core.jit import call_at, compiled
+from finger_pin.core.jit import call_at, compiled, compiled_within, copy
 from finger_pin.core.stepping.error_norm import step_error
 from finger_pin.core.stepping.interpolation import between, cut
 from finger_pin.core.tables import END, FIRST, KINK
@@ -31,7 +31,7 @@ def release(tables: Any, rows: Any) -> None:
                 rows[SIDE, k] = 0.0
 
 
-@compiled
+@compiled_within
 def hold(tables: Any, rows: Any, kinks: Any) -> None:
     """Hold all rows on the present side of their kink."""
     for g in range(tables.groups.shape[0]):
@@ -92,7 +92,7 @@ def price(integration: Any, model: Any, time: float, h: float) -> Any:
     return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
 
 
-@compiled
+@compiled_within
 def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) -> Any:
     """Return the greatest length of the step after a kink, s.
 
@@ -107,25 +107,25 @@ def past_kink(h: float, share: float, cost: float, rtol: float, tableau: Any) ->
     return h * radians * np.sqrt((1.0 - share) / max(rtol * cost, 1e-300))
 
 
-@compiled
+@compiled_within
 def passed(integration: Any, model: Any, time: float, h: float) -> Any:
     """Return the share of a step after which a row has left its side in the middle, if that costs too much; else 1.
 
     A row that is back at the end would not be seen there.
     """
     x, state, end = integration.x, model.state, integration.end
-    end[:] = state
+    copy(state, end)
     between(x, end, integration.dense, 0.5, state)
     call_at(model.evaluate, integration.model, time + 0.5 * h)
     share = strayed(model.tables, model.work.rows, integration.kinks)
     if share < 1.0 and price(integration, model, time + 0.5 * h, h) <= 1.0:
         share = 1.0
-    state[:] = end
+    copy(end, state)
     call_at(model.evaluate, integration.model, time + h)
     return share if share == 1.0 else 0.5 * share
 
 
-@compiled
+@compiled_within
 def crossing(integration: Any, model: Any, time: float, h: float, share: float, cost: float) -> Any:
     """Let a step end a little behind the first row's leaving its side, at the interpolant's state.
 
@@ -142,7 +142,7 @@ def crossing(integration: Any, model: Any, time: float, h: float, share: float, 
         cost; and the number of evaluations.
     """
     x, state, end, count = integration.x, model.state, integration.end, 0
-    end[:] = state
+    copy(state, end)
     low, behind = 0.0, min(_BEHIND * share, _WANTED * (1.0 - share) / cost)
     at = share + behind
     for _ in range(_TRIALS):
@@ -154,13 +154,13 @@ def crossing(integration: Any, model: Any, time: float, h: float, share: float, 
             count += 2
             cost = price(integration, model, time + at * h, at * h)
             if cost <= 1.0:
-                state[:] = end
+                copy(end, state)
                 cut(x, state, integration.dense, at)
                 return at, share, cost, count
             behind = min(behind, _WANTED * (1.0 - share) * at / cost)
         else:
             low = at
         at = min(max(low, share * at) + behind, 1.0)
-    state[:] = end
+    copy(end, state)
     call_at(model.evaluate, integration.model, time + h)
     return 1.0, share, cost, count + 1

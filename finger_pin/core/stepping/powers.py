@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
 from finger_pin.core.evaluation.signals import book, book_moved, exert_alone, let_sleep, rouse, wake_since
-from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call_at, compiled
+from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call_at, compiled, compiled_within
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import Between, step_at, within
 
@@ -37,7 +37,7 @@ def _attitude(b: Any, step: int) -> Any:
     return b.attitude if step == 0 else b.attitudes[step - 1]
 
 
-@compiled
+@compiled_within
 def _keep(tables: Any, work: Any, state: Any, booked: Any, out: Any) -> None:
     """Fill the powers of the rows, which are booked last, and that of the forces at the tips."""
     count, width = out.size - 1, work.torque.size

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import Legendre
 
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import bound_at, call_at, compiled
+from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within, copy_matrix
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import rate_at
 
@@ -46,15 +46,7 @@ _UNFELT = 1e-4
 _CLOSE, _MOST = 0.02, 12
 
 
-@compiled
-def copy(source: Any, target: Any) -> None:
-    """Copy a matrix."""
-    for r in range(source.shape[0]):
-        for c in range(source.shape[1]):
-            target[r, c] = source[r, c]
-
-
-@compiled
+@compiled_within
 def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
     count, size = col.derivative.shape
@@ -82,7 +74,7 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     return True
 
 
-@compiled
+@compiled_within
 def sweep(col: Any, h: float) -> Any:
     """Improve S and its rates at all nodes in turn; return the correction of S at the last one."""
     count, size = col.derivative.shape
@@ -118,7 +110,7 @@ def sweep(col: Any, h: float) -> Any:
                 rate[c] = g * (found[c] - row[c])
         if a == nodes - 1:
             off = distance(col, col.found, col.nodal[a])
-        copy(col.found, col.nodal[a])
+        copy_matrix(col.found, col.nodal[a])
     return off
 
 
@@ -138,7 +130,7 @@ def distance(col: Any, one: Any, other: Any) -> Any:
     return np.sqrt(most / size)
 
 
-@compiled
+@compiled_within
 def relax(col: Any, h: float) -> None:
     """Solve for S at the nodes, from its rate at the begin and that rate's own."""
     for a in range(col.nodes.size):
@@ -151,7 +143,7 @@ def relax(col: Any, h: float) -> None:
             break
 
 
-@compiled
+@compiled_within
 def curvature(col: Any) -> Any:
     """Return the distance of S at the begin from the polynomial through the nodes alone."""
     for k in range(col.found.shape[0]):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED
-from finger_pin.core.jit import call_value, compiled
+from finger_pin.core.jit import call_value, compiled, compiled_within
 from finger_pin.core.tables import END, FIRST, KINK
 
 # A step is taken as a whole if what is misled in it is so much of the tolerance at most. One that is cut ends a little
@@ -46,7 +46,7 @@ def before_reversal(integration: Any, model: Any, h: float) -> Any:
     return share
 
 
-@compiled
+@compiled_within
 def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
     """Return the error of bristles misled in a share of a step, in tolerances, and the share at which that begins."""
     tables, rows, off, total, first = model.tables, model.work.rows, integration.end, 0.0, 1.0
@@ -67,7 +67,7 @@ def _misled(integration: Any, model: Any, h: float, share: float) -> Any:
     return np.sqrt(total / size), first
 
 
-@compiled
+@compiled_within
 def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
     """Return the mean speed of a row against its side in a share of a step, the fastest, and the share at its begin."""
     tables, dense, side = model.tables, integration.dense, model.work.rows[SIDE, k]
@@ -96,7 +96,7 @@ def _way_back(integration: Any, model: Any, k: int, share: float) -> Any:
     return way / _LOOKS, side * fastest, turned
 
 
-@compiled
+@compiled_within
 def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
     """Return the rate of a row's state at a speed, held on the other side, less that on this side."""
     side, own, more = rows[SIDE, k], rows[SPEED, k], 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from finger_pin.core.collision.broad_phase import depart
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Vector, call_at, compiled
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Vector, call_at, compiled_within
 from finger_pin.core.stepping.kink_sides import hold, release, strayed
 from finger_pin.core.stepping.tableaus import Tableau
 
@@ -101,7 +101,7 @@ class Stretch(NamedTuple):
 INTEGRATION, STRETCH = Kind(Integration), Kind(Stretch)
 
 
-@compiled
+@compiled_within
 def try_step(integration: Any, model: Any, time: float, h: float, fresh: bool) -> int:
     """Try one step: fill the increments k and, in model.state, the state at its end.
 

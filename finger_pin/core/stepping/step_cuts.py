@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.collision.continuous import survey
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled_within
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import cut, interpolant
@@ -42,7 +42,7 @@ def survey_step(address: int, _h: float) -> int:
     return 1
 
 
-@compiled
+@compiled_within
 def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
     """Return the share of a step that is taken, that of another try, and the share after which a row strays.
 
@@ -72,7 +72,7 @@ def _kept_at_kinks(integration: Any, model: Any, h: float, outcome: int) -> Any:
     return part, min(_LONGEST, max(_SHORTEST, 1.02 * share)) if dear and long else 1.0, share
 
 
-@compiled
+@compiled_within
 def _part_before_reversal(integration: Any, model: Any, h: float) -> Any:
     """Let a step end a little behind the first reversal of sliding; return the share that is taken, 1 without one."""
     memory, part = integration.memory, before_reversal(integration, model, h)
