@@ -193,7 +193,7 @@ def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> No
             right[r, c] *= inverse
 
 
-@compiled
+@compiled_within
 def condense(model: Any, address: int, g: float) -> bool:
     """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
     linear, blocks = model.linear, model.linear.blocks

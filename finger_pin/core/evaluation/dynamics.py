@@ -132,7 +132,7 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
         rate[i] = rows[RATE, tables.state_row[i]]
 
 
-@compiled
+@compiled_within
 def exert(model: Any, address: int, time: float) -> None:
     """Fill the rows' arguments, forces and rates of states, after `move` and with known inputs."""
     tables, control, x, work = model.tables, model.control, model.state, model.work

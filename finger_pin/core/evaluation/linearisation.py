@@ -13,7 +13,7 @@ from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import Indices, Matrix, Vector, call_at, call_filling, compiled, compiled_within
+from finger_pin.core.jit import Indices, Matrix, Vector, call_at, call_filling, compiled_within
 from finger_pin.core.tables import END, FIRST, Tables
 
 
@@ -178,7 +178,7 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
             j = tables.parents[j]
 
 
-@compiled
+@compiled_within
 def linearise(model: Any, address: int, time: float) -> None:
     """Fill all partial derivatives after `evaluate` at the same time and state."""
     tables, control, x, work, linear = model.tables, model.control, model.state, model.work, model.linear

@@ -55,6 +55,7 @@ class Companion:
         self._large = min(_LARGE * max(part.rtol, float(np.max(part.atol[turning], initial=0.0))), _LARGEST)
         self._seen = [self._now()]
         self._second: Part | None = None
+        self._room = part.room(0)
 
     def look(self, steps: int = _STEPS) -> None:
         """Look at the error, if so many steps have been taken since the last time."""
@@ -81,16 +82,16 @@ class Companion:
         second.knots = self._part.knots
         second.restart(begin.x + begin.drift, begin.attitude, begin.time)
         second.memory[core.STEP] = begin.memory[core.STEP]
+        # What takes so much longer is no neighbour any more.
+        self._room = self._part.room(_MOST * _STEPS)
         return second
 
     def _follow(self, second: Part) -> None:
         """Replace the error by the difference to the second motion, unless that is another one."""
         part, (begin, *later) = self._part, self._seen
         sums, error, time = begin.memory[[core.DRIFT, core.OBJECT_DRIFT]], begin.drift, begin.time
-        # What takes so much longer is no neighbour any more.
-        room = part.room(_MOST * _STEPS)
         for moment in later:
-            if not _size(part, error) < _OTHER or second.advance(moment.time, room)[0] != core.DONE:
+            if not _size(part, error) < _OTHER or second.advance(moment.time, self._room)[0] != core.DONE:
                 break
             other = difference(part, moment, second)
             means = [max(_mean(each[places]) for each in (error, other)) for places in (part.joints, part.objects)]
@@ -101,7 +102,7 @@ class Companion:
         part.drift[:], part.memory[[core.DRIFT, core.OBJECT_DRIFT]], part.memory[core.BEHIND] = error, sums, 0.0
         self._seen = [self._now()]
         if _size(part, error) < _SMALL * self._large:
-            self._second = None
+            self._second, self._room = None, part.room(0)
 
 
 def difference(part: Part, moment: Moment, other: Part) -> Array:
