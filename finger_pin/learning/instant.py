@@ -46,7 +46,7 @@ class Present(SampledMotion):
         self.times, self.packed = np.zeros(count), np.zeros((count, loop.finger.layout.size))
 
     def forget(self) -> None:
-        """Forget what followed from earlier states; views of the states remain."""
+        """Forget results of earlier states; views of the states remain."""
         for name in vars(self).keys() - _STAYING:
             delattr(self, name)
 

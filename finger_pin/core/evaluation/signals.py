@@ -183,8 +183,7 @@ def _set(many: Any, model: Any, m: int) -> None:
     for t in range(many.forces.shape[1]):
         for r in range(3):
             model.tables.tip_force[t, r] = many.forces[m, t, r]
-    for c in range(many.states.shape[1]):
-        model.state[c] = many.states[m, c]
+    copy(many.states[m], model.state)
 
 
 @compiled_within

@@ -43,7 +43,7 @@ def compiled(function: _Function) -> _Function:
 
 
 def compiled_within(function: _Function) -> _Function:
-    """Return the function, to be compiled with its caller: for what is called at one place, else it is compiled twice.
+    """Return a function that is compiled as a part of its caller; of several callers, each would compile it anew.
 
     Numba optimises each function that is `compiled` with all that it calls, and makes machine code of it, though only
     what calls it is ever run: of a chain of calls, the last function would be optimised as often as the chain is long.

@@ -10,7 +10,7 @@ from finger_pin.core.collision.broad_phase import list_awake, settle
 from finger_pin.core.collision.continuous import NOTHING, UNSEEN
 from finger_pin.core.control import HELD
 from finger_pin.core.evaluation.attitude_charts import rechart
-from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within, copy_matrix
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_within, copy, copy_matrix
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.error_norm import step_error, worst
@@ -133,14 +133,12 @@ def _arrive(stretch: Any, integration: Any, model: Any, time: float) -> None:
     if tables.touching and settle(tables, model.work.rows, model.work.paths, model.state[first:]):
         list_awake(tables, model.work.paths)
         _still(integration, model, first)
-    for c in range(x.size):
-        x[c] = model.state[c]
+    copy(model.state, x)
     integration.memory[at.TIME] = time
     if taken < stretch.times.size:
         stretch.times[taken] = time
         copy_matrix(integration.dense, stretch.dense[taken])
-        for c in range(x.size):
-            stretch.states[taken, c] = x[c]
+        copy(x, stretch.states[taken])
     rechart(tables, x, attitude, integration.drift)
     if taken < stretch.times.size:
         for f in range(attitude.shape[0]):
