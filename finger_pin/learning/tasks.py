@@ -20,7 +20,7 @@ from finger_pin.learning.vector_environment import VectorEnvironment
 from finger_pin.mechanism.finger import Finger
 
 #: At these tolerances angles err by about a thousandth of a radian, which no policy feels.
-COARSE = {"simulation.method": "Rodas4", "simulation.rtol": 3e-2, "simulation.atol_scale": 3e-2}
+COARSE = {"simulation.method": "Rodas4", "simulation.rtol": 1e-2, "simulation.atol_scale": 2e-2}
 # Most tensions, N, half of which hold the finger in the air, and half of which press on things with a newton or two.
 _LIGHT, _FIRM = (2.0, 2.0, 8.8, 6.2), (12.0, 12.0, 25.0, 8.0)
 # Errors over which the halves of a reward fall off, m and N: the first leads there, the second asks for more.

@@ -6,6 +6,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,14 @@ import numpy as np
 import finger_pin as fp
 from benchmarks.store import Store, say
 from finger_pin.control.compiled import Bindings
+from finger_pin.description.routing import Array
 from finger_pin.simulation.setup import Setup
 
 SCENARIOS = ("fig6", "stick_slip", "servo", "press", "hand")
 #: What the prepared runs record.
 RECORDED = ("joint_position", "tendon_tension")
 _ROUNDS, _QUICK_ROUNDS, _SHORT = 7, 2, 0.01
-_START = (0.0, 0.4, 0.5, 0.35)
+_START, _REST = (0.0, 0.4, 0.5, 0.35), np.array([1.0, 1.0, 4.4, 3.1])
 
 
 def measure(store: Store) -> dict[str, Any]:
@@ -76,33 +78,48 @@ class _Steps:
             part.advance(_SHORT)
 
 
-def _simulator(rounds: int) -> dict[str, float]:
-    """Return the times of a simulator on steps of 20 ms, s, and the error of its angles there, rad rms."""
-    sim = fp.Simulator("ub", _START, method="Rodas4", rtol=3e-2, atol_scale=3e-2)
-    tension, period, many = np.array([1.0, 1.0, 4.4, 3.1]), 0.02, 64
-    # Tensions that change at every step, as a policy's do.
-    pulls = tension * np.random.default_rng(0).uniform(0.9, 1.1, (100, 4))
-    exact, tensions = fp.Simulator("ub", _START, rtol=1e-9, atol_scale=1e-9), itertools.cycle(pulls)
-    apart = [sim.step(pull, period).position - exact.step(pull, period).position for pull in pulls]
+def _simulator(rounds: int) -> dict[str, Any]:
+    """Return the times of a simulator's steps of 20 ms, s, and the largest error of an angle in one step, rad."""
+    settings: dict[str, Any] = {"method": "Rodas4", "rtol": 1e-2, "atol_scale": 2e-2}
+    steps, period, many = np.arange(100)[:, None], 0.02, 64
+    pulls = {
+        "held": np.tile(_REST, (len(steps), 1)),
+        "varied slowly": _REST * (1.0 + 0.05 * np.sin(np.pi * period * steps + np.arange(4))),
+        # At every step, as those of a policy that explores.
+        "jumping": _REST * np.random.default_rng(0).uniform(0.9, 1.1, (len(steps), 4)),
+    }
+    sim, errors = fp.Simulator("ub", _START, **settings), {}
+    exact = fp.Simulator("ub", _START, rtol=1e-9, atol_scale=1e-9)
+    jobs: dict[str, Callable[[], Any]] = {}
+    for name, tensions in pulls.items():
+        apart = []
+        sim.reset()
+        for pull in tensions:
+            exact.x = sim.x
+            apart.append(sim.step(pull, period).position - exact.step(pull, period).position)
+        errors[name] = float(np.max(np.abs(apart)))
+        jobs[name] = partial(_episode, sim, tensions, period)
     # One that is set and reset begins with small steps again: it is another one that is stepped.
     other, x, worlds = sim.clone(), sim.x, [sim.clone() for _ in range(many)]
-
-    def episode() -> None:
-        sim.reset()
-        for pull in pulls:
-            sim.step(pull, period)
-
-    jobs: dict[str, Callable[[], Any]] = {
-        "step": episode,
+    jumping = itertools.cycle(pulls["jumping"])
+    jobs |= {
         "set x": lambda: setattr(other, "x", x),
         "signals": other.signals,
         "reset": other.reset,
         "set_parameters": lambda: other.set_parameters({"finger.tendon_friction.coulomb": 0.12}),
     }
     times = processor_time(jobs, 20 * rounds)
-    times["step"] /= len(pulls)
-    together = processor_time({"": lambda: fp.step_many(worlds, [next(tensions) for _ in worlds], period)}, rounds)
-    return times | {"step_many, per world": together[""] / many, "error": float(np.sqrt(np.mean(np.square(apart))))}
+    for name in pulls:
+        times[name] /= len(steps)
+    together = processor_time({"": lambda: fp.step_many(worlds, [next(jumping) for _ in worlds], period)}, rounds)
+    times["step_many, per world"] = together[""] / many
+    return {"times": times, "errors": errors}
+
+
+def _episode(sim: fp.Simulator, tensions: Array, period: float) -> None:
+    sim.reset()
+    for pull in tensions:
+        sim.step(pull, period)
 
 
 def processor_time(jobs: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, float]:

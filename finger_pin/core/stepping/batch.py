@@ -92,13 +92,11 @@ class Together:
 
     def read(self, out: Array) -> None:
         """Fill the packed states of all, shape (m, size), contiguous."""
-        if not self._whole:
-            out[:] = [stepper.x for stepper in self._steppers]
-        elif len(self._parts[0].attitude):
-            states, attitudes = (np.array([getattr(part, name) for part in self._parts]) for name in ("x", "attitude"))
-            out[:] = self._steppers[0].joined([states], [attitudes])
+        if self._whole and not len(self._parts[0].attitude):
+            for row, part in zip(out, self._parts, strict=True):
+                row[:] = part.x
         else:
-            np.concatenate([part.x for part in self._parts], out=out.reshape(-1))
+            out[:] = [stepper.x for stepper in self._steppers]
 
     def _bound(self, threads: int) -> list[int]:
         """Return the addresses of pieces of the batch, for some threads."""
