@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger_pin.core.buffers import build_work
-from finger_pin.core.control import held_control
+from finger_pin.core.buffers import Work, build_linear, build_work, renew_linear, renew_work
+from finger_pin.core.control import Control, held_control
+from finger_pin.core.evaluation.condensation import condense
+from finger_pin.core.evaluation.contacts import add_pushes, fill_contact_gains, measure
+from finger_pin.core.evaluation.dynamics import evaluate, exert
+from finger_pin.core.evaluation.linearisation import linearise
+from finger_pin.core.evaluation.moving_base import base_power, bias_rate, move_base
+from finger_pin.core.evaluation.path_derivatives import linearise_paths
+from finger_pin.core.evaluation.paths import look
 from finger_pin.core.evaluation.signals import STATES, States, evaluate_many
-from finger_pin.core.jit import call, copied
-from finger_pin.core.model import BoundModel
+from finger_pin.core.jit import bound, call, copied, refill
+from finger_pin.core.model import MODEL, Model
 from finger_pin.core.tables import Tables
 from finger_pin.core.threads import in_threads, threads
 from finger_pin.description.routing import Array
@@ -65,6 +72,51 @@ class Room(NamedTuple):
             attitudes=attitudes[at],
             touches=own.touches,
         )
+
+
+_THROUGH_SPACE = (measure, linearise_paths, fill_contact_gains, add_pushes, look)
+_MOVED = (move_base, bias_rate, base_power)
+
+
+class BoundModel:
+    """A model and its address.
+
+    Attributes:
+        model: Its arrays, which live as long as this.
+        address: Of what `bound_at` reads.
+    """
+
+    def __init__(self, tables: Tables, control: Control, work: Work, moved: bool = False) -> None:
+        """Bind; arrays are taken as they are, not copied. The base may be ``moved`` by others than its control."""
+        size = 2 * len(work.torque) + int(tables.state.max(initial=-1)) + 1
+        moved = moved or len(control.palm.harmonics) > 0
+        through_space = len(tables.paths.columns) > 0
+        units = [unit.address for unit in (evaluate, exert, linearise, condense)]
+        # Compiled only for mechanisms that need them: paths through space or contacts, and a base that moves.
+        units += [unit.address if through_space else 0 for unit in _THROUGH_SPACE]
+        units += [unit.address if moved else 0 for unit in _MOVED]
+        self.model = Model(tables, control, work, build_linear(tables, control), np.zeros(size), np.zeros(size), *units)
+        self._block = bound(self.model, MODEL)
+        # Of tables what changes in place is copied wherever it is handed over.
+        self._filled: Tables | None = None
+        self.address = int(self._block.ctypes.data)
+
+    def renew(self, tables: Tables, control: Control) -> None:
+        """Take the numbers of other tables and another control, which fit, into the arrays that are bound."""
+        own = self.model
+        refill(own.tables, tables, self._filled)
+        refill(own.control, control)
+        self._filled = tables
+        renew_work(own.work, tables)
+        renew_linear(own.linear, tables)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled: a copy's address would be that of this one.
+
+        Raises:
+            TypeError: Always.
+        """
+        raise TypeError("a bound model holds addresses: what owns it is copied, and binds another")
 
 
 class Models:

@@ -7,93 +7,10 @@ each of its states decays on its own.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from finger_pin.core.control import Control
 from finger_pin.core.evaluation import law_code as at
-from finger_pin.core.jit import Indices, Vector, compiled, compiled_within
-from finger_pin.core.stepping.islands import find_islands
-from finger_pin.core.tables import Tables
-
-
-class Blocks(NamedTuple):
-    """Atoms, and the blocks to which contacts join them; N coordinates, K rows, Z states, A atoms.
-
-    Members of all blocks stand in a row, one block after the other; ``*_start`` has where each begins.
-
-    Attributes:
-        atom: Of every coordinate, shape (N,).
-        row_atom: Of every row, shape (K,); -1 for contacts.
-        label: Block of every atom, shape (A,).
-        number: Number of blocks, shape (1,).
-        coordinate_start, coordinates: Shapes (A + 1,) and (N,).
-        row_start, rows: Of all rows but those of contacts, shapes (A + 1,) and (K,).
-        touch_start, touches: First rows of closed contacts, shapes (A + 1,) and (contacts,).
-        state_start, states: Shapes (A + 1,) and (Z,).
-        place: Of every coordinate in its block, shape (N,).
-        state_place: Of every state in its block, shape (Z,).
-        loose: For the states of contacts that are open, -dz'/dz, shape (Z,); zero for all others.
-        awake, awake_count: States of contacts that are awake, shape (Z,), and how many, shape (1,).
-        current: The block that is being condensed, shape (1,).
-    """
-
-    atom: Indices
-    row_atom: Indices
-    label: Indices
-    number: Indices
-    coordinate_start: Indices
-    coordinates: Indices
-    row_start: Indices
-    rows: Indices
-    touch_start: Indices
-    touches: Indices
-    state_start: Indices
-    states: Indices
-    place: Indices
-    state_place: Indices
-    loose: Vector
-    awake: Indices
-    awake_count: Indices
-    current: Indices
-
-
-def build_blocks(tables: Tables, control: Control) -> Blocks:
-    """Return the blocks of tables while nothing touches."""
-    count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
-    states = int(tables.state.max(initial=-1)) + 1
-    atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
-    if tables.touching:
-        islands = find_islands(tables, control, touching=False)
-        atoms = len(islands)
-        for index, island in enumerate(islands):
-            atom[island.coordinates], row_atom[island.rows] = index, index
-        row_atom[tables.touch > 0] = -1
-
-    def room(size: int) -> Any:
-        return np.zeros(size, dtype=np.int64)
-
-    return Blocks(
-        atom=atom,
-        row_atom=row_atom,
-        label=room(atoms),
-        number=np.ones(1, dtype=np.int64),
-        coordinate_start=np.array([0, *[width] * atoms]),
-        coordinates=np.arange(width),
-        row_start=np.array([0, *[count] * atoms]),
-        rows=np.arange(count),
-        touch_start=room(atoms + 1),
-        touches=room(tables.touching // 3),
-        state_start=np.array([0, *[states] * atoms]),
-        states=np.arange(states),
-        place=np.arange(width),
-        state_place=np.arange(states),
-        loose=np.zeros(states),
-        awake=room(states),
-        awake_count=room(1),
-        current=room(1),
-    )
+from finger_pin.core.jit import compiled, compiled_within
 
 
 @compiled

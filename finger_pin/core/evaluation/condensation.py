@@ -16,7 +16,8 @@ from typing import Any
 
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
-from finger_pin.core.jit import call_at, compiled, compiled_loosely, compiled_within
+from finger_pin.core.jit import Unit, bound_at, call_at, compiled, compiled_loosely, compiled_within
+from finger_pin.core.model import MODEL
 
 
 @compiled
@@ -46,7 +47,7 @@ def _outside(model: Any, address: int, g: float, b: int, width: int, wide: int) 
                     force[j, last] += work.jacobian[t, r, places[j]] * work.force_rate[t, r]
     if tables.touching:
         linear.blocks.current[0] = b
-        call_at(model.touch, address, g)
+        call_at(model.fill_contact_gains, address, g)
 
 
 @compiled_within
@@ -59,7 +60,7 @@ def _load(model: Any, address: int, k: int, places: Any, width: int, wide: int) 
             load[c] += linear.load_by_position[k, places[c]]
         load[wide - 1] += linear.load_by_time[k]
         if tables.touching:
-            call_at(model.press, address, float(k))
+            call_at(model.add_pushes, address, float(k))
 
 
 @compiled_within
@@ -193,17 +194,18 @@ def substitute(matrix: Any, size: int, pivots: Any, right: Any, wide: int) -> No
             right[r, c] *= inverse
 
 
-@compiled_within
-def condense(model: Any, address: int, g: float) -> bool:
-    """Fill the solution of (g - J) u = r for all r, after `linearise`; false if g - J is singular."""
+@Unit
+def condense(address: int, g: float) -> int:
+    """Fill the solution of (g - J) u = r for all r, after `linearise`; return 0 if g - J is singular, else 1."""
+    model = bound_at(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
     for index in range(blocks.awake_count[0]):
         s = blocks.awake[index]
         linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
     for b in range(blocks.number[0]):
         if not _condense_block(model, address, g, b):
-            return False
-    return True
+            return 0
+    return 1
 
 
 @compiled

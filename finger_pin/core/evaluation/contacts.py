@@ -6,13 +6,25 @@ from typing import Any
 
 from finger_pin.core.evaluation import law_code as at
 from finger_pin.core.evaluation.blocks import extent
-from finger_pin.core.evaluation.paths import passes, push
-from finger_pin.core.jit import call_value, compiled, compiled_within
+from finger_pin.core.evaluation.paths import measure_paths, passes, push
+from finger_pin.core.jit import Unit, bound_at, call_value, compiled, compiled_within
+from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FIRST
 
 
+@Unit
+def measure(address: int, _time: float) -> int:
+    """Fill what rows with paths through space see, and the forces of contacts, after `move`."""
+    model = bound_at(address, MODEL)
+    measure_paths(model.tables, model.work)
+    if model.tables.touching:
+        width = model.work.torque.size
+        _exert(model.tables, model.state[width : 2 * width], model.state[2 * width :], model.work)
+    return 1
+
+
 @compiled_within
-def exert_contacts(tables: Any, v: Any, z: Any, work: Any) -> None:
+def _exert(tables: Any, v: Any, z: Any, work: Any) -> None:
     """Evaluate the contacts, which come before all other rows, but for those asleep, and add to A^T phi."""
     rows, paths = work.rows, work.paths
     for g in range(tables.groups.shape[0]):
@@ -89,19 +101,23 @@ def _contact_gains(tables: Any, g: float, k: int, work: Any, linear: Any, width:
                     target[column] += arm * row[column]
 
 
-@compiled_within
-def block_contact_gains(tables: Any, g: float, work: Any, linear: Any) -> None:
+@Unit
+def fill_contact_gains(address: int, g: float) -> int:
     """Fill the gains of a block's closed contacts, which depend on no other rows, and add them to A^T d phi."""
-    blocks = linear.blocks
+    model = bound_at(address, MODEL)
+    linear, blocks = model.linear, model.linear.blocks
     b = blocks.current[0]
     width, wide = extent(blocks, b)
     for index in range(blocks.touch_start[b], blocks.touch_start[b + 1]):
-        _contact_gains(tables, g, blocks.touches[index], work, linear, width, wide)
+        _contact_gains(model.tables, g, blocks.touches[index], model.work, linear, width, wide)
+    return 1
 
 
-@compiled_within
-def add_pushes(tables: Any, work: Any, k: int, linear: Any) -> None:
-    """Add to the change of a pin's load that of the forces of the closed contacts of its block."""
+@Unit
+def add_pushes(address: int, row: float) -> int:
+    """Add to the change of a row's load that of the forces of the closed contacts of its block on its pin."""
+    model = bound_at(address, MODEL)
+    tables, work, linear, k = model.tables, model.work, model.linear, int(row)
     paths, own, blocks, load = tables.paths, work.paths, linear.blocks, linear.load
     _, wide = extent(blocks, blocks.current[0])
     for index in range(own.closed_count[0]):
@@ -116,3 +132,4 @@ def add_pushes(tables: Any, work: Any, k: int, linear: Any) -> None:
                 share += passing * work.pull[k, r] * own.wrench[e, m, 3 + r] / size
             for c in range(wide):
                 load[c] += share * linear.gain[paths.row[e] + m, c]
+    return 1

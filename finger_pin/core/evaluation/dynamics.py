@@ -11,7 +11,8 @@ from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGT
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, factorise_mass, inverse_dynamics, mass_matrix, move, solve_mass
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import call_at, call_value, compiled, compiled_within
+from finger_pin.core.jit import Unit, bound_at, call_at, call_value, compiled, compiled_within
+from finger_pin.core.model import MODEL
 from finger_pin.core.tables import END, FED, FIRST, PRESSED
 
 
@@ -132,9 +133,10 @@ def _drive(tables: Any, work: Any, rate: Any) -> None:
         rate[i] = rows[RATE, tables.state_row[i]]
 
 
-@compiled_within
-def exert(model: Any, address: int, time: float) -> None:
+@Unit
+def exert(address: int, time: float) -> int:
     """Fill the rows' arguments, forces and rates of states, after `move` and with known inputs."""
+    model = bound_at(address, MODEL)
     tables, control, x, work = model.tables, model.control, model.state, model.work
     width = work.torque.size
     if tables.loaded:
@@ -147,17 +149,19 @@ def exert(model: Any, address: int, time: float) -> None:
     _see(tables, x[:width], x[width : 2 * width], x[2 * width :], work)
     _act(tables, work)
     _drive(tables, work, model.rate[2 * width :])
+    return 1
 
 
-@compiled_within
-def evaluate(model: Any, address: int, time: float) -> None:
-    """Fill the rate of the packed state, and everything in ``work`` that the linearisation needs."""
+@Unit
+def evaluate(address: int, time: float) -> int:
+    """Fill the rate of the packed state of a `Model`, and everything in ``work`` that the linearisation needs."""
+    model = bound_at(address, MODEL)
     tables, control, x, work, rate = model.tables, model.control, model.state, model.work, model.rate
     size, width = tables.parents.size, work.torque.size
     q, v = x[:width], x[width : 2 * width]
     inputs(control, time, q, v, work.command)
-    if model.carry != 0:
-        call_at(model.carry, address, time)
+    if model.move_base != 0:
+        call_at(model.move_base, address, time)
     move(tables, q, v, work)
     call_at(model.exert, address, time)
     mass_matrix(tables, work)
@@ -177,3 +181,4 @@ def evaluate(model: Any, address: int, time: float) -> None:
     for j in range(width):
         rate[j] = v[j]
         rate[width + j] = work.acceleration[j]
+    return 1

@@ -9,14 +9,11 @@ import numpy as np
 from finger_pin.core.control import HELD, SCHEDULED
 from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.time_functions import signal_derivative, signal_derivatives, signal_values
-from finger_pin.core.evaluation.trigonometry import sine_cosine
 from finger_pin.core.jit import compiled, compiled_within
 from finger_pin.laws import controller as controller_laws
-from finger_pin.laws import palm as palm_laws
 
 _proportional_torque = inlined(controller_laws.proportional_torque)
 _internal_level = inlined(controller_laws.internal_level)
-_base_motion = inlined(palm_laws.base_motion)
 
 
 @compiled
@@ -107,40 +104,3 @@ def tip_forces(control: Any, time: float, order: int, out: Any) -> None:
         for t in range(out.shape[0]):
             for r in range(3):
                 out[t, r] = signal_derivative(control.force, 3 * t + r, time, order)
-
-
-@compiled
-def _coordinates(signal: Any, time: float, order: int) -> Any:
-    return (
-        signal_derivative(signal, 0, time, order),
-        signal_derivative(signal, 1, time, order),
-        signal_derivative(signal, 2, time, order),
-        signal_derivative(signal, 3, time, order),
-        signal_derivative(signal, 4, time, order),
-        signal_derivative(signal, 5, time, order),
-    )
-
-
-@compiled_within
-def move_base(control: Any, time: float, tables: Any, work: Any) -> None:
-    """Fill velocity and acceleration of a moving base, and their rates."""
-    if control.palm.harmonics.shape[0] == 0:
-        return
-    place = _coordinates(control.palm, time, 0)
-    turns = sine_cosine(place[3]) + sine_cosine(place[4]) + sine_cosine(place[5])
-    found = _base_motion(
-        _coordinates(control.palm, time, 1),
-        _coordinates(control.palm, time, 2),
-        _coordinates(control.palm, time, 3),
-        turns,
-        (tables.gravity[0], tables.gravity[1], tables.gravity[2]),
-    )
-    for k in range(6):
-        work.base_velocity[k] = found[k]
-        work.base_acceleration[k] = found[6 + k]
-        work.base_rate[0, k] = found[15 + k]
-        work.base_rate[1, k] = found[21 + k]
-    # The world that the base sees goes back as the base goes on: first its angles, then its place.
-    for i in range(work.guide.size):
-        work.guide[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 2)
-        work.guide_rate[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 3)

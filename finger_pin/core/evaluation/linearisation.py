@@ -2,117 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from finger_pin.core.control import Control
-from finger_pin.core.evaluation.blocks import Blocks, build_blocks
 from finger_pin.core.evaluation.inputs import input_slopes, tip_forces
 from finger_pin.core.evaluation.paths import passes
 from finger_pin.core.evaluation.rigid_body import AXIS, BY_POSITION, BY_VELOCITY, MASS_MATRIX, inverse_dynamics
 from finger_pin.core.evaluation.rigid_body_derivatives import inverse_dynamics_derivatives
 from finger_pin.core.evaluation.time_functions import signal_derivatives
-from finger_pin.core.jit import Indices, Matrix, Vector, call_at, call_filling, compiled_within
-from finger_pin.core.tables import END, FIRST, Tables
-
-
-class Linear(NamedTuple):
-    """Partial derivatives at one state, and the solution of (g - J) u = r; K rows, N coordinates, Z states.
-
-    Columns of what is wide are (r of positions, N | r of velocities, N | r of states, Z | h d_i of a stage, 1) of one
-    block; before the reduced system is solved, velocities stand in place of their r. Of what blocks have in common
-    the rows are those of the whole.
-
-    Attributes:
-        mass: M with the lumps, shape (N, N).
-        by_position: d(M a + h - J^T F)/dq at the actual acceleration, shape (N, N).
-        by_velocity: dh/dv, shape (N, N).
-        bias_rate: dh/dt by the motion of the base, shape (N,).
-        arm: dl'/dv, shape (arms,).
-        measure: dl/dq, shape (arms,).
-        turning: dl'/dq at constant v, shape (arms,).
-        bend: d(curvature)/dq, as in the tables, shape (bends,).
-        load_slope: dN/dS, S the sum of earlier forces, shape (K,).
-        load_by_position: dN/dq at constant S, shape (K, N).
-        load_by_time: dN/dt at constant S, shape (K,).
-        gain: d phi, shape (K, wide).
-        state_gain: d z, shape (Z, wide).
-        load, command: Of one row, shape (wide,).
-        force: Sum of A^T d phi of a block, shape (N, wide).
-        reduced: Of a block, shape (N, N), factorised in place.
-        pivots: Row exchanges, shape (N,).
-        velocity: The solution's velocities of a block, shape (N, wide).
-        solution: The solution u, shape (2 N + Z, wide).
-        loose: Of the states of open contacts, u / r, shape (Z,).
-        right: The right-hand side of a block, shape (wide,).
-        blocks: The coupled blocks.
-    """
-
-    mass: Matrix
-    by_position: Matrix
-    by_velocity: Matrix
-    bias_rate: Vector
-    arm: Vector
-    measure: Vector
-    turning: Vector
-    bend: Vector
-    load_slope: Vector
-    load_by_position: Matrix
-    load_by_time: Vector
-    gain: Matrix
-    state_gain: Matrix
-    load: Vector
-    command: Vector
-    force: Matrix
-    reduced: Matrix
-    pivots: Indices
-    velocity: Matrix
-    solution: Matrix
-    loose: Vector
-    right: Vector
-    blocks: Blocks
-
-
-def build_linear(tables: Tables, control: Control) -> Linear:
-    """Allocate the linearisation of tables."""
-    count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
-    states = int(tables.state.max(initial=-1)) + 1
-    wide = 2 * width + states + 1
-    linear = Linear(
-        mass=np.zeros((width, width)),
-        by_position=np.zeros((width, width)),
-        by_velocity=np.zeros((width, width)),
-        bias_rate=np.zeros(width),
-        arm=np.zeros(len(tables.arm)),
-        measure=np.zeros(len(tables.arm)),
-        turning=np.zeros(len(tables.arm)),
-        bend=np.zeros(len(tables.bend)),
-        load_slope=np.zeros(count),
-        load_by_position=np.zeros((count, width)),
-        load_by_time=np.zeros(count),
-        gain=np.zeros((count, wide)),
-        state_gain=np.zeros((states, wide)),
-        load=np.zeros(wide),
-        command=np.zeros(wide),
-        force=np.zeros((width, wide)),
-        reduced=np.zeros((width, width)),
-        pivots=np.zeros(width, dtype=np.int64),
-        velocity=np.zeros((width, wide)),
-        solution=np.zeros((wide - 1, wide)),
-        loose=np.zeros(states),
-        right=np.zeros(wide),
-        blocks=build_blocks(tables, control),
-    )
-    take_numbers(linear, tables)
-    return linear
-
-
-def take_numbers(linear: Linear, tables: Tables) -> None:
-    """Copy the entries of a linearisation that no posture changes from tables into its memory."""
-    lumped = np.arange(len(tables.parents), len(linear.mass))
-    linear.mass[lumped, lumped] = tables.lumps
-    linear.arm[:], linear.measure[:], linear.bend[:] = tables.arm, tables.measure, tables.bend
+from finger_pin.core.jit import Unit, bound_at, call_at, call_filling, compiled_within
+from finger_pin.core.model import MODEL
+from finger_pin.core.tables import END, FIRST
 
 
 @compiled_within
@@ -178,9 +79,10 @@ def _load_slopes(tables: Any, work: Any, linear: Any) -> None:
             j = tables.parents[j]
 
 
-@compiled_within
-def linearise(model: Any, address: int, time: float) -> None:
-    """Fill all partial derivatives after `evaluate` at the same time and state."""
+@Unit
+def linearise(address: int, time: float) -> int:
+    """Fill all partial derivatives of a `Model` at an address after `evaluate` at the same time and state."""
+    model = bound_at(address, MODEL)
     tables, control, x, work, linear = model.tables, model.control, model.state, model.work, model.linear
     size, width = tables.parents.size, work.torque.size
     velocity = x[width : 2 * width]
@@ -196,7 +98,7 @@ def linearise(model: Any, address: int, time: float) -> None:
             linear.by_velocity[i, j] = work.square[BY_VELOCITY, i, j]
             linear.by_velocity[j, i] = work.square[BY_VELOCITY, j, i]
     if control.palm.harmonics.shape[0] > 0:
-        call_at(model.sway, address, time)
+        call_at(model.bias_rate, address, time)
     if tables.loaded:
         _turning_tips(tables, work, linear)
     input_slopes(control, time)
@@ -216,5 +118,6 @@ def linearise(model: Any, address: int, time: float) -> None:
     for e in range(tables.bend.size):
         linear.bend[e] = tables.bend[e] * np.sign(x[tables.bend_at[e]])
     _load_slopes(tables, work, linear)
-    if model.turn != 0:
-        call_at(model.turn, address, time)
+    if model.linearise_paths != 0:
+        call_at(model.linearise_paths, address, time)
+    return 1

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from finger_pin.core.evaluation.blocks import partition
 from finger_pin.core.evaluation.law_code import FORCE, LOAD
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
 from finger_pin.core.evaluation.rigid_body import AXIS
 from finger_pin.core.evaluation.spatial import add_force_cross, dot, motion_cross
-from finger_pin.core.jit import call_shape, compiled, compiled_within
+from finger_pin.core.jit import Unit, bound_at, call_shape, compiled, compiled_within
+from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
@@ -126,9 +128,12 @@ def _turn_pushes(tables: Any, work: Any, k: int, by_position: Any) -> None:
                     by_position[paths.at[s]] += force * work.pull[k, r] * own.wrench_slope[s, m, 3 + r]
 
 
-@compiled_within
-def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
+@Unit
+def linearise_paths(address: int, _time: float) -> int:
     """Fill the derivatives of arms, turns and loads by contacts; subtract those of A^T phi from by_position."""
+    model = bound_at(address, MODEL)
+    tables, work, linear = model.tables, model.work, model.linear
+    velocity = model.state[work.torque.size : 2 * work.torque.size]
     paths, own, closed, touching = tables.paths, work.paths, COLUMNS * work.paths.closed_count[0], tables.touching
     for index in range(own.closed_count[0]):
         _slopes_of_piece(paths, own.closed[index], work)
@@ -167,3 +172,5 @@ def linearise_paths(tables: Any, velocity: Any, work: Any, linear: Any) -> None:
         for k in range(tables.pins.size):
             if tables.pins[k] >= 0:
                 _turn_pushes(tables, work, k, linear.load_by_position[k])
+        partition(tables, work, linear.blocks, linear.gain)
+    return 1

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.evaluation.law_code import FORCE, SIDE
-from finger_pin.core.evaluation.rigid_body import AXIS
+from finger_pin.core.evaluation.rigid_body import AXIS, move
 from finger_pin.core.evaluation.spatial import dot
-from finger_pin.core.jit import call_shape, compiled, compiled_within
+from finger_pin.core.jit import Unit, bound_at, call_shape, compiled, compiled_within
+from finger_pin.core.model import MODEL
 from finger_pin.core.path_tables import COLUMNS, WRENCH
 
 
@@ -60,7 +61,7 @@ def turn_out(rotation: Any, out: Any, first: int, vector: Any) -> None:
 
 
 @compiled
-def look(paths: Any, e: int, work: Any) -> bool:
+def _look(paths: Any, e: int, work: Any) -> bool:
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     own = work.paths
     _frame(paths, e, work)
@@ -81,7 +82,7 @@ def look(paths: Any, e: int, work: Any) -> bool:
 def _measure(paths: Any, e: int, work: Any) -> None:
     """Fill the value of a piece, and its wrenches."""
     own = work.paths
-    look(paths, e, work)
+    _look(paths, e, work)
     out, columns = own.out[e], paths.columns[e]
     own.active[e] = 1 if columns == 1 or out[0] < 0.0 or work.rows[SIDE, paths.row[e]] > 0.0 else 0
     rotation, ends, point = own.frame[e], own.ends[e], work.centre
@@ -121,6 +122,15 @@ def angle_between(first: Any, second: Any) -> Any:
     y = first[2] * second[0] - first[0] * second[2]
     z = first[0] * second[1] - first[1] * second[0]
     return cosine, np.sqrt(x * x + y * y + z * z)
+
+
+@Unit
+def look(address: int, piece: float) -> int:
+    """Place all bodies, and fill value and wrenches of a piece; return 0 if it is out of reach, else 1."""
+    model = bound_at(address, MODEL)
+    work, width = model.work, model.work.torque.size
+    move(model.tables, model.state[:width], model.state[width : 2 * width], work)
+    return 1 if _look(model.tables.paths, int(piece), work) else 0
 
 
 @compiled_within

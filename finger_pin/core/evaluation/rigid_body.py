@@ -141,44 +141,6 @@ def inverse_dynamics(tables: Any, velocity: Any, acceleration: Any, work: Any, t
 
 
 @compiled_within
-def base_power(tables: Any, velocity: Any, work: Any) -> Any:
-    """Return the power that a moving base supplies, W, after an evaluation: its velocity times its wrench."""
-    inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
-    power = 0.0
-    for i in range(tables.parents.size):
-        if tables.parents[i] < 0:
-            power += dot(work.base_velocity, work.spatial[FORCE, i])
-    return power
-
-
-@compiled_within
-def bias_rate(tables: Any, velocity: Any, work: Any, out: Any) -> None:
-    """Fill the time derivative of inverse dynamics at a given motion on a moving base, shape (n,).
-
-    All velocities change alike, by dV; accelerations by that of the base and by dV x S v of every joint before. What
-    an evaluation has left in two layers is overwritten.
-    """
-    size, change = tables.parents.size, work.base_rate[0]
-    for i in range(size):
-        parent = tables.parents[i]
-        own, force = work.spatial[AXIS_CURVE, i], work.spatial[FORCE, i]
-        above = work.base_rate[1] if parent < 0 else work.spatial[AXIS_CURVE, parent]
-        motion_cross(change, work.spatial[AXIS, i], work.vectors[0])
-        for k in range(6):
-            own[k] = above[k] + work.vectors[0][k] * velocity[i]
-        apply_inertia(work.inertia[i], own, force)
-        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
-        add_force_cross(change, work.vectors[0], force)
-        apply_inertia(work.inertia[i], change, work.vectors[0])
-        add_force_cross(work.spatial[MOTION, i], work.vectors[0], force)
-    for i in range(size - 1, -1, -1):
-        out[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
-        if tables.parents[i] >= 0:
-            for k in range(6):
-                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
-
-
-@compiled_within
 def mass_matrix(tables: Any, work: Any) -> None:
     """Fill work.square[MASS_MATRIX] = M after `move`; entries between trees are zero from the start."""
     size = tables.parents.size

@@ -229,8 +229,8 @@ def _keep(many: Any, model: Any, m: int) -> None:
 def book_moved(model: Any, address: int, moving: bool, totals: Any) -> None:
     """Book the power of a moving base, or of coordinates led along paths, after a whole evaluation."""
     work, width, last = model.work, model.work.torque.size, totals.size - 1
-    if model.power != 0 and moving:
-        call_at(model.power, address, 0.0)
+    if model.base_power != 0 and moving:
+        call_at(model.base_power, address, 0.0)
         totals[last] = work.base_power[0]
     if work.guide.size > 0:
         for j in range(width):

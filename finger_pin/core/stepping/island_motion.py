@@ -7,11 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from finger_pin.core.bound_models import FEW
+from finger_pin.core.bound_models import FEW, BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.evaluation.law_code import SIDE
 from finger_pin.core.jit import call, copied
-from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping.interpolation import BETWEEN, Between, interpolate_many
 from finger_pin.core.stepping.island_stepper import Part, Record
 from finger_pin.core.stepping.powers import POWERS, Powers, power_many

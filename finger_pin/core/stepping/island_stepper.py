@@ -10,13 +10,13 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from finger_pin.core.bound_models import BoundModel
 from finger_pin.core.buffers import build_work
 from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.control import Control
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
 from finger_pin.core.jit import Unit, bound, copied
-from finger_pin.core.model import BoundModel
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven

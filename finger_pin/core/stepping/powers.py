@@ -56,7 +56,7 @@ def power_many(address: int, _time: float) -> int:
     b, model = asked.between, bound_at(asked.model, MODEL)
     tables, work, state = model.tables, model.work, model.state
     width, step, last = work.torque.size, -1, -1
-    moving = model.power != 0 or work.guide.size > 0
+    moving = model.base_power != 0 or work.guide.size > 0
     rouse(tables, work)
     for k in range(b.times.size):
         time, last = b.times[k], step

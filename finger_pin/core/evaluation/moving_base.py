@@ -1,0 +1,101 @@
+"""A base that moves, compiled: its motion, the power that it supplies, and what it adds to the linearisation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from finger_pin.core.evaluation.law_code import inlined
+from finger_pin.core.evaluation.rigid_body import AXIS, AXIS_CURVE, FORCE, MOTION, inverse_dynamics
+from finger_pin.core.evaluation.spatial import add_force_cross, apply_inertia, dot, motion_cross
+from finger_pin.core.evaluation.time_functions import signal_derivative
+from finger_pin.core.evaluation.trigonometry import sine_cosine
+from finger_pin.core.jit import Unit, bound_at, compiled
+from finger_pin.core.model import MODEL
+from finger_pin.laws import palm as palm_laws
+
+_base_motion = inlined(palm_laws.base_motion)
+
+
+@compiled
+def _coordinates(signal: Any, time: float, order: int) -> Any:
+    return (
+        signal_derivative(signal, 0, time, order),
+        signal_derivative(signal, 1, time, order),
+        signal_derivative(signal, 2, time, order),
+        signal_derivative(signal, 3, time, order),
+        signal_derivative(signal, 4, time, order),
+        signal_derivative(signal, 5, time, order),
+    )
+
+
+@Unit
+def move_base(address: int, time: float) -> int:
+    """Fill velocity and acceleration of a moving base, and their rates."""
+    model = bound_at(address, MODEL)
+    control, tables, work = model.control, model.tables, model.work
+    if control.palm.harmonics.shape[0] == 0:
+        return 1
+    place = _coordinates(control.palm, time, 0)
+    turns = sine_cosine(place[3]) + sine_cosine(place[4]) + sine_cosine(place[5])
+    found = _base_motion(
+        _coordinates(control.palm, time, 1),
+        _coordinates(control.palm, time, 2),
+        _coordinates(control.palm, time, 3),
+        turns,
+        (tables.gravity[0], tables.gravity[1], tables.gravity[2]),
+    )
+    for k in range(6):
+        work.base_velocity[k] = found[k]
+        work.base_acceleration[k] = found[6 + k]
+        work.base_rate[0, k] = found[15 + k]
+        work.base_rate[1, k] = found[21 + k]
+    # The world that the base sees goes back as the base goes on: first its angles, then its place.
+    for i in range(work.guide.size):
+        work.guide[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 2)
+        work.guide_rate[i] = -signal_derivative(control.palm, (i + 3) % 6, time, 3)
+    return 1
+
+
+@Unit
+def base_power(address: int, _time: float) -> int:
+    """Fill the power that a moving base supplies, W, after an evaluation: its velocity times its wrench."""
+    model = bound_at(address, MODEL)
+    tables, work, width = model.tables, model.work, model.work.torque.size
+    velocity = model.state[width : 2 * width]
+    inverse_dynamics(tables, velocity, work.acceleration, work, work.bias, True)
+    power = 0.0
+    for i in range(tables.parents.size):
+        if tables.parents[i] < 0:
+            power += dot(work.base_velocity, work.spatial[FORCE, i])
+    work.base_power[0] = power
+    return 1
+
+
+@Unit
+def bias_rate(address: int, _time: float) -> int:
+    """Fill the time derivative of inverse dynamics at a given motion on a moving base, shape (n,).
+
+    All velocities change alike, by dV; accelerations by that of the base and by dV x S v of every joint before. What
+    an evaluation has left in two layers is overwritten.
+    """
+    model = bound_at(address, MODEL)
+    tables, work, width, out = model.tables, model.work, model.work.torque.size, model.linear.bias_rate
+    velocity, size, change = model.state[width : 2 * width], tables.parents.size, work.base_rate[0]
+    for i in range(size):
+        parent = tables.parents[i]
+        own, force = work.spatial[AXIS_CURVE, i], work.spatial[FORCE, i]
+        above = work.base_rate[1] if parent < 0 else work.spatial[AXIS_CURVE, parent]
+        motion_cross(change, work.spatial[AXIS, i], work.vectors[0])
+        for k in range(6):
+            own[k] = above[k] + work.vectors[0][k] * velocity[i]
+        apply_inertia(work.inertia[i], own, force)
+        apply_inertia(work.inertia[i], work.spatial[MOTION, i], work.vectors[0])
+        add_force_cross(change, work.vectors[0], force)
+        apply_inertia(work.inertia[i], change, work.vectors[0])
+        add_force_cross(work.spatial[MOTION, i], work.vectors[0], force)
+    for i in range(size - 1, -1, -1):
+        out[i] = dot(work.spatial[AXIS, i], work.spatial[FORCE, i])
+        if tables.parents[i] >= 0:
+            for k in range(6):
+                work.spatial[FORCE, tables.parents[i], k] += work.spatial[FORCE, i, k]
+    return 1
