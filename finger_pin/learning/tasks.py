@@ -119,8 +119,9 @@ def _press() -> dict[str, Any]:
         "scenario": _scenario("press", ((f"{plate}.amplitude", 0.002), (f"{plate}.frequency", 0.5))),
         "limits": (0.0, _FIRM),
         "reward": _pressed,
+        # Frictions hide what pulls: without tensions a policy knows neither what it did last nor what arrived of it.
         "observation": _observed(
-            "joint_position", "joint_velocity", "contact_normal_force", missing_force=missing_force
+            "tendon_tension", "joint_position", "joint_velocity", "contact_normal_force", missing_force=missing_force
         ),
         "draw": wanted_force,
         "randomise": {f"{plate}.phase": Uniform(0.0, 2.0 * np.pi), f"{plate}.frequency": Uniform(0.2, 1.0)},
