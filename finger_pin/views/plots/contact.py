@@ -113,5 +113,8 @@ def _moved(axes: Axes, result: xr.Dataset) -> None:
         lines = dict(zip(labels, moved.reshape(len(labels), -1), strict=True))
     for index, (label, values) in enumerate(lines.items()):
         trace(axes, time, _MILLI * values, label=label, linewidth=thin(), **series(index))
-    axes.legend(loc="best", ncols=5 if len(objects) > _MOST_ALONG else 3, fontsize="x-small")
+    low, high = axes.get_ylim()
+    # Names stand above the lines.
+    axes.set_ylim(low, high + 0.4 * (high - low))
+    axes.legend(loc="upper center", ncols=5 if len(objects) > _MOST_ALONG else 3, fontsize="x-small")
     title(axes, "(d) free objects")
