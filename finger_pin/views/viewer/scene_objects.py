@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -120,12 +121,13 @@ class SceneObjects:
         return {name: encode(values, "<f4") for name, values in (("object", self.poses), ("contact", self.contacts))}
 
     def seen(self) -> Array:
-        """Return the places of free objects and of contacts, as far as they are near the finger, shape (m, 3)."""
+        """Return places of free objects and contacts, and corners of fixed ones, near the finger, shape (m, 3)."""
         free = [index for index, name in enumerate(self.moving) if self.by_name[name].mass is not None]
         places = self.poses[:, free, :3].reshape(-1, 3)
         points = self.contacts[np.any(self.contacts[..., 3:6] != 0.0, axis=-1)][:, :3]
-        found = np.concatenate([places, points])
-        return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size][::10])
+        corners = [_corners(each) for each in self.by_name.values() if each.mass is None and each.sizes]
+        found = np.concatenate([places[::10], points[::10], *corners])
+        return np.asarray(found[np.linalg.norm(found - self.middle, axis=1) < 1.2 * self.size])
 
     def commands(self) -> Iterator[Command]:
         """Yield meshcat's commands for all objects, each at its start."""
@@ -183,3 +185,12 @@ class SceneObjects:
                 ends = np.array([0.0, 0.0, 0.5 * sizes[1]])
                 parts += [(ball(sizes[0]), np.eye(3), end) for end in (-ends, ends)]
         yield from ((*part, colour) for part in parts)
+
+
+def _corners(each: Object) -> Array:
+    """Return the corners of the box around a fixed object, shape (8, 3), m."""
+    radius = each.radius or 0.0
+    round_ends = 0.0 if each.shape == "cylinder" else 2.0 * radius
+    sides = each.sides or (2.0 * radius, 2.0 * radius, (each.length or 0.0) + round_ends)
+    rotation = pin.Quaternion(each.quaternion).toRotationMatrix()
+    return np.asarray(0.5 * np.array(list(product((-1.0, 1.0), repeat=3))) * sides @ rotation.T + each.position)
