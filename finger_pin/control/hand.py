@@ -63,7 +63,7 @@ class HandController(LoopController):
         return tuple(signal for each in self.controllers for signal in each.signals())
 
     def without_memory(self) -> HandController | None:
-        """Return those that remember nothing side by side, if there is one of each."""
+        """Return the controllers that remember nothing, side by side, if there is one of each."""
         own = [each.without_memory() for each in self.controllers]
         known = [each for each in own if each is not None]
         return HandController(known, self.routing) if len(known) == len(own) else None

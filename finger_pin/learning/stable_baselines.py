@@ -70,7 +70,7 @@ class StableBaselinesEnvironment(VecEnv):
         return [found for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Return that no world is wrapped."""
+        """Return False for every world: none is wrapped."""
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[Any] | None]:

@@ -14,7 +14,7 @@ from finger_pin.core.tables import END, FIRST
 
 @Unit
 def measure(address: int, _time: float) -> int:
-    """Fill what rows with paths through space see, and the forces of contacts, after `move`."""
+    """Fill lengths, turns and arms of rows with paths through space, and forces of contacts, after `move`."""
     model = bound_at(address, MODEL)
     measure_paths(model.tables, model.work)
     if model.tables.touching:
