@@ -84,13 +84,14 @@ class CompiledMechanism:
         mechanism, work = self.mechanism, self.models.model().model.work
         width, kept = mechanism.coordinates, 0 if booked_only else count
         return Room(
-            packed=np.zeros((count, mechanism.size)),
-            rates=np.zeros((kept if accelerated else 0, self.charts.size)),
-            rows=np.zeros((len(work.rows), kept, work.rows.shape[1])),
+            packed=np.empty((count, mechanism.size)),
+            rates=np.empty((kept if accelerated else 0, self.charts.size)),
+            rows=np.empty((len(work.rows), kept, work.rows.shape[1])),
             first=0,
-            torques=np.zeros((count, width)),
-            externals=np.zeros((count, width)),
-            booked=np.zeros((count, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
+            torques=np.empty((count, width)),
+            externals=np.empty((count, width)),
+            booked=np.empty((count, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
+            # Of what touches, forces are added up.
             touches=np.zeros((kept, self.tables.touching // CONTACT.arms, 9)),
         )
 

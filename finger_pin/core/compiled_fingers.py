@@ -103,9 +103,12 @@ class CompiledFingers:
         signals = self._first.finger.signals(x, command, fingertip_force, found)
         if not self._differs[:, 0].any():
             return signals
-        own = [each.mechanism.found(self._room, index).rows for index, each in enumerate(self._fingers)]
-        torques = [each.finger.tendon_torque(*given) for each, *given in zip(self._fingers, x, own, strict=True)]
-        return replace(signals, tendon_torque=np.array(torques))
+
+        def pulling() -> Array:
+            own = [each.mechanism.found(self._room, index).rows for index, each in enumerate(self._fingers)]
+            return np.array([each.finger.tendon_torque(*at) for each, *at in zip(self._fingers, x, own, strict=True)])
+
+        return replace(signals, pulling=pulling)
 
     exerted = evaluate
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -219,9 +220,8 @@ class Finger:
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        bodies, pulled = int(self.mechanism.body.model.nv), self.pulled
-        torque = self.tendon_torque(x, found.rows)
-        return FingerSignals.of(found, self.layout.unpack(x), inputs, force, torque, bodies, pulled)
+        bodies, pulling = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, found.rows)
+        return FingerSignals(self.layout.unpack(x), inputs, force, found, bodies, self.pulled, pulling)
 
     @property
     def pulling(self) -> tuple[str, ...]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,36 +13,65 @@ from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.rows import RowSignals, combined
 from finger_pin.mechanism.state import State
 
-_TABLES = ("passive_halves", "driven_tendons", "passive_tendons", "joint_friction", "limiter", "joint_springs")
-
 
 @dataclass(frozen=True, eq=False)
 class TendonForces:
-    """Signals of the tendons; shapes (..., t) unless said otherwise.
+    """Signals of the tendons, joined when they are asked for; shapes (..., t) unless said otherwise.
 
     Attributes:
-        curvature: phi, rad, (15).
-        coefficient: mu^d, (16).
-        velocity: v, m/s; (H_c theta')_i, and p_5' for a passive tendon.
-        friction: f^f, N, (9c).
-        normal: F^n = |f| + |f^a|, N, (14), with f before micro-damping.
-        level: max(F^n M, g_min), N.
-        stiction_rate: F^s', N/s, (9a).
-        entering: f^a, what pulls at the canal's entrance, N; of a passive tendon its proximal half.
+        driven: Signals of the rows of actuated tendons.
+        passive: Those of passive tendons.
         strands: f of (12), shape (..., s), N.
         passive_acceleration: p_5'', shape (..., p), m/s2, (13).
     """
 
-    curvature: Array
-    coefficient: Array
-    velocity: Array
-    friction: Array
-    normal: Array
-    level: Array
-    stiction_rate: Array
-    entering: Array
+    driven: RowSignals
+    passive: RowSignals
     strands: Array
     passive_acceleration: Array
+
+    def _both(self, of: Callable[[RowSignals], Array]) -> Array:
+        return np.concatenate([of(self.driven), of(self.passive)], axis=-1)
+
+    @property
+    def curvature(self) -> Array:
+        """phi, rad, (15)."""
+        return self._both(lambda tendons: tendons.row.curvature)
+
+    @property
+    def coefficient(self) -> Array:
+        """mu^d, (16)."""
+        return self._both(lambda tendons: tendons["coefficient"])
+
+    @property
+    def velocity(self) -> Array:
+        """v, m/s; (H_c theta')_i, and p_5' for a passive tendon."""
+        return self._both(lambda tendons: tendons.row.speed)
+
+    @property
+    def friction(self) -> Array:
+        """f^f, N, (9c)."""
+        return self._both(lambda tendons: tendons["friction"])
+
+    @property
+    def normal(self) -> Array:
+        """F^n = |f| + |f^a|, N, (14), with f before micro-damping."""
+        return self._both(lambda tendons: tendons["normal_force"])
+
+    @property
+    def level(self) -> Array:
+        """max(F^n M, g_min), N."""
+        return self._both(lambda tendons: tendons["level"])
+
+    @property
+    def stiction_rate(self) -> Array:
+        """F^s', N/s, (9a)."""
+        return self._both(lambda tendons: tendons.rate)
+
+    @property
+    def entering(self) -> Array:
+        """f^a, what pulls at the canal's entrance, N; of a passive tendon its proximal half."""
+        return np.concatenate([self.driven.row.command, self.strands[..., self.driven.rows.count :: 2]], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,100 +112,85 @@ class MotorForces:
 
 @dataclass(frozen=True, eq=False)
 class FingerSignals:
-    """The terms of (18) at one state or at many (leading dimensions are kept).
+    """The terms of (18) at one state or at many (leading dimensions are kept), taken apart when they are asked for.
 
     Attributes:
         state: The state, unpacked.
         command: f^a, shape (..., a), N.
         fingertip_force: F, shape (3,) or (..., 3), of several fingers (f, 3) or (..., f, 3), N, base frame.
-        tendons: Tendon forces and friction.
-        joints: Joint reaction and friction.
-        limiter_depth: Signed penetration beyond the range, shape (..., n), rad.
-        limiter_torque: tau^r, shape (..., n), N m.
-        spring_torque: tau^k of the joints' springs, shape (..., n), N m.
-        tendon_torque: H_c2^T f, shape (..., n), N m, (11).
-        external_torque: J^T F, shape (..., n), N m, (6).
-        acceleration: theta'', shape (..., n), rad/s2, (18).
-        rate: Time derivative of the packed state, shape (..., size).
         mechanism: The same of the mechanism, with what every row does.
-        motors: Signals of the motors; None without any.
+        bodies: Number of velocities of the rigid body, before those of passive tendons.
+        pulled: Weights with which further tables pull the strands, by table, as of `Tendons.pulled`.
+        pulling: Returns the torque of the tendons, as `Finger.tendon_torque`.
     """
 
     state: State
     command: Array
     fingertip_force: Array
-    tendons: TendonForces
-    joints: JointForces
-    limiter_depth: Array
-    limiter_torque: Array
-    spring_torque: Array
-    tendon_torque: Array
-    external_torque: Array
-    acceleration: Array
-    rate: Array
     mechanism: Evaluation
-    motors: MotorForces | None = None
+    bodies: int
+    pulled: Mapping[str, Array]
+    pulling: Callable[[], Array]
 
-    @classmethod
-    def of(
-        cls,
-        found: Evaluation,
-        state: State,
-        command: Array,
-        force: Array,
-        torque: Array,
-        bodies: int,
-        pulled: dict[str, Array],
-    ) -> FingerSignals:
-        """Take the rows' signals apart by the paper's names.
-
-        Args:
-            found: Evaluation of the mechanism.
-            state: The state, unpacked.
-            command: f^a, shape (..., a), N.
-            force: F, N.
-            torque: H_c2^T f, shape (..., n), N m.
-            bodies: Number of velocities of the rigid body, before those of passive tendons.
-            pulled: Weights with which further tables pull the strands, by table, as of `Tendons.pulled`.
-        """
-        joints, passive_tendons = torque.shape[-1], state.passive_position.shape[-1]
-        halves, driven, passive, pins, limiter, springs = (found.rows[name] for name in _TABLES)
-        strands, motors = np.concatenate([driven.force, halves.force], axis=-1), None
-        for table, weights in pulled.items():
+    @cached_property
+    def tendons(self) -> TendonForces:
+        """Tendon forces and friction."""
+        found, masses = self.mechanism, self.state.passive_position.shape[-1]
+        driven, passive = found.rows["driven_tendons"], found.rows["passive_tendons"]
+        strands = np.concatenate([driven.force, found.rows["passive_halves"].force], axis=-1)
+        for table, weights in self.pulled.items():
             strands = strands + combined(found.rows[table].force, weights.T)
-        if "motors" in found.rows:
-            motor, gears = (found.rows[name] for name in ("motors", "gearboxes"))
-            motors = MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
+        return TendonForces(driven, passive, strands, found.acceleration[..., self.bodies : self.bodies + masses])
 
-        def both(of: Callable[[RowSignals], Array]) -> Array:
-            return np.concatenate([of(driven), of(passive)], axis=-1)
+    @property
+    def joints(self) -> JointForces:
+        """Joint reaction and friction."""
+        pins = self.mechanism.rows["joint_friction"]
+        return JointForces(pins["normal_force"], pins["friction"], pins["level"], pins.rate)
 
-        return cls(
-            state=state,
-            command=command,
-            fingertip_force=force,
-            tendons=TendonForces(
-                curvature=both(lambda tendons: tendons.row.curvature),
-                coefficient=both(lambda tendons: tendons["coefficient"]),
-                velocity=both(lambda tendons: tendons.row.speed),
-                friction=both(lambda tendons: tendons["friction"]),
-                normal=both(lambda tendons: tendons["normal_force"]),
-                level=both(lambda tendons: tendons["level"]),
-                stiction_rate=both(lambda tendons: tendons.rate),
-                entering=np.concatenate([driven.row.command, strands[..., driven.rows.count :: 2]], axis=-1),
-                strands=strands,
-                passive_acceleration=found.acceleration[..., bodies : bodies + passive_tendons],
-            ),
-            joints=JointForces(
-                reaction=pins["normal_force"], friction=pins["friction"], level=pins["level"], stiction_rate=pins.rate
-            ),
-            limiter_depth=limiter["depth"],
-            limiter_torque=-limiter.force,
-            spring_torque=-combined(springs.force, springs.rows.arm)[..., :joints],
-            tendon_torque=torque,
-            external_torque=found.external[..., :joints],
-            acceleration=found.acceleration[..., :joints],
-            rate=found.rate,
-            mechanism=found,
-            motors=motors,
-        )
+    @property
+    def motors(self) -> MotorForces | None:
+        """Signals of the motors; None without any."""
+        if "motors" not in self.mechanism.rows:
+            return None
+        motor, gears = self.mechanism.rows["motors"], self.mechanism.rows["gearboxes"]
+        return MotorForces(motor["current"], motor["voltage"], motor.force, gears["friction"], gears.row.load)
+
+    @property
+    def limiter_depth(self) -> Array:
+        """Signed penetration beyond the range, shape (..., n), rad."""
+        return self.mechanism.rows["limiter"]["depth"]
+
+    @property
+    def limiter_torque(self) -> Array:
+        """tau^r, shape (..., n), N m."""
+        return -self.mechanism.rows["limiter"].force
+
+    @property
+    def spring_torque(self) -> Array:
+        """tau^k of the joints' springs, shape (..., n), N m."""
+        springs = self.mechanism.rows["joint_springs"]
+        return self._of_joints(-combined(springs.force, springs.rows.arm))
+
+    @cached_property
+    def tendon_torque(self) -> Array:
+        """H_c2^T f, shape (..., n), N m, (11)."""
+        return self.pulling()
+
+    @property
+    def external_torque(self) -> Array:
+        """J^T F, shape (..., n), N m, (6)."""
+        return self._of_joints(self.mechanism.external)
+
+    @property
+    def acceleration(self) -> Array:
+        """theta'', shape (..., n), rad/s2, (18)."""
+        return self._of_joints(self.mechanism.acceleration)
+
+    @property
+    def rate(self) -> Array:
+        """Time derivative of the packed state, shape (..., size)."""
+        return self.mechanism.rate
+
+    def _of_joints(self, values: Array) -> Array:
+        return values[..., : self.state.position.shape[-1]]

@@ -57,7 +57,7 @@ class SampledMotion:
     @cached_property
     def reference(self) -> ReferenceSignals:
         """The reference."""
-        return self.loop.reference.at(self.times)
+        return self.signals.reference if "signals" in vars(self) else self.loop.reference.at(self.times)
 
     @cached_property
     def control(self) -> ControlSignals:
