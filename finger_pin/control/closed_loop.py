@@ -51,6 +51,11 @@ class Dynamics(Protocol):
     ) -> FingerSignals:
         """Return the same, if that is sooner without accelerations."""
 
+    def forces(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return the same, if that is sooner with no more than forces."""
+
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> tuple[Array, Array]:
@@ -203,12 +208,19 @@ class ClosedLoop:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)
 
-    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
-        """Return all signals at one time and state, or at times (m,) and states (m, size); maybe no accelerations."""
+    def evaluate(
+        self, time: Array | float, x: Array, *, accelerated: bool = True, forces_only: bool = False
+    ) -> LoopSignals:
+        """Return all signals at one time and state, or at times (m,) and states (m, size).
+
+        Of those that are not asked for, accelerations or all but forces, there may be none.
+        """
         reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
         evaluate = self.dynamics.evaluate if accelerated else self.dynamics.exerted
+        if forces_only:
+            evaluate = self.dynamics.forces
         return LoopSignals(reference, control, evaluate(x, *acting))
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:

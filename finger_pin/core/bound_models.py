@@ -33,13 +33,15 @@ FEW = 1000
 class Room(NamedTuple):
     """Arrays for the signals of m states, filled by `evaluate_many`, beside packed states, shape (m, size).
 
-    The rows are those of more states, these from the ``first`` on: compiled code takes them whole.
+    The rows are those of more states, these from the ``first`` on: compiled code takes them whole; ``column`` is the
+    first of the table that they have.
     """
 
     packed: Array
     rates: Array
     rows: Array
     first: int
+    column: int
     torques: Array
     externals: Array
     booked: Array
@@ -50,7 +52,7 @@ class Room(NamedTuple):
         first = self.first + at.indices(len(self.packed))[0]
         own = (self.packed, self.rates, self.torques, self.externals, self.booked, self.touches)
         packed, rates, torques, externals, booked, touches = (values[at] for values in own)
-        return Room(packed, rates, self.rows, first, torques, externals, booked, touches)
+        return Room(packed, rates, self.rows, first, self.column, torques, externals, booked, touches)
 
     def states(
         self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
@@ -65,6 +67,7 @@ class Room(NamedTuple):
             rates=own.rates,
             rows=own.rows,
             first=own.first,
+            column=own.column,
             torques=own.torques,
             externals=own.externals,
             booked=own.booked,

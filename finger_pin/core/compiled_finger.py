@@ -70,29 +70,34 @@ class CompiledMechanism:
         base: Array | None = None,
         *,
         accelerated: bool = True,
+        forces_only: bool = False,
     ) -> Evaluation:
         """Return everything at packed states, shape (size,) or (m, size); see `Mechanism.evaluate`.
 
-        Without accelerations, which take most of the time, they and the rate are NaN.
+        Without accelerations, which take most of the time, they and the rate are NaN. Of many states the rows' forces
+        alone take less again.
         """
-        room = self.room(len(np.atleast_2d(x)), accelerated=accelerated)
+        room = self.room(len(np.atleast_2d(x)), accelerated=accelerated, forces_only=forces_only)
         self.fill(room, x, command, force, base)
         return self.found(room, slice(None) if np.ndim(x) > 1 else 0)
 
-    def room(self, count: int, *, booked_only: bool = False, accelerated: bool = True) -> Room:
-        """Return room for the signals of so many states: all, or energies, powers and J^T F only."""
-        mechanism, work = self.mechanism, self.models.model().model.work
-        width, kept = mechanism.coordinates, 0 if booked_only else count
+    def room(
+        self, count: int, *, accelerated: bool = True, booked_only: bool = False, forces_only: bool = False
+    ) -> Room:
+        """Return room for the signals of so many states: all, or energies, powers and J^T F, or the rows' forces."""
+        mechanism, (columns, rows) = self.mechanism, self.models.model().model.work.rows.shape
+        width, kept, booked = mechanism.coordinates, 0 if booked_only else count, 0 if forces_only else count
         return Room(
             packed=np.empty((count, mechanism.size)),
-            rates=np.empty((kept if accelerated else 0, self.charts.size)),
-            rows=np.empty((len(work.rows), kept, work.rows.shape[1])),
+            rates=np.empty((min(kept, booked) if accelerated else 0, self.charts.size)),
+            rows=np.empty((1 if forces_only else columns, kept, rows)),
             first=0,
-            torques=np.empty((count, width)),
-            externals=np.empty((count, width)),
-            booked=np.empty((count, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
+            column=FORCE if forces_only else 0,
+            torques=np.empty((booked, width)),
+            externals=np.empty((booked, width)),
+            booked=np.empty((booked, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
-            touches=np.zeros((kept, self.tables.touching // CONTACT.arms, 9)),
+            touches=np.zeros((min(kept, booked), self.tables.touching // CONTACT.arms, 9)),
         )
 
     def found(self, room: Room, at: slice | int = slice(None)) -> Evaluation:
@@ -113,14 +118,16 @@ class CompiledMechanism:
         found, begin = {}, 0
         for table in mechanism.rows:
             end = begin + table.count
-            own, arms = rows[:, at, begin:end], table.law.arms
+            own, arms, begin = rows[:, at, begin:end], table.law.arms, end
+            if room.column == FORCE:
+                found[table.group] = RowSignals(table, None, own[0], own[0, ..., :0], ())
+                continue
             stateful = np.arange(table.count) % arms > 0 if arms > 1 else slice(None)
             seen = table.law.sees(
                 own[LENGTH], own[SPEED], own[STATE][..., stateful], *(own[c] for c in (LOAD, COMMAND, CURVATURE))
             )
             shown = tuple(own[SIGNALS + i, ..., ::arms] for i in range(len(table.law.signals)))
             found[table.group] = RowSignals(table, seen, own[FORCE], own[RATE][..., stateful], shown)
-            begin = end
         return Evaluation(
             mechanism.energies,
             found,
@@ -146,7 +153,7 @@ class CompiledMechanism:
         mechanism, tables = self.mechanism, self.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
-        room.packed[:] = x
+        room.packed[...] = x
         count, tips = len(room.packed), len(tables.tip_body)
         commands = rows_of(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
@@ -154,7 +161,9 @@ class CompiledMechanism:
         if loaded:
             given = np.asarray(force, dtype=float)
             forces[...] = given[..., None, :] if tips == 1 else given
-        states, attitudes = self.charts.to_core(room.packed)
+        states, attitudes = room.packed, np.zeros((count, 0, 4))
+        if self.charts.quaternions:
+            states, attitudes = self.charts.to_core(states)
         fill(self.models, room, states, attitudes, commands, forces, base)
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
@@ -224,6 +233,13 @@ class CompiledFinger:
         """Return the same with no accelerations, which are NaN."""
         found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False)
         return self.finger.signals(np.asarray(x), np.asarray(command), fingertip_force, found)
+
+    def forces(
+        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
+    ) -> FingerSignals:
+        """Return the same at many states with no more than the forces of rows and what they add up to."""
+        found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False, forces_only=True)
+        return self.finger.signals(x, command, fingertip_force, found)
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

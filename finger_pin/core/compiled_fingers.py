@@ -110,7 +110,7 @@ class CompiledFingers:
 
         return replace(signals, pulling=pulling)
 
-    exerted = evaluate
+    exerted = forces = evaluate
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None

@@ -217,6 +217,8 @@ class Finger:
         """Return the same; an evaluation that is faster without accelerations may leave them out."""
         return self.evaluate(x, inputs, fingertip_force, base)
 
+    forces = exerted
+
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, found: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)

@@ -17,6 +17,20 @@ from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.account import Account, account
 from finger_pin.simulation.energy import Flows, energies, powers
 
+#: Variables that need states, plans and no more of the finger's signals than forces.
+_OF_FORCES = frozenset(
+    {
+        "joint_position",
+        "joint_velocity",
+        "joint_reference",
+        "tracking_error",
+        "joint_torque_command",
+        "joint_torque",
+        "tendon_command",
+        "tendon_tension",
+    }
+)
+
 
 class SampledMotion:
     """A trajectory at times, and all that follows from it, computed when it is first asked for.
@@ -28,6 +42,8 @@ class SampledMotion:
         trajectory: Its solution.
         times: Shape (m,), s, as far as the trajectory goes.
     """
+
+    _forces_only = False
 
     def __init__(
         self, loop: ClosedLoop, trajectory: Trajectory, times: Array, names: Sequence[str] | None = None
@@ -41,6 +57,7 @@ class SampledMotion:
             names: Names of `variables` that will be asked for; by default all.
         """
         self._accelerated = names is None or "joint_acceleration" in names
+        self._forces_only = names is not None and _OF_FORCES.issuperset(names)
         self.loop, self.trajectory = loop, trajectory
         self.times = times[times <= trajectory.breakpoints[-1] * (1.0 + 1e-12)]
 
@@ -67,6 +84,8 @@ class SampledMotion:
     @cached_property
     def signals(self) -> LoopSignals:
         """All signals of the finger."""
+        if self._forces_only:
+            return self.loop.evaluate(self.times, self.packed, forces_only=True)
         return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
 
     @property

@@ -40,9 +40,11 @@ class States(NamedTuple):
         rows: Filled with the table of rows from the first place on, shape (columns, first + m or more, K), or
             (columns, 0, K) if only J^T F, energies and powers are wanted.
         first: Where in it the first state stands.
-        torques: Filled with the sum of A^T phi, shape (m, N).
-        externals: Filled with J^T F, shape (m, N).
-        booked: Filled with energies and powers, shape (m, energies); the last is that of a base that moves.
+        column: The first column of the table that is wanted.
+        torques: Filled with the sum of A^T phi, shape (m, N), or (0, N) if only rows are wanted.
+        externals: Filled with J^T F, likewise.
+        booked: Filled with energies and powers, shape (m, energies) or (0, energies); the last is that of a base that
+            moves.
         bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
             (m, 15 + g), or (0, 15 + g) at rest.
         attitudes: Quaternions of free bodies, shape (m, f, 4).
@@ -57,6 +59,7 @@ class States(NamedTuple):
     rates: Matrix
     rows: Layers
     first: int
+    column: int
     torques: Matrix
     externals: Matrix
     booked: Matrix
@@ -216,13 +219,15 @@ def _keep(many: Any, model: Any, m: int) -> None:
     if rows.shape[1] > 0:
         for c in range(rows.shape[0]):
             for k in range(rows.shape[2]):
-                rows[c, many.first + m, k] = work.rows[c, k]
-        if tables.touching:
-            _touch(tables.paths, work, many.touches[m])
-    for j in range(many.torques.shape[1]):
-        many.torques[m, j] = work.torque[j]
-        many.externals[m, j] = work.external[j]
-    book(tables, work, many.booked[m])
+                rows[c, many.first + m, k] = work.rows[many.column + c, k]
+    if many.touches.shape[0] > 0 and tables.touching:
+        _touch(tables.paths, work, many.touches[m])
+    if many.booked.shape[0] > 0:
+        for j in range(many.torques.shape[1]):
+            many.torques[m, j] = work.torque[j]
+            many.externals[m, j] = work.external[j]
+        book(tables, work, many.booked[m])
+        book_moved(model, many.model, many.bases.shape[0] > 0, many.booked[m])
 
 
 @compiled
@@ -257,7 +262,6 @@ def evaluate_many(address: int, _time: float) -> int:
         _keep(many, model, m)
         if sleepy:
             let_sleep(tables, work, model.state, before)
-        book_moved(model, many.model, many.bases.shape[0] > 0, many.booked[m])
     return 1
 
 
