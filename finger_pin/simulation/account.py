@@ -185,4 +185,6 @@ def _works(power: Callable[[Array], Array], begin: Array, length: Array, times: 
 def _over(power: Callable[[Array], Array], begin: Array, length: Array, nodes: Array) -> Array:
     """Return the powers at nodes of steps, times the steps' lengths, shape (steps, nodes, count)."""
     times = (begin[:, None] + length[:, None] * nodes).ravel()
-    return power(times).reshape(len(begin), len(nodes), -1) * length[:, None, None]
+    found = power(times).reshape(len(begin), len(nodes), -1)
+    found *= length[:, None, None]
+    return found
