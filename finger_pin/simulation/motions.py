@@ -28,6 +28,7 @@ _OF_FORCES = frozenset(
         "joint_torque",
         "tendon_command",
         "tendon_tension",
+        "fingertip_position",
     }
 )
 

@@ -102,6 +102,17 @@ def test_a_run_records_bit_for_bit_what_simulating_the_scenario_read_anew_does(n
         assert run.units(each) == read[each].units
 
 
+@pytest.mark.parametrize("name", ["fig6", "servo_position", "pinch", "hand"])
+def test_what_needs_no_more_than_forces_has_the_bits_of_the_whole_result(name):
+    scenario = fp.load_scenario(name, {"simulation.duration": 0.05})
+    joints = ("position", "velocity", "reference", "torque_command", "torque")
+    record = [f"joint_{each}" for each in joints]
+    record += ["tracking_error", "tendon_command", "tendon_tension", "fingertip_position"]
+    run, whole = fp.prepare(scenario, record=record).run(), fp.simulate(scenario)
+    for each in record:
+        assert np.array_equal(run[each], whole[each].values), each
+
+
 def test_runs_in_several_threads_at_once_give_the_bits_of_one_after_the_other():
     prepared = fp.prepare("stick_slip", ["finger.tendon_friction.coulomb", "simulation.duration"])
     values = [(coulomb, 0.2) for coulomb in np.linspace(0.05, 0.15, 12)]
