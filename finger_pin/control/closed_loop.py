@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -208,19 +209,18 @@ class ClosedLoop:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""
         return max(float(np.diff(self.knots(tolerance)).min(initial=np.inf)), _SHORTEST)
 
-    def evaluate(
-        self, time: Array | float, x: Array, *, accelerated: bool = True, forces_only: bool = False
-    ) -> LoopSignals:
-        """Return all signals at one time and state, or at times (m,) and states (m, size).
+    def evaluate(self, time: Array | float, x: Array, *, accelerated: bool = True) -> LoopSignals:
+        """Return all signals at one time and state, or at times (m,) and states (m, size); maybe no accelerations."""
+        return self._signals(time, x, self.dynamics.evaluate if accelerated else self.dynamics.exerted)
 
-        Of those that are not asked for, accelerations or all but forces, there may be none.
-        """
+    def pulls(self, time: Array, x: Array) -> LoopSignals:
+        """Return the signals at times (m,) and states (m, size), of the finger's maybe no more than forces."""
+        return self._signals(time, x, self.dynamics.forces)
+
+    def _signals(self, time: Array | float, x: Array, evaluate: Callable[..., FingerSignals]) -> LoopSignals:
         reference, control, acting = self._acting(time, x)
         if self.drives is not None:
             control = self.drives.planned(time, reference, control)
-        evaluate = self.dynamics.evaluate if accelerated else self.dynamics.exerted
-        if forces_only:
-            evaluate = self.dynamics.forces
         return LoopSignals(reference, control, evaluate(x, *acting))
 
     def _acting(self, time: Array | float, x: Array) -> tuple[ReferenceSignals, ControlSignals, _Acting]:

@@ -86,7 +86,7 @@ class SampledMotion:
     def signals(self) -> LoopSignals:
         """All signals of the finger."""
         if self._forces_only:
-            return self.loop.evaluate(self.times, self.packed, forces_only=True)
+            return self.loop.pulls(self.times, self.packed)
         return self.loop.evaluate(self.times, self.packed, accelerated=self._accelerated)
 
     @property
