@@ -1,5 +1,7 @@
 """The compiled dynamics against the readable ones: every signal, at states of every kind."""
 
+from functools import cached_property
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -29,12 +31,15 @@ def assert_alike(found, expected, rtol=1e-9, name="signals"):
 
 
 def parts(value):
-    """The parts of something nested, by name or number; a table of rows is one thing."""
+    """The parts of something nested, by name or number, those too that are computed; a table of rows is one thing."""
     if isinstance(value, tuple):
         return dict(enumerate(value))
     if isinstance(value, Rows):
         return {"table": id(value)}
-    return value if isinstance(value, dict) else vars(value)
+    if isinstance(value, dict):
+        return value
+    computed = [name for name, each in vars(type(value)).items() if isinstance(each, property | cached_property)]
+    return vars(value) | {name: getattr(value, name) for name in computed}
 
 
 @pytest.mark.parametrize("name", LOOPS)

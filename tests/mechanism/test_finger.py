@@ -10,6 +10,11 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.exceptions import InputError
 
+TENDON_SIGNALS = (
+    *("curvature", "coefficient", "velocity", "friction", "normal", "level", "stiction_rate", "entering", "strands"),
+    "passive_acceleration",
+)
+
 
 @pytest.fixture(scope="module", params=["fig6", "stick_slip"])
 def case(request):
@@ -88,9 +93,11 @@ def test_evaluation_of_a_batch_is_that_of_each_state(finger):
     for index in range(12):
         single = finger.evaluate(x[index], command[index], force[index])
         close(batch.rate[index], single.rate, "rate")
-        for group in ("tendons", "joints", "state"):
+        for group in ("joints", "state"):
             for name, values in vars(getattr(single, group)).items():
                 close(getattr(getattr(batch, group), name)[index], values, name)
+        for name in TENDON_SIGNALS:
+            close(getattr(batch.tendons, name)[index], getattr(single.tendons, name), name)
         for name in ("limiter_depth", "limiter_torque", "tendon_torque", "external_torque", "acceleration"):
             close(getattr(batch, name)[index], getattr(single, name), name)
 
