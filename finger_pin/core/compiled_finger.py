@@ -153,7 +153,7 @@ class CompiledMechanism:
         mechanism, tables = self.mechanism, self.tables
         # Compiled code checks no sizes.
         mechanism.split(np.asarray(x))
-        room.packed[...] = x
+        room.packed[:] = x
         count, tips = len(room.packed), len(tables.tip_body)
         commands = rows_of(command, (count, mechanism.channels))
         loaded = force is not None and bool(np.any(force))
