@@ -83,6 +83,7 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
     statistics = {f"solver_{key}": value for key, value in asdict(trajectory.statistics).items()}
     return {
         "title": scenario.title or scenario.name,
+        "controller": scenario.controller.kind,
         "frame": BASE_FRAME,
         "method": method,
         "rtol": scenario.simulation.rtol,
@@ -91,6 +92,12 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
         **statistics,
         **_versions(),
     }
+
+
+def is_tracking(result: xr.Dataset) -> bool:
+    """Return whether joints were to follow a reference: none is where tensions are given and the reference rests."""
+    given = result.attrs.get("controller") == "tensions" and "own" not in result.attrs
+    return not given or bool(np.ptp(result["joint_reference"].values, axis=0).any())
 
 
 @cache

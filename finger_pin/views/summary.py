@@ -12,6 +12,7 @@ from finger_pin.description.embedded import described
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import entries
+from finger_pin.simulation.recording import is_tracking
 
 _SETTLING = 1.0
 _LONG = 2.0
@@ -28,7 +29,8 @@ def summarize(result: xr.Dataset) -> str:
     """
     head = [*_head(result), *_own(result), *_warnings(result)]
     tree = described(result.attrs).finger.tree
-    motion = [_tracking(result)] if tree is None else [_joints(result), *_actuators(result)]
+    tracks = tree is None and is_tracking(result)
+    motion = [_tracking(result)] if tracks else [_joints(result), *_actuators(result)]
     pulled = [_tension(result)] if result.sizes["tendon"] else []
     blocks = [
         head,

@@ -42,6 +42,21 @@ def test_the_first_second_of_a_long_run_is_left_out_and_that_is_said(result):
     np.testing.assert_allclose(row(long, "abduction"), [5.0 / np.sqrt(3.0), 4.0], atol=5e-5)
 
 
+def test_a_run_under_given_tensions_tells_errors_only_of_a_reference_that_moves():
+    brief = {"simulation.duration": 0.05}
+    alone = fp.simulate(fp.load_scenario("canal", brief))
+    assert "Tracking error" not in summarize(alone)
+    degrees = alone["joint_position"].sel(joint="drum").values
+    np.testing.assert_allclose(row(alone, "drum"), [degrees.min(), degrees.max()], atol=5e-4)
+    assert [axes.get_title(loc="left") for axes in fp.plot_fig6(alone).axes][:2] == [
+        "(a) joint angles",
+        "(b) joint velocities",
+    ]
+    moving = {"kind": "samples", "times": [0.0, 0.05], "values": [0.0, 0.1]}
+    recorded = fp.simulate(fp.load_scenario("canal", brief | {"reference.joints.drum": moving}))
+    assert "Tracking error" in summarize(recorded)
+
+
 def test_the_summary_tells_least_and_greatest_tensions(result):
     tension = result["tendon_tension"].sel(tendon="T3")
     np.testing.assert_allclose(row(result, "T3"), [tension.min(), tension.max()], atol=5e-4)

@@ -9,16 +9,23 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from finger_pin.simulation.recording import is_tracking
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
 from finger_pin.views.plots.lines import bundle, names, passive_proximal, trace
 from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, Width, styled, thin
 
 _DEGREES = 180.0 / np.pi
+_DELIVERED = ("delivered tendon tensions", "tendon_tension", 1.0, "N")
 _COLUMNS = (
     ("references θᵈ", "joint_reference", _DEGREES, "°"),
     ("tracking errors θᵈ \N{MINUS SIGN} θ", "tracking_error", _DEGREES, "°"),
-    ("delivered tendon tensions", "tendon_tension", 1.0, "N"),
+    _DELIVERED,
+)
+_OPEN_LOOP = (
+    ("joint angles θ", "joint_position", _DEGREES, "°"),
+    ("joint velocities", "joint_velocity", _DEGREES, "°/s"),
+    _DELIVERED,
 )
 
 
@@ -26,9 +33,9 @@ _COLUMNS = (
 def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = None, titles: bool = True) -> Figure:
     """Draw Fig. 6 from a result.
 
-    (a) theta^d, or theta where theta^d is constant, and (b) theta^d - theta, deg. (c) One panel per tendon, N: dashed
-    f_hat, solid f; for a passive tendon f is the tension of its distal half (f5_4), and that of its proximal half
-    (f5_3) is dotted.
+    (a) theta^d, or theta where theta^d is constant, and (b) theta^d - theta, deg; where nothing is followed, theta and
+    its rate. (c) One panel per tendon, N: dashed f_hat, solid f; for a passive tendon f is the tension of its distal
+    half (f5_4), and that of its proximal half (f5_3) is dotted.
 
     Of a hand there is a row for each finger, with references, errors and delivered tensions.
 
@@ -44,16 +51,18 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
     if finger is not None:
         result = finger_of(result, finger)
     elif len(fingers_of(result)) > 1:
-        return plot_by_finger(result, _COLUMNS, width, titles)
+        return plot_by_finger(result, _COLUMNS if is_tracking(result) else _OPEN_LOOP, width, titles)
     tendons = names(result, "tendon")
     height = max(6.6, 1.3 * len(tendons))
     figure, (left, right) = sheet([(5.1, height), (5.9, height)], width, titles)
-    moves = bool(np.ptp(result["joint_reference"].values, axis=0).any())
-    angles = stack(left, ["reference θᵈ (°)" if moves else "angle θ (°)", "error θᵈ \N{MINUS SIGN} θ (°)"])
-    title(angles[0], "(a) references" if moves else "(a) joint angles; the references are constant")
+    moves, tracks = bool(np.ptp(result["joint_reference"].values, axis=0).any()), is_tracking(result)
+    below = "error θᵈ \N{MINUS SIGN} θ (°)" if tracks else "velocity (°/s)"
+    angles = stack(left, ["reference θᵈ (°)" if moves else "angle θ (°)", below])
+    constant = "; the references are constant" if tracks else ""
+    title(angles[0], "(a) references" if moves else f"(a) joint angles{constant}")
     _joints(angles[0], result, "joint_reference" if moves else "joint_position")
-    title(angles[1], "(b) tracking errors")
-    _joints(angles[1], result, "tracking_error")
+    title(angles[1], "(b) tracking errors" if tracks else "(b) joint velocities")
+    _joints(angles[1], result, "tracking_error" if tracks else "joint_velocity")
     legend(left, angles[0].get_lines())
     panels = stack(right, [labelled(name, "N") for name in tendons])
     title(panels[0], "(c) tendon tensions")
