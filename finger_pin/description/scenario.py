@@ -159,8 +159,13 @@ class Scenario(Description):
         def own(table: Mapping[str, _Item]) -> dict[str, _Item]:
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
-        controller = of_finger(self.controller, name)
-        if controller.tensions is not None:
+        controller, given = of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
+        if given is not None and given.tensions is not None:
+            named = {
+                key if key.startswith(f"{name}.") else f"{name}.{key}": each for key, each in given.tensions.items()
+            }
+            controller = controller.updated(tensions=own(self.controller.tensions or {}) | named)
+        elif controller.tensions is not None:
             controller = controller.updated(tensions=own(controller.tensions))
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
@@ -179,11 +184,13 @@ class Scenario(Description):
         """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
+        pulled = dict.fromkeys(key.partition(".")[0] for key in (self.controller.tensions or {}) if self.hand)
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),
             "simulation.initial.position": (initial.position, "joint", joints),
             "simulation.initial.velocity": (initial.velocity, "joint", joints),
             "controller.fingers": (self.controller.fingers or (), "finger", fingers),
+            "controller.tensions": (pulled, "finger", fingers),
             "environment.fingers": (self.environment.fingers or (), "finger", fingers),
         }
         for name, settings in (self.controller.fingers or {}).items():

@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 import finger_pin as fp
 from finger_pin.exceptions import InputError
@@ -98,6 +99,23 @@ def test_settings_of_one_finger_are_its_own_and_the_others_keep_theirs():
     assert changed.reference.joints["index.medial"].amplitude == 0.2
     again = fp.Scenario.model_validate(tomllib.loads(fp.to_toml(changed)))
     assert again == changed
+
+
+@pytest.mark.parametrize("where", ["tensions.index.T3", "fingers.index.tensions.T3", "fingers.index.tensions.index.T3"])
+def test_given_tensions_are_those_of_a_finger_wherever_they_stand(where):
+    # Without another one's, every other tendon is held at its minimum tension.
+    plain = fp.load_scenario("hand")
+    table = tomllib.loads(fp.to_toml(plain))
+    table["controller"] = own = {"kind": "tensions"}
+    for name in where.split("."):
+        own[name] = own = {}
+    own["offset"] = 4.0
+    parts = fp.Scenario.model_validate(table).parts()
+    given = {name: dict(part.controller.tensions or {}) for name, part in parts.items()}
+    assert list(given.pop("index")) == ["index.T3"] and not any(given.values())
+    own["offset"], table["controller"]["tensions"] = 5.0, {"nobody": {"T3": {"offset": 1.0}}}
+    with pytest.raises(ValidationError, match="no such finger; the fingers are thumb"):
+        fp.Scenario.model_validate(table)
 
 
 def test_each_finger_has_a_lambda_of_its_own(scenario, result):
