@@ -26,13 +26,13 @@ from finger_pin.core.jit import (
     bound_at,
     compiled,
     compiled_within,
-    copy_matrix,
+    copy,
 )
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.interpolation import Between, begin_of
 from finger_pin.core.stepping.kink_sides import release
-from finger_pin.core.stepping.radau import curvature, node, relax
+from finger_pin.core.stepping.radau import add, curvature, node, relax
 
 # Entries of the memory.
 STEP, TIME, SPLIT, LENGTH, MEMORY_SIZE = range(5)
@@ -48,6 +48,8 @@ SINGULAR = -1
 class Collocation(NamedTuple):
     """A motion of size n with p numbers, and its at most m intervals to be filled.
 
+    Derivatives stand one number after the other, each in w places, n or a few more, which stay zero: `radau.LANES`.
+
     Attributes:
         model: Address of the bound `Model`.
         changed: Addresses of models with one number changed each, shape (p,); 0 where the rates do not feel it.
@@ -59,28 +61,27 @@ class Collocation(NamedTuple):
         rows: Rows that may bend, shape (r,).
         columns: What changes its sign there, columns of the table of rows, shape (r,).
         held: Whether the row can be held on a side, shape (r,).
-        leaders: Memory, the tension that sets lambda in (22), by controller, shape (l,); w = r + l bends in all.
+        leaders: Memory, the tension that sets lambda in (22), by controller, shape (l,); b = r + l bends in all.
         nodes: `radau.NODES`.
         memory: The step, the time, and how often the step has been cut so far; kept between calls.
-        sides: Memory, on which side of each bend the motion is, shape (w,).
-        before, between, after: Scratch, what changes its sign at each, shape (w,).
-        derivative: S, changed in place, shape (p, n).
-        rate: Memory, its rate, shape (p, n).
-        bend: Memory, the rate of that, as far as it is known, shape (p, n).
-        largest: Memory, the largest S so far, shape (p, n).
-        scale: Sizes of the states, shape (n,).
+        sides: Memory, on which side of each bend the motion is, shape (b,).
+        before, between, after: Scratch, what changes its sign at each, shape (b,).
+        derivative: S, changed in place, shape (p w,).
+        rate: Memory, its rate, shape (p w,).
+        bend: Memory, the rate of that, as far as it is known, shape (p w,).
+        largest: Memory, the largest S so far, shape (p w,).
+        scale: Sizes of the states, and ones, shape (w,).
         allowed: How curved S may be in an interval, of its largest.
         matrix, sweep, back, slope: Of the method, as in `radau`; s nodes.
         state: Scratch, shape (n,).
         right: Scratch, shape (n + 1,).
         part: Scratch, shape (n,).
-        source: Scratch, shape (n,).
-        found: Scratch, shape (p, n).
-        resolvents: Scratch, transposed, shape (s, n, n).
-        given: Scratch, E at the nodes, shape (s, p, n).
-        known, nodal, rates: Scratch, S at the nodes and its rates there, shape (s, p, n).
+        source, found: Scratch, shape (p w,).
+        resolvents: Scratch, transposed, shape (s, w, w).
+        given: Scratch, E at the nodes, shape (s, p w).
+        known, nodal, rates: Scratch, S at the nodes and its rates there, shape (s, p w).
         ends: Filled with the ends of the intervals, shape (m,), s.
-        solution: Filled with S at their begins and nodes, shape ((s + 1) m, p, n).
+        solution: Filled with S at their begins and nodes, shape ((s + 1) m, p w).
     """
 
     model: int
@@ -99,10 +100,10 @@ class Collocation(NamedTuple):
     before: Vector
     between: Vector
     after: Vector
-    derivative: Matrix
-    rate: Matrix
-    bend: Matrix
-    largest: Matrix
+    derivative: Vector
+    rate: Vector
+    bend: Vector
+    largest: Vector
     scale: Vector
     allowed: float
     matrix: Matrix
@@ -113,14 +114,14 @@ class Collocation(NamedTuple):
     right: Vector
     part: Vector
     source: Vector
-    found: Matrix
+    found: Vector
     resolvents: Layers
-    given: Layers
-    known: Layers
-    nodal: Layers
-    rates: Layers
+    given: Matrix
+    known: Matrix
+    nodal: Matrix
+    rates: Matrix
     ends: Vector
-    solution: Layers
+    solution: Matrix
 
 
 COLLOCATION = Kind(Collocation)
@@ -166,7 +167,7 @@ def _jump(col: Any, model: Any, step: int, corner: int) -> None:
     rate_at(col.model, end * (1.0 + 2.0**-51), col.state)
     for c in range(col.state.size):
         for k in range(col.changes.size):
-            col.derivative[k, c] += (col.part[c] - model.rate[c]) * col.shifts[corner, k]
+            col.derivative[k * col.scale.size + c] += (col.part[c] - model.rate[c]) * col.shifts[corner, k]
 
 
 @compiled_within
@@ -177,12 +178,12 @@ def _turn(col: Any, step: int) -> None:
         i = b.charts[f]
         x = b.states[step]
         for k in range(col.changes.size):
-            angles, rates = col.right[:3], col.part[:3]
+            own, angles, rates = col.derivative[k * col.scale.size :], col.right[:3], col.part[:3]
             for r in range(3):
-                angles[r], rates[r] = col.derivative[k, i + r], col.derivative[k, b.width + i + r]
+                angles[r], rates[r] = own[i + r], own[b.width + i + r]
             turn_small(x[i], x[i + 1], x[i + 2], x[b.width + i], x[b.width + i + 1], x[b.width + i + 2], angles, rates)
             for r in range(3):
-                col.derivative[k, i + r], col.derivative[k, b.width + i + r] = angles[r], rates[r]
+                own[i + r], own[b.width + i + r] = angles[r], rates[r]
 
 
 @compiled_within
@@ -219,18 +220,16 @@ def _keep(col: Any, taken: int, begin: float, end: float) -> None:
     """Take an interval that is solved."""
     nodes = col.nodes.size
     first, last = taken * (nodes + 1), nodes - 1
-    copy_matrix(col.derivative, col.solution[first])
+    copy(col.derivative, col.solution[first])
     for a in range(nodes):
-        copy_matrix(col.nodal[a], col.solution[first + 1 + a])
-    copy_matrix(col.nodal[last], col.derivative)
-    copy_matrix(col.rates[last], col.rate)
-    for k in range(col.largest.shape[0]):
-        for c in range(col.largest.shape[1]):
-            value = 0.0
-            for a in range(nodes):
-                value += col.slope[a] * col.rates[a, k, c]
-            col.bend[k, c] = value / (end - begin)
-            col.largest[k, c] = max(col.largest[k, c], abs(col.derivative[k, c]))
+        copy(col.nodal[a], col.solution[first + 1 + a])
+    copy(col.nodal[last], col.derivative)
+    copy(col.rates[last], col.rate)
+    col.bend[:] = 0.0
+    for a in range(nodes):
+        add(col.slope[a] / (end - begin), col.rates[a], col.bend)
+    for i in range(col.largest.size):
+        col.largest[i] = max(col.largest[i], abs(col.derivative[i]))
     col.ends[taken] = end
 
 

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.polynomial import Legendre
 
 from finger_pin.core.evaluation.condensation import solve
-from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within, copy_matrix
+from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within, copy
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import rate_at
 
+#: Numbers that are added at once: of so many, or of a multiple, arrays are quickest.
+LANES = 4
 _COUNT = 4
 #: Nodes c, of a step: zeros of P_s - P_(s-1) on it.
 NODES = np.sort(np.real((Legendre.basis(_COUNT, [0.0, 1.0]) - Legendre.basis(_COUNT - 1, [0.0, 1.0])).roots()))
@@ -49,13 +51,13 @@ _CLOSE, _MOST = 0.02, 12
 @compiled_within
 def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
-    count, size = col.derivative.shape
-    for k in range(count):
+    size, wide = col.state.size, col.scale.size
+    for k in range(col.changes.size):
         if col.changed[k] != 0:
             rate_at(col.changed[k], time, col.state)
             other = bound_at(col.changed[k], MODEL)
             for c in range(size):
-                col.given[a, k, c] = (other.rate[c] - model.rate[c]) / col.changes[k]
+                col.given[a, k * wide + c] = (other.rate[c] - model.rate[c]) / col.changes[k]
     call_at(model.linearise, col.model, time)
     if call_at(model.condense, col.model, 1.0 / (h * col.sweep[a, a])) == 0:
         return False
@@ -69,75 +71,91 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
         col.right[c] = 0.0
     for c in range(size):
         col.right[c] = 1.0
-        solve(model.linear, col.right, resolvent[c])
+        solve(model.linear, col.right, resolvent[c, :size])
         col.right[c] = 0.0
     return True
+
+
+@compiled
+def add(weight: float, source: Any, out: Any) -> None:
+    """Add a multiple of numbers, whose count is one of `LANES`, to others."""
+    for i in range(out.size // LANES * LANES):
+        out[i] += weight * source[i]
+
+
+@compiled
+def _product(source: Any, matrix: Any, out: Any) -> None:
+    """Fill rows of numbers, one after the other, with other such rows times a matrix, all as wide as `LANES` lets."""
+    wide, rows = matrix.shape[0] // LANES * LANES, out.size // matrix.shape[0]
+    # Two rows and four columns at a time, so that the matrix and what is found are read and written less often.
+    for k in range(0, rows - 1, 2):
+        s, t = source[k * wide :], source[(k + 1) * wide :]
+        one, two = out[k * wide :], out[(k + 1) * wide :]
+        for c in range(wide):
+            one[c], two[c] = 0.0, 0.0
+        for j in range(0, wide, LANES):
+            m0, m1, m2, m3 = matrix[j], matrix[j + 1], matrix[j + 2], matrix[j + 3]
+            s0, s1, s2, s3, t0, t1, t2, t3 = s[j], s[j + 1], s[j + 2], s[j + 3], t[j], t[j + 1], t[j + 2], t[j + 3]
+            for c in range(wide):
+                one[c] += s0 * m0[c] + s1 * m1[c] + s2 * m2[c] + s3 * m3[c]
+                two[c] += t0 * m0[c] + t1 * m1[c] + t2 * m2[c] + t3 * m3[c]
+    if rows % 2 == 1:
+        s, one = source[(rows - 1) * wide :], out[(rows - 1) * wide :]
+        for c in range(wide):
+            one[c] = 0.0
+        for j in range(0, wide, LANES):
+            m0, m1, m2, m3 = matrix[j], matrix[j + 1], matrix[j + 2], matrix[j + 3]
+            s0, s1, s2, s3 = s[j], s[j + 1], s[j + 2], s[j + 3]
+            for c in range(wide):
+                one[c] += s0 * m0[c] + s1 * m1[c] + s2 * m2[c] + s3 * m3[c]
 
 
 @compiled_within
 def sweep(col: Any, h: float) -> Any:
     """Improve S and its rates at all nodes in turn; return the correction of S at the last one."""
-    count, size = col.derivative.shape
-    nodes, known, source, off = col.nodes.size, col.known, col.source, 0.0
+    nodes, known, rates, source, off = col.nodes.size, col.known, col.rates, col.source, 0.0
+    size = source.size // LANES * LANES
     for a in range(nodes):
-        for k in range(count):
-            row, first = known[a, k], col.derivative[k]
-            for c in range(size):
-                row[c] = first[c]
-            for b in range(1, nodes):
-                weight, rate = h * (col.matrix[a, b] - col.sweep[a, b]), col.rates[b, k]
-                for c in range(size):
-                    row[c] += weight * rate[c]
+        copy(col.derivative, known[a])
+        for b in range(1, nodes):
+            add(h * (col.matrix[a, b] - col.sweep[a, b]), rates[b], known[a])
     for a in range(nodes):
-        g, resolvent = 1.0 / (h * col.sweep[a, a]), col.resolvents[a]
-        for k in range(count):
-            row, given, found, rate = known[a, k], col.given[a, k], col.found[k], col.rates[a, k]
-            for b in range(a):
-                weight, earlier = h * col.sweep[a, b], col.rates[b, k]
-                for c in range(size):
-                    row[c] += weight * earlier[c]
-            for c in range(size):
-                source[c], found[c] = g * row[c] + given[c], 0.0
-            # Two columns at a time, so that what is found is read and written half as often.
-            for j in range(0, size - 1, 2):
-                one, two, first, second = source[j], source[j + 1], resolvent[j], resolvent[j + 1]
-                for c in range(size):
-                    found[c] += one * first[c] + two * second[c]
-            if size % 2 == 1:
-                for c in range(size):
-                    found[c] += source[size - 1] * resolvent[size - 1, c]
-            for c in range(size):
-                rate[c] = g * (found[c] - row[c])
-        if a == nodes - 1:
-            off = distance(col, col.found, col.nodal[a])
-        copy_matrix(col.found, col.nodal[a])
+        g, row, given, rate = 1.0 / (h * col.sweep[a, a]), known[a], col.given[a], rates[a]
+        for b in range(a):
+            add(h * col.sweep[a, b], rates[b], row)
+        for i in range(size):
+            source[i] = g * row[i] + given[i]
+        found = col.found if a == nodes - 1 else col.nodal[a]
+        _product(source, col.resolvents[a], found)
+        for i in range(size):
+            rate[i] = g * (found[i] - row[i])
+    off = distance(col, col.found, col.nodal[nodes - 1])
+    copy(col.found, col.nodal[nodes - 1])
     return off
 
 
 @compiled
 def distance(col: Any, one: Any, other: Any) -> Any:
     """Return the distance of S from another one, for the worst number: rms over states, each of its largest so far."""
-    count, size = one.shape
-    most = 0.0
-    for k in range(count):
-        total, most_felt, largest = 0.0, 0.0, col.largest[k]
-        for c in range(size):
-            most_felt = max(most_felt, largest[c] / col.scale[c], abs(one[k, c]) / col.scale[c])
-        for c in range(size):
-            felt = max(largest[c], abs(one[k, c]), _UNFELT * most_felt * col.scale[c], 1e-300)
-            total += ((one[k, c] - other[k, c]) / felt) ** 2
+    wide, most = col.scale.size // LANES * LANES, 0.0
+    for k in range(col.changes.size):
+        total, most_felt, at = 0.0, 0.0, k * wide
+        largest, own, off = col.largest[at : at + wide], one[at : at + wide], other[at : at + wide]
+        for c in range(wide):
+            most_felt = max(most_felt, largest[c] / col.scale[c], abs(own[c]) / col.scale[c])
+        for c in range(wide):
+            felt = max(largest[c], abs(own[c]), _UNFELT * most_felt * col.scale[c], 1e-300)
+            total += ((own[c] - off[c]) / felt) ** 2
         most = max(most, total)
-    return np.sqrt(most / size)
+    return np.sqrt(most / col.state.size)
 
 
 @compiled_within
 def relax(col: Any, h: float) -> None:
     """Solve for S at the nodes, from its rate at the begin and that rate's own."""
     for a in range(col.nodes.size):
-        ahead, rates = col.nodes[a] * h, col.rates[a]
-        for k in range(rates.shape[0]):
-            for c in range(rates.shape[1]):
-                rates[k, c] = col.rate[k, c] + ahead * col.bend[k, c]
+        copy(col.rate, col.rates[a])
+        add(col.nodes[a] * h, col.bend, col.rates[a])
     for _ in range(_MOST):
         if sweep(col, h) <= _CLOSE * col.allowed:
             break
@@ -146,10 +164,7 @@ def relax(col: Any, h: float) -> None:
 @compiled_within
 def curvature(col: Any) -> Any:
     """Return the distance of S at the begin from the polynomial through the nodes alone."""
-    for k in range(col.found.shape[0]):
-        for c in range(col.found.shape[1]):
-            value = 0.0
-            for a in range(col.nodes.size):
-                value += col.back[a] * col.nodal[a, k, c]
-            col.found[k, c] = value
+    col.found[:] = 0.0
+    for a in range(col.nodes.size):
+        add(col.back[a], col.nodal[a], col.found)
     return distance(col, col.derivative, col.found)

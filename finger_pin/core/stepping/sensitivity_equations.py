@@ -23,7 +23,7 @@ from finger_pin.core.stepping.collocation import (
 from finger_pin.core.stepping.interpolation import Between
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part
-from finger_pin.core.stepping.radau import BACK, MATRIX, NODES, SLOPE, SWEEP
+from finger_pin.core.stepping.radau import BACK, LANES, MATRIX, NODES, SLOPE, SWEEP
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 from finger_pin.description.routing import Array
 
@@ -99,13 +99,12 @@ def differentiate(
         changes: By how much each number is changed, shape (p,).
         allowed: Relative error of the derivatives, roughly.
     """
-    ends, solutions = [np.zeros(0)], [np.zeros((0, len(NODES) + 1, len(parts) - 1, len(motion.start)))]
     collocation = _collocation(motion, parts, knots, changes, allowed)
+    shape = (-1, len(NODES) + 1, len(changes), len(collocation.scale))
+    ends, solutions = [], []
     while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
         ends.append(collocation.ends[:taken].copy())
-        solutions.append(
-            collocation.solution[: (len(NODES) + 1) * taken].reshape(taken, *solutions[0].shape[1:]).copy()
-        )
+        solutions.append(collocation.solution[: shape[1] * taken].reshape(shape)[..., : len(motion.start)].copy())
         if taken < _ROOM:
             return Derivative(motion, np.concatenate(ends), np.concatenate(solutions))
     return None
@@ -117,6 +116,8 @@ def _collocation(
     """Return the `Collocation` at the start of a motion; arguments as for `differentiate`."""
     own, others = parts[0], parts[1:]
     size, count, nodes = len(motion.start), len(others), len(NODES)
+    wide = -(-size // LANES) * LANES
+    filled = count * wide
     rows, columns, held = _bends(own.tables)
     bends = len(rows) + len(own.control.level)
     corners, shifts = _corners(motion.record.times, knots[0], knots[1:], changes)
@@ -143,11 +144,11 @@ def _collocation(
         before=np.zeros(bends),
         between=np.zeros(bends),
         after=np.zeros(bends),
-        derivative=_start(motion, others, changes, width),
-        rate=np.zeros((count, size)),
-        bend=np.zeros((count, size)),
-        largest=np.zeros((count, size)),
-        scale=own.atol,
+        derivative=np.pad(_start(motion, others, changes, width), ((0, 0), (0, wide - size))).ravel(),
+        rate=np.zeros(filled),
+        bend=np.zeros(filled),
+        largest=np.zeros(filled),
+        scale=np.pad(own.atol, (0, wide - size), constant_values=1.0),
         allowed=allowed,
         matrix=MATRIX,
         sweep=SWEEP,
@@ -156,15 +157,15 @@ def _collocation(
         state=np.zeros(size),
         right=np.zeros(size + 1),
         part=np.zeros(size),
-        source=np.zeros(size),
-        found=np.zeros((count, size)),
-        resolvents=np.zeros((nodes, size, size)),
-        given=np.zeros((nodes, count, size)),
-        known=np.zeros((nodes, count, size)),
-        nodal=np.zeros((nodes, count, size)),
-        rates=np.zeros((nodes, count, size)),
+        source=np.zeros(filled),
+        found=np.zeros(filled),
+        resolvents=np.zeros((nodes, wide, wide)),
+        given=np.zeros((nodes, filled)),
+        known=np.zeros((nodes, filled)),
+        nodal=np.zeros((nodes, filled)),
+        rates=np.zeros((nodes, filled)),
         ends=np.zeros(_ROOM),
-        solution=np.zeros(((nodes + 1) * _ROOM, count, size)),
+        solution=np.zeros(((nodes + 1) * _ROOM, filled)),
     )
 
 
@@ -197,7 +198,7 @@ def _start(motion: IslandMotion, others: Sequence[Part], changes: Array, width: 
             moved, rest = other.attitude[f, :3], other.attitude[f, 3]
             turn = scalar * moved - rest * vector - np.cross(vector, moved)
             found[k, first : first + 3] = 2.0 * np.sign(scalar * rest + vector @ moved) * turn / change
-    return np.ascontiguousarray(found)
+    return found
 
 
 def _bends(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
