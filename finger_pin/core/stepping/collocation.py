@@ -53,6 +53,7 @@ class Collocation(NamedTuple):
     Attributes:
         model: Address of the bound `Model`.
         changed: Addresses of models with one number changed each, shape (p,); 0 where the rates do not feel it.
+        within: Whether it changes laws alone, and so shares the memory of the model without, shape (p,).
         changes: By how much, shape (p,).
         motion: The steps.
         corners: One more than the row of ``shifts`` where inputs bend or jump at the end of a step, else 0, shape
@@ -86,6 +87,7 @@ class Collocation(NamedTuple):
 
     model: int
     changed: Indices
+    within: Indices
     changes: Vector
     motion: Between
     corners: Indices

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.polynomial import Legendre
 
 from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.evaluation.rigid_body import solve_mass
 from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within, copy
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import rate_at
@@ -53,7 +54,7 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     """Fill E and the resolvent at a node that is evaluated; false if it is singular."""
     size, wide = col.state.size, col.scale.size
     for k in range(col.changes.size):
-        if col.changed[k] != 0:
+        if col.changed[k] != 0 and not col.within[k]:
             rate_at(col.changed[k], time, col.state)
             other = bound_at(col.changed[k], MODEL)
             for c in range(size):
@@ -61,19 +62,48 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     call_at(model.linearise, col.model, time)
     if call_at(model.condense, col.model, 1.0 / (h * col.sweep[a, a])) == 0:
         return False
-    resolvent = col.resolvents[a]
+    _transpose(col, model, col.resolvents[a])
+    copy(model.rate, col.part)
+    copy(model.work.torque, col.right)
+    for k in range(col.changes.size):
+        if col.within[k]:
+            _differ(col, model, k, time, col.given[a, k * wide : (k + 1) * wide])
+    return True
+
+
+@compiled_within
+def _differ(col: Any, model: Any, k: int, time: float, out: Any) -> None:
+    """Fill E of a number that changes laws alone, after the evaluation without: bodies and inputs are as they were."""
+    tables, work, width, change = model.tables, model.work, model.work.torque.size, col.changes[k]
+    call_at(model.exert, col.changed[k], time)
+    moved = out[width : 2 * width]
+    for j in range(width):
+        moved[j] = (work.torque[j] - col.right[j]) / change
+    solve_mass(tables, tables.parents.size, work, moved)
+    for j in range(tables.parents.size, width):
+        moved[j] /= tables.lumps[j - tables.parents.size]
+    for j in range(width):
+        if tables.guided[j] >= 0:
+            moved[j] = 0.0
+    for c in range(2 * width, model.rate.size):
+        out[c] = (model.rate[c] - col.part[c]) / change
+
+
+@compiled_within
+def _transpose(col: Any, model: Any, resolvent: Any) -> None:
+    """Fill the resolvent of a condensed system, transposed."""
+    size = col.state.size
     if model.linear.blocks.touches.size == 0:
         for i in range(size):
             for c in range(size):
                 resolvent[c, i] = model.linear.solution[i, c]
-        return True
+        return
     for c in range(size + 1):
         col.right[c] = 0.0
     for c in range(size):
         col.right[c] = 1.0
         solve(model.linear, col.right, resolvent[c, :size])
         col.right[c] = 0.0
-    return True
 
 
 @compiled

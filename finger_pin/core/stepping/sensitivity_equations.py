@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.law_code import SPEED
-from finger_pin.core.jit import call
+from finger_pin.core.jit import alike, bound, call
+from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.collocation import (
     COLLOCATION,
     LENGTH,
@@ -99,7 +98,9 @@ def differentiate(
         changes: By how much each number is changed, shape (p,).
         allowed: Relative error of the derivatives, roughly.
     """
-    collocation = _collocation(motion, parts, knots, changes, allowed)
+    # As long as they are used.
+    changed = [_changed(parts[0], each) for each in parts[1:]]
+    collocation = _collocation(motion, parts, knots, changes, allowed, changed)
     shape = (-1, len(NODES) + 1, len(changes), len(collocation.scale))
     ends, solutions = [], []
     while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
@@ -111,9 +112,14 @@ def differentiate(
 
 
 def _collocation(
-    motion: IslandMotion, parts: Sequence[Part], knots: Sequence[Array], changes: Array, allowed: float
+    motion: IslandMotion,
+    parts: Sequence[Part],
+    knots: Sequence[Array],
+    changes: Array,
+    allowed: float,
+    changed: Sequence[tuple[NDArray[np.uint8] | None, bool]],
 ) -> Collocation:
-    """Return the `Collocation` at the start of a motion; arguments as for `differentiate`."""
+    """Return the `Collocation` at the start of a motion; arguments as for `differentiate`, and `_changed` of each."""
     own, others = parts[0], parts[1:]
     size, count, nodes = len(motion.start), len(others), len(NODES)
     wide = -(-size // LANES) * LANES
@@ -122,14 +128,12 @@ def _collocation(
     bends = len(rows) + len(own.control.level)
     corners, shifts = _corners(motion.record.times, knots[0], knots[1:], changes)
     width = len(own.tables.parents) + len(own.tables.lumps)
-    felt = [not (_alike(own.tables, each.tables) and _alike(own.control, each.control)) for each in others]
     memory = np.zeros(MEMORY_SIZE)
     memory[TIME], memory[LENGTH] = motion.begin, motion.record.times[0] - motion.begin
     return Collocation(
         model=own.model.address,
-        changed=np.array(
-            [each.model.address if f else 0 for each, f in zip(others, felt, strict=True)], dtype=np.int64
-        ),
+        changed=np.array([0 if block is None else block.ctypes.data for block, _ in changed], dtype=np.int64),
+        within=np.array([within for _, within in changed], dtype=np.int64),
         changes=np.array(changes, dtype=float),
         motion=_steps(motion, own, width),
         corners=corners,
@@ -227,8 +231,14 @@ def _corners(ends: Array, knots: Array, others: Sequence[Array], changes: Array)
     return corners, np.ascontiguousarray(np.stack(shifts, axis=1))
 
 
-def _alike(one: Any, other: Any) -> bool:
-    """Return whether two tables have the same numbers."""
-    if hasattr(one, "_fields"):
-        return all(_alike(a, b) for a, b in zip(one, other, strict=True))
-    return bool(np.array_equal(one, other))
+def _changed(own: Part, other: Part) -> tuple[NDArray[np.uint8] | None, bool]:
+    """Return the block of the model with a number changed, if rates feel it, and whether it changes laws alone.
+
+    Then the block has the memory of the model without: what is known of bodies there need not be evaluated again.
+    """
+    laws = own.tables._replace(parameters=other.tables.parameters)
+    if not (alike(laws, other.tables, numbers=True) and alike(own.control, other.control, numbers=True)):
+        return bound(other.model.model, MODEL), False
+    if np.array_equal(own.tables.parameters, other.tables.parameters):
+        return None, False
+    return bound(own.model.model._replace(tables=laws), MODEL), True
