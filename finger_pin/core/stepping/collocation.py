@@ -72,6 +72,7 @@ class Collocation(NamedTuple):
         bend: Memory, the rate of that, as far as it is known, shape (p w,).
         largest: Memory, the largest S so far, shape (p w,).
         scale: Sizes of the states, and ones, shape (w,).
+        weight: Scratch, of each state in what is allowed, shape (p w,).
         allowed: How curved S may be in an interval, of its largest.
         matrix, sweep, back, slope: Of the method, as in `radau`; s nodes.
         state: Scratch, shape (n,).
@@ -107,6 +108,7 @@ class Collocation(NamedTuple):
     bend: Vector
     largest: Vector
     scale: Vector
+    weight: Vector
     allowed: float
     matrix: Matrix
     sweep: Matrix

@@ -15,7 +15,7 @@ from numpy.polynomial import Legendre
 
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.evaluation.rigid_body import solve_mass
-from finger_pin.core.jit import bound_at, call_at, compiled, compiled_within, copy
+from finger_pin.core.jit import bound_at, call_at, compiled, compiled_loosely, compiled_within, copy
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import rate_at
 
@@ -141,9 +141,9 @@ def _product(source: Any, matrix: Any, out: Any) -> None:
 
 
 @compiled_within
-def sweep(col: Any, h: float) -> Any:
-    """Improve S and its rates at all nodes in turn; return the correction of S at the last one."""
-    nodes, known, rates, source, off = col.nodes.size, col.known, col.rates, col.source, 0.0
+def sweep(col: Any, h: float) -> None:
+    """Improve S and its rates at all nodes in turn; S at the last one is ``found``."""
+    nodes, known, rates, source = col.nodes.size, col.known, col.rates, col.source
     size = source.size // LANES * LANES
     for a in range(nodes):
         copy(col.derivative, known[a])
@@ -159,23 +159,30 @@ def sweep(col: Any, h: float) -> Any:
         _product(source, col.resolvents[a], found)
         for i in range(size):
             rate[i] = g * (found[i] - row[i])
-    off = distance(col, col.found, col.nodal[nodes - 1])
-    copy(col.found, col.nodal[nodes - 1])
-    return off
 
 
 @compiled
-def distance(col: Any, one: Any, other: Any) -> Any:
+def _weigh(col: Any) -> None:
+    """Fill the weights of states: one over the largest of each so far and at the end of this interval."""
+    wide, end = col.scale.size, col.found
+    for k in range(col.changes.size):
+        most_felt, at = 0.0, k * wide
+        for c in range(wide):
+            most_felt = max(most_felt, max(col.largest[at + c], abs(end[at + c])) / col.scale[c])
+        for c in range(wide):
+            least = max(_UNFELT * most_felt * col.scale[c], 1e-300)
+            col.weight[at + c] = 1.0 / max(col.largest[at + c], abs(end[at + c]), least)
+
+
+@compiled_loosely
+def _distance(col: Any, one: Any, other: Any) -> Any:
     """Return the distance of S from another one, for the worst number: rms over states, each of its largest so far."""
     wide, most = col.scale.size // LANES * LANES, 0.0
     for k in range(col.changes.size):
-        total, most_felt, at = 0.0, 0.0, k * wide
-        largest, own, off = col.largest[at : at + wide], one[at : at + wide], other[at : at + wide]
-        for c in range(wide):
-            most_felt = max(most_felt, largest[c] / col.scale[c], abs(own[c]) / col.scale[c])
-        for c in range(wide):
-            felt = max(largest[c], abs(own[c]), _UNFELT * most_felt * col.scale[c], 1e-300)
-            total += ((own[c] - off[c]) / felt) ** 2
+        total = 0.0
+        for i in range(k * wide, (k + 1) * wide):
+            off = (one[i] - other[i]) * col.weight[i]
+            total += off * off
         most = max(most, total)
     return np.sqrt(most / col.state.size)
 
@@ -186,8 +193,14 @@ def relax(col: Any, h: float) -> None:
     for a in range(col.nodes.size):
         copy(col.rate, col.rates[a])
         add(col.nodes[a] * h, col.bend, col.rates[a])
-    for _ in range(_MOST):
-        if sweep(col, h) <= _CLOSE * col.allowed:
+    end = col.nodal[col.nodes.size - 1]
+    for trial in range(_MOST):
+        sweep(col, h)
+        if trial == 0:
+            _weigh(col)
+        off = _distance(col, col.found, end)
+        copy(col.found, end)
+        if off <= _CLOSE * col.allowed:
             break
 
 
@@ -197,4 +210,4 @@ def curvature(col: Any) -> Any:
     col.found[:] = 0.0
     for a in range(col.nodes.size):
         add(col.back[a], col.nodal[a], col.found)
-    return distance(col, col.derivative, col.found)
+    return _distance(col, col.derivative, col.found)

@@ -153,6 +153,7 @@ def _collocation(
         bend=np.zeros(filled),
         largest=np.zeros(filled),
         scale=np.pad(own.atol, (0, wide - size), constant_values=1.0),
+        weight=np.zeros(filled),
         allowed=allowed,
         matrix=MATRIX,
         sweep=SWEEP,
