@@ -16,18 +16,7 @@ from typing import Any, NamedTuple
 
 from finger_pin.core.collision.broad_phase import list_awake
 from finger_pin.core.evaluation.attitude_charts import place_bodies, turn_small
-from finger_pin.core.jit import (
-    Indices,
-    Kind,
-    Layers,
-    Matrix,
-    Unit,
-    Vector,
-    bound_at,
-    compiled,
-    compiled_within,
-    copy,
-)
+from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled, compiled_within, copy
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.events import cross, hold_all, last_before, look, rate_at, state_at, turned_after
 from finger_pin.core.stepping.interpolation import Between, begin_of

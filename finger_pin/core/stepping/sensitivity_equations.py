@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from finger_pin.core.evaluation.law_code import SPEED
 from finger_pin.core.jit import alike, bound, call
@@ -26,8 +29,7 @@ from finger_pin.core.stepping.radau import BACK, LANES, MATRIX, NODES, SLOPE, SW
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 from finger_pin.description.routing import Array
 
-# Intervals that are filled at a time.
-_ROOM = 256
+Block: TypeAlias = NDArray[np.uint8]
 # A step that ends at a knot ends so much before it, of the time.
 _BEFORE = 1.0 - 2.0**-53
 # Weights of the values at the begin and the nodes of an interval in powers of the share: the polynomial through them.
@@ -35,27 +37,46 @@ _POLYNOMIAL = np.linalg.inv(np.vander(np.array([0.0, *NODES]), increasing=True))
 
 
 class Derivative:
-    """The motion of an island, and S over time, by p numbers."""
+    """The motion of an island, and S over time, by the numbers that it feels."""
 
-    def __init__(self, motion: IslandMotion, ends: Array, solution: Array) -> None:
-        """Keep the ends of the intervals, shape (m,), s, and S at begin and nodes of each, shape (m, s + 1, p, n)."""
-        self._motion, self._ends, self._solution = motion, ends, solution
+    def __init__(self, motion: IslandMotion, felt: list[int], ends: Array, solution: Array) -> None:
+        """Keep what is known.
+
+        Args:
+            motion: The motion.
+            felt: Which numbers it feels.
+            ends: Ends of the m intervals, s.
+            solution: S at begin and nodes of each, a number after the other, shape ((s + 1) m, f w), w >= n.
+        """
+        self._motion, self._felt, self._ends, self._solution = motion, felt, ends, solution
         self._begins = np.concatenate([[motion.begin], ends[:-1]])
-        self._last: tuple[Array, tuple[Array, Array], NDArray[np.intp], Array] | None = None
+        self._last: tuple[Array, tuple[Array, Array], Array] | None = None
 
-    def at(self, times: Array, k: int) -> tuple[Array, Array, Array]:
-        """Return states and quaternions at times, as the motion does, and S of a number there, shape (t, n).
+    def at(self, times: Array, k: int) -> tuple[Array, Array, Array | float]:
+        """Return states and quaternions at times, as the motion does, and S of a number there, shape (t, n), or 0.
 
-        All numbers ask for the same times in turn: what they share of the latest is remembered.
+        All numbers ask for the same times in turn: the latest are remembered, with S of all.
         """
         last = self._last
         if last is None or not np.array_equal(last[0], times):
-            place = np.clip(np.searchsorted(self._ends, times, side="right"), 0, len(self._ends) - 1)
-            share = (times - self._begins[place]) / (self._ends[place] - self._begins[place])
-            weights = np.vander(np.clip(share, 0.0, 1.0), len(_POLYNOMIAL), increasing=True) @ _POLYNOMIAL
-            self._last = last = times.copy(), self._motion.interpolate(times), place, weights
-        _, (states, attitudes), place, weights = last
-        return states, attitudes, np.einsum("tj,tjn->tn", weights, self._solution[place, :, k])
+            self._last = last = times.copy(), self._motion.interpolate(times), self._slopes(times)
+        _, (states, attitudes), slopes = last
+        if k not in self._felt:
+            return states, attitudes, 0.0
+        return states, attitudes, slopes[:, self._felt.index(k), : states.shape[1]]
+
+    def _slopes(self, times: Array) -> Array:
+        """Return S of all numbers, shape (t, f, w)."""
+        if not self._felt:
+            return np.zeros((len(times), 0, 0))
+        count = len(_POLYNOMIAL)
+        place = np.clip(np.searchsorted(self._ends, times, side="right"), 0, len(self._ends) - 1)
+        share = (times - self._begins[place]) / (self._ends[place] - self._begins[place])
+        weights = np.vander(np.clip(share, 0.0, 1.0), count, increasing=True) @ _POLYNOMIAL
+        which = count * place[:, None] + np.arange(count)
+        shape, starts = (len(times), len(self._solution)), np.arange(0, which.size + 1, count)
+        found = csr_array((weights.ravel(), which.ravel(), starts), shape) @ self._solution
+        return found.reshape(len(times), len(self._felt), -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +119,38 @@ def differentiate(
         changes: By how much each number is changed, shape (p,).
         allowed: Relative error of the derivatives, roughly.
     """
-    # As long as they are used.
-    changed = [_changed(parts[0], each) for each in parts[1:]]
-    collocation = _collocation(motion, parts, knots, changes, allowed, changed)
-    shape = (-1, len(NODES) + 1, len(changes), len(collocation.scale))
+    own = parts[0]
+    changed = [_changed(own, each) for each in parts[1:]]
+    same = [_starts(motion, other) and np.array_equal(at, knots[0]) for other, at in zip(parts, knots, strict=True)]
+    felt = [k for k, (address, _) in enumerate(changed) if address != 0 or not same[1 + k]]
+    if not felt:
+        return Derivative(motion, felt, motion.record.times[-1:], np.zeros((0, 0)))
+    chosen = [0, *(1 + k for k in felt)]
+    given = [parts[k] for k in chosen], [knots[k] for k in chosen], changes[felt], allowed
+    collocation = _collocation(motion, *given, [changed[k] for k in felt])
+    # As a rule there are fewer intervals than steps.
+    room = 2 * len(motion.record.times) + 1
     ends, solutions = [], []
-    while (taken := call(collocate, collocation, COLLOCATION)) != SINGULAR:
-        ends.append(collocation.ends[:taken].copy())
-        solutions.append(collocation.solution[: shape[1] * taken].reshape(shape)[..., : len(motion.start)].copy())
-        if taken < _ROOM:
-            return Derivative(motion, np.concatenate(ends), np.concatenate(solutions))
-    return None
+    while True:
+        ends.append(np.zeros(room))
+        solutions.append(np.zeros(((len(NODES) + 1) * room, len(collocation.derivative))))
+        collocation = collocation._replace(ends=ends[-1], solution=solutions[-1])
+        taken = call(collocate, collocation, COLLOCATION)
+        if taken == SINGULAR:
+            return None
+        if taken < room:
+            ends[-1], solutions[-1] = ends[-1][:taken], solutions[-1][: (len(NODES) + 1) * taken]
+            return Derivative(motion, felt, _joined(ends), _joined(solutions))
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    """Return arrays as one, a single one without a copy."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _starts(motion: IslandMotion, part: Part) -> bool:
+    """Return whether a motion starts as an island does."""
+    return np.array_equal(part.x, motion.start) and np.array_equal(part.attitude, motion.attitude)
 
 
 def _collocation(
@@ -117,9 +159,9 @@ def _collocation(
     knots: Sequence[Array],
     changes: Array,
     allowed: float,
-    changed: Sequence[tuple[NDArray[np.uint8] | None, bool]],
+    changed: Sequence[tuple[int, Block | None]],
 ) -> Collocation:
-    """Return the `Collocation` at the start of a motion; arguments as for `differentiate`, and `_changed` of each."""
+    """Return the `Collocation` at the start of a motion, without room; arguments of `differentiate`, and `_changed`."""
     own, others = parts[0], parts[1:]
     size, count, nodes = len(motion.start), len(others), len(NODES)
     wide = -(-size // LANES) * LANES
@@ -132,8 +174,8 @@ def _collocation(
     memory[TIME], memory[LENGTH] = motion.begin, motion.record.times[0] - motion.begin
     return Collocation(
         model=own.model.address,
-        changed=np.array([0 if block is None else block.ctypes.data for block, _ in changed], dtype=np.int64),
-        within=np.array([within for _, within in changed], dtype=np.int64),
+        changed=np.array([address for address, _ in changed], dtype=np.int64),
+        within=np.array([block is not None for _, block in changed], dtype=np.int64),
         changes=np.array(changes, dtype=float),
         motion=_steps(motion, own, width),
         corners=corners,
@@ -169,8 +211,8 @@ def _collocation(
         known=np.zeros((nodes, filled)),
         nodal=np.zeros((nodes, filled)),
         rates=np.zeros((nodes, filled)),
-        ends=np.zeros(_ROOM),
-        solution=np.zeros(((nodes + 1) * _ROOM, filled)),
+        ends=np.zeros(0),
+        solution=np.zeros((0, filled)),
     )
 
 
@@ -232,14 +274,16 @@ def _corners(ends: Array, knots: Array, others: Sequence[Array], changes: Array)
     return corners, np.ascontiguousarray(np.stack(shifts, axis=1))
 
 
-def _changed(own: Part, other: Part) -> tuple[NDArray[np.uint8] | None, bool]:
-    """Return the block of the model with a number changed, if rates feel it, and whether it changes laws alone.
+def _changed(own: Part, other: Part) -> tuple[int, Block | None]:
+    """Return the address of the model with a number changed, 0 where rates do not feel it, and a block to be kept.
 
-    Then the block has the memory of the model without: what is known of bodies there need not be evaluated again.
+    Of a number that changes laws alone the block is one of the motion's own model but for the laws' parameters: bodies
+    and inputs, once evaluated, need not be again. Of others there is none.
     """
     laws = own.tables._replace(parameters=other.tables.parameters)
     if not (alike(laws, other.tables, numbers=True) and alike(own.control, other.control, numbers=True)):
-        return bound(other.model.model, MODEL), False
+        return other.model.address, None
     if np.array_equal(own.tables.parameters, other.tables.parameters):
-        return None, False
-    return bound(own.model.model._replace(tables=laws), MODEL), True
+        return 0, None
+    block = bound(own.model.model._replace(tables=laws), MODEL)
+    return block.ctypes.data, block
