@@ -162,16 +162,16 @@ def sweep(col: Any, h: float) -> None:
 
 
 @compiled
-def _weigh(col: Any) -> None:
-    """Fill the weights of states: one over the largest of each so far and at the end of this interval."""
-    wide, end = col.scale.size, col.found
+def _weigh(col: Any, now: Any) -> None:
+    """Fill the weights of states: one over the largest of each so far and now."""
+    wide = col.scale.size
     for k in range(col.changes.size):
         most_felt, at = 0.0, k * wide
         for c in range(wide):
-            most_felt = max(most_felt, max(col.largest[at + c], abs(end[at + c])) / col.scale[c])
+            most_felt = max(most_felt, max(col.largest[at + c], abs(now[at + c])) / col.scale[c])
         for c in range(wide):
             least = max(_UNFELT * most_felt * col.scale[c], 1e-300)
-            col.weight[at + c] = 1.0 / max(col.largest[at + c], abs(end[at + c]), least)
+            col.weight[at + c] = 1.0 / max(col.largest[at + c], abs(now[at + c]), least)
 
 
 @compiled_loosely
@@ -197,7 +197,7 @@ def relax(col: Any, h: float) -> None:
     for trial in range(_MOST):
         sweep(col, h)
         if trial == 0:
-            _weigh(col)
+            _weigh(col, col.found)
         off = _distance(col, col.found, end)
         copy(col.found, end)
         if off <= _CLOSE * col.allowed:
@@ -210,4 +210,5 @@ def curvature(col: Any) -> Any:
     col.found[:] = 0.0
     for a in range(col.nodes.size):
         add(col.back[a], col.nodal[a], col.found)
+    _weigh(col, col.derivative)
     return _distance(col, col.derivative, col.found)
