@@ -65,7 +65,8 @@ class Collocation(NamedTuple):
         allowed: How curved S may be in an interval, of its largest.
         matrix, sweep, back, slope: Of the method, as in `radau`; s nodes.
         state: Scratch, shape (n,).
-        right: Scratch, shape (n + 1,).
+        order: Scratch, shape (n,).
+        torque: Scratch, by coordinate.
         part: Scratch, shape (n,).
         source, found: Scratch, shape (p w,).
         resolvents: Scratch, transposed, shape (s, w, w).
@@ -104,7 +105,8 @@ class Collocation(NamedTuple):
     back: Vector
     slope: Vector
     state: Vector
-    right: Vector
+    order: Indices
+    torque: Vector
     part: Vector
     source: Vector
     found: Vector
@@ -171,7 +173,7 @@ def _turn(col: Any, step: int) -> None:
         i = b.charts[f]
         x = b.states[step]
         for k in range(col.changes.size):
-            own, angles, rates = col.derivative[k * col.scale.size :], col.right[:3], col.part[:3]
+            own, angles, rates = col.derivative[k * col.scale.size :], col.state[:3], col.part[:3]
             for r in range(3):
                 angles[r], rates[r] = own[i + r], own[b.width + i + r]
             turn_small(x[i], x[i + 1], x[i + 2], x[b.width + i], x[b.width + i + 1], x[b.width + i + 2], angles, rates)

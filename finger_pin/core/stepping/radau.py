@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Legendre
 
-from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.evaluation.blocks import extent
 from finger_pin.core.evaluation.rigid_body import solve_mass
 from finger_pin.core.jit import bound_at, call_at, compiled, compiled_loosely, compiled_within, copy
 from finger_pin.core.model import MODEL
@@ -62,9 +62,9 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     call_at(model.linearise, col.model, time)
     if call_at(model.condense, col.model, 1.0 / (h * col.sweep[a, a])) == 0:
         return False
-    _transpose(col, model, col.resolvents[a])
+    _transpose(col, model.linear, col.resolvents[a])
     copy(model.rate, col.part)
-    copy(model.work.torque, col.right)
+    copy(model.work.torque, col.torque)
     for k in range(col.changes.size):
         if col.within[k]:
             _differ(col, model, k, time, col.given[a, k * wide : (k + 1) * wide])
@@ -78,7 +78,7 @@ def _differ(col: Any, model: Any, k: int, time: float, out: Any) -> None:
     call_at(model.exert, col.changed[k], time)
     moved = out[width : 2 * width]
     for j in range(width):
-        moved[j] = (work.torque[j] - col.right[j]) / change
+        moved[j] = (work.torque[j] - col.torque[j]) / change
     solve_mass(tables, tables.parents.size, work, moved)
     for j in range(tables.parents.size, width):
         moved[j] /= tables.lumps[j - tables.parents.size]
@@ -90,20 +90,30 @@ def _differ(col: Any, model: Any, k: int, time: float, out: Any) -> None:
 
 
 @compiled_within
-def _transpose(col: Any, model: Any, resolvent: Any) -> None:
+def _transpose(col: Any, linear: Any, resolvent: Any) -> None:
     """Fill the resolvent of a condensed system, transposed."""
-    size = col.state.size
-    if model.linear.blocks.touches.size == 0:
-        for i in range(size):
-            for c in range(size):
-                resolvent[c, i] = model.linear.solution[i, c]
+    blocks, solution, order, whole = linear.blocks, linear.solution, col.order, linear.mass.shape[0]
+    if blocks.touches.size == 0:
+        for i in range(order.size):
+            for c in range(order.size):
+                resolvent[c, i] = solution[i, c]
         return
-    for c in range(size + 1):
-        col.right[c] = 0.0
-    for c in range(size):
-        col.right[c] = 1.0
-        solve(model.linear, col.right, resolvent[c, :size])
-        col.right[c] = 0.0
+    for i in range(order.size):
+        for c in range(order.size):
+            resolvent[c, i] = 0.0
+    for index in range(blocks.awake_count[0]):
+        i = 2 * whole + blocks.awake[index]
+        resolvent[i, i] = linear.loose[blocks.awake[index]]
+    for b in range(blocks.number[0]):
+        width, wide = extent(blocks, b)
+        for c in range(width):
+            order[c] = blocks.coordinates[blocks.coordinate_start[b] + c]
+            order[width + c] = whole + order[c]
+        for c in range(wide - 1 - 2 * width):
+            order[2 * width + c] = 2 * whole + blocks.states[blocks.state_start[b] + c]
+        for i in order[: wide - 1]:
+            for c in range(wide - 1):
+                resolvent[order[c], i] = solution[i, c]
 
 
 @compiled
