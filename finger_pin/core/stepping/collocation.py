@@ -195,7 +195,8 @@ def _interval(col: Any, model: Any, step: int, begin: float, end: float, looks: 
         if turned_after(col, col.after, col.after) < 1.0:
             return col.motion.ends[at]
         at += 1
-    for a in range(col.nodes.size):
+    # The last node first: there most bends show, before anything is spent.
+    for a in range(col.nodes.size - 1, -1, -1):
         time = end if a == col.nodes.size - 1 else begin + col.nodes[a] * h
         if looks:
             look(col, model, step, time, col.after)
