@@ -75,7 +75,7 @@ class Derivative:
         weights = np.vander(np.clip(share, 0.0, 1.0), count, increasing=True) @ _POLYNOMIAL
         which = count * place[:, None] + np.arange(count)
         shape, starts = (len(times), len(self._solution)), np.arange(0, which.size + 1, count)
-        found = csr_array((weights.ravel(), which.ravel(), starts), shape) @ self._solution
+        found: Array = csr_array((weights.ravel(), which.ravel(), starts), shape) @ self._solution
         return found.reshape(len(times), len(self._felt), -1)
 
 
