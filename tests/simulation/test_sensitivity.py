@@ -8,6 +8,12 @@ import finger_pin as fp
 VARIABLES = ("joint_position", "tendon_tension")
 FRICTION = ["finger.tendon_friction.coulomb", "finger.joint_friction.viscous", "simulation.initial.position.medial"]
 POSED = {"simulation.duration": 0.3, "simulation.initial.position.medial": 0.2}
+LED = {
+    "simulation.duration": 0.15,
+    "environment.objects.plate.position": [0.0, 0.0, 0.0296],
+    "environment.objects.plate.path.x": {"kind": "points", "times": [0.0, 0.15], "values": [0.0, 0.01]},
+    "environment.objects.plate.path.z": {"kind": "points", "times": [0.0, 0.15], "values": [0.0, -0.002]},
+}
 TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
 
 
@@ -16,9 +22,18 @@ TIGHT = {"simulation.rtol": 1e-11, "simulation.atol_scale": 1e-11}
     [
         # Until 0.7 s another tension takes the lead in (22), twice.
         ("fig6", POSED | {"simulation.duration": 0.7}, FRICTION, VARIABLES, 1e-3),
-        ("servo", POSED, FRICTION, VARIABLES, 3e-3),
+        # Of the last number the rotors feel the most.
+        ("servo", POSED, [*FRICTION, "finger.actuators.*.motor.friction.viscous"], VARIABLES, 3e-3),
         # A pad that touches a plate, sticks and slips.
         ("press", {"simulation.duration": 2.0}, ["environment.objects.plate.surface.friction"], VARIABLES, 1.5e-2),
+        # A plate that is led along the pad and away from it, whatever it feels.
+        (
+            "press",
+            LED,
+            ["environment.objects.plate.surface.friction", "finger.tendon_friction.coulomb"],
+            VARIABLES,
+            1e-3,
+        ),
         # A free ball between two pads.
         ("pinch", {"simulation.duration": 0.1}, ["environment.objects.ball.mass"], ("object_position",), 1e-2),
     ],
@@ -103,6 +118,23 @@ def test_of_a_hand_whose_controller_is_sampled_every_finger_keeps_steps_of_its_o
     ends = [exact.run([value * (1.0 + way)])["joint_position"] for way in (1e-5, -1e-5)]
     expected = (ends[0] - ends[1]) / (2e-5 * value)
     assert np.sqrt(np.mean((slopes - expected) ** 2)) < 1e-2 * np.sqrt(np.mean(expected**2))
+
+
+def test_each_finger_of_a_hand_feels_numbers_of_its_own_alone():
+    entries = {"simulation.duration": 0.05, "simulation.sample_rate": 200.0}
+    keys = [f"hand.fingers.{name}.finger.tendon_friction.coulomb" for name in ("middle", "thumb")]
+    prepared, exact = (
+        fp.prepare(fp.load_scenario("hand", entries | more), keys, ["joint_position"]) for more in ({}, TIGHT)
+    )
+    values = np.array(prepared.values)
+    run = prepared.run(sensitivities=True)
+    for k, name in enumerate(("middle", "thumb")):
+        change = 1e-5 * values * (np.arange(2) == k)
+        ends = [exact.run(values + way * change)["joint_position"] for way in (1.0, -1.0)]
+        expected, slopes = (ends[0] - ends[1]) / (2.0 * change[k]), run.slopes["joint_position"][k]
+        own = np.array([joint.startswith(name) for joint in run["joint"]])
+        assert np.sqrt(np.mean((slopes - expected) ** 2)) < 1e-3 * np.sqrt(np.mean(expected**2))
+        assert np.any(slopes[:, own] != 0.0) and np.all(slopes[:, ~own] == 0.0)
 
 
 def test_what_has_no_slope_is_refused():
