@@ -67,26 +67,25 @@ def node(col: Any, model: Any, a: int, time: float, h: float) -> Any:
     copy(model.work.torque, col.torque)
     for k in range(col.changes.size):
         if col.within[k]:
-            _differ(col, model, k, time, col.given[a, k * wide : (k + 1) * wide])
+            _differ(col, model, k, time, col.given[a])
     return True
 
 
 @compiled_within
-def _differ(col: Any, model: Any, k: int, time: float, out: Any) -> None:
+def _differ(col: Any, model: Any, k: int, time: float, given: Any) -> None:
     """Fill E of a number that changes laws alone, after the evaluation without: bodies and inputs are as they were."""
-    tables, work, width, change = model.tables, model.work, model.work.torque.size, col.changes[k]
+    tables, work, change, first = model.tables, model.work, col.changes[k], k * col.scale.size
+    size, width, moved = tables.parents.size, work.torque.size, work.acceleration
     call_at(model.exert, col.changed[k], time)
-    moved = out[width : 2 * width]
     for j in range(width):
         moved[j] = (work.torque[j] - col.torque[j]) / change
-    solve_mass(tables, tables.parents.size, work, moved)
-    for j in range(tables.parents.size, width):
-        moved[j] /= tables.lumps[j - tables.parents.size]
+    solve_mass(tables, size, work, moved)
     for j in range(width):
+        given[first + width + j] = moved[j] if j < size else moved[j] / tables.lumps[j - size]
         if tables.guided[j] >= 0:
-            moved[j] = 0.0
+            given[first + width + j] = 0.0
     for c in range(2 * width, model.rate.size):
-        out[c] = (model.rate[c] - col.part[c]) / change
+        given[first + c] = (model.rate[c] - col.part[c]) / change
 
 
 @compiled_within
@@ -111,9 +110,9 @@ def _transpose(col: Any, linear: Any, resolvent: Any) -> None:
             order[width + c] = whole + order[c]
         for c in range(wide - 1 - 2 * width):
             order[2 * width + c] = 2 * whole + blocks.states[blocks.state_start[b] + c]
-        for i in order[: wide - 1]:
+        for i in range(wide - 1):
             for c in range(wide - 1):
-                resolvent[order[c], i] = solution[i, c]
+                resolvent[order[c], order[i]] = solution[order[i], c]
 
 
 @compiled
