@@ -135,6 +135,16 @@ def test_a_hand_is_taken_where_a_finger_is(hand):
     assert fp.analysis.closure_over_range(hand, samples=8).holds
 
 
+def test_of_a_scenario_its_finger_or_hand_is_taken(tmp_path):
+    own = tmp_path / "thick.toml"
+    own.write_text('extends = "fig6"\n[finger]\nbase = "ub"\njoints.distal.link.length = 0.025')
+    assert fp.Finger(own).description == fp.load_finger("ub", {"finger.joints.distal.link.length": 0.025})
+    assert fp.Simulator("hand").finger.description == fp.load_hand("ub_hand")
+    own.write_text('[finger]\nbase = "ub"\njoints.distal.link.lenght = 0.025')
+    with pytest.raises(fp.InputError, match=r"^finger\.joints\.distal\.link\.lenght: unknown key"):
+        fp.Finger(own)
+
+
 def test_a_misspelt_hand_is_told_the_nearest_of_fingers_and_hands():
     with pytest.raises(fp.InputError, match=r"no such finger or hand; .*did you mean ub_hand\?"):
         fp.Hand("ub_hnd")

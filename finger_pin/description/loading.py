@@ -98,13 +98,15 @@ def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> F
 
 
 def describe(finger: DescriptionLike) -> FingerDescription:
-    """Return the description of a finger or a hand that is given in any way.
+    """Return the description of a finger or a hand that is given in any way; of a scenario's name or file, of its own.
 
     Raises:
         InputError: Naming the entry that is wrong.
     """
     if isinstance(finger, str | Path):
         kind, names = kind_of(str(finger)), [*list_fingers(), *list_hands()]
+        if kind == "scenario" and _is_scenario(str(finger)):
+            return load_scenario(finger).finger
         if kind == "scenario" and not is_path(str(finger)):
             allowed = f"no such finger or hand; there are {', '.join(names)}, or the path of a .toml file"
             raise InputError("finger", allowed + suggestion(finger, names), str(finger))
@@ -113,6 +115,15 @@ def describe(finger: DescriptionLike) -> FingerDescription:
         allowed = "must be that of a finger or a hand, as fp.load_finger(name), or the name or path of one"
         raise InputError("description", allowed, type(finger).__name__)
     return finger
+
+
+def _is_scenario(name: str) -> bool:
+    """Return whether there is a scenario of a name or in a file, right or wrong."""
+    try:
+        table, _ = read_scenario_file(name, Path())
+    except InputError:
+        return False
+    return not is_path(name) or not {"extends", "finger", "hand"}.isdisjoint(table)
 
 
 def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None) -> Scenario:
