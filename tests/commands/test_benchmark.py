@@ -155,7 +155,8 @@ def stages():
     joint = {"states": 5, "wall_time": 0.1, "real_time_factor": 20.0, "steps": 9, "time_per_step": 1e-5}
     spent = ("integration", "run", "simulate", *(f"short {each}" for each in ("steps", "run", "changed", "simulate")))
     runs = {"fig6": dict.fromkeys((*spent, "load"), 1e-3)}
-    prepared = {"runs": runs, "simulator": {"step": 7e-5, "error": 1e-3}}
+    simulator = {"times": {"varied slowly": 7e-5}, "errors": {"varied slowly": 9e-4}}
+    prepared = {"runs": runs, "simulator": simulator}
     job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
     return {
         "work-precision": {"fig6": study, "stick_slip": study},
@@ -224,7 +225,8 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["hand over one finger, integration"] is False
     assert verdicts["hand, two threads, integration"] is True
     assert verdicts["prepared run of 10 ms with another number, beside its steps, at most"] is True
-    assert verdicts["a simulator's step of 20 ms at 1e-3 rad"] is False
+    assert verdicts["a simulator's step of 20 ms, tensions varied slowly"] is False
+    assert verdicts["its error, at most"] is True
     assert verdicts["six numbers of fig6 identified from three starts"] is True
     assert verdicts["slopes by 3 numbers, in runs"] is True and verdicts["slopes by 6 numbers, in runs"] is False
     assert verdicts["main job, first run"] is False
