@@ -129,7 +129,7 @@ class Crossing(Description):
     radius: Annotated[float, real(-0.5, 0.5, hint=_MILLIMETRES)] = quantity(
         ..., unit="m", source="(3)", doc="r, signed: positive where tension turns the joint positively."
     )
-    bends: bool = Field(False, strict=True, description="Whether the joint's rotation adds to the curvature (15).")
+    bends: bool = Field(False, strict=True, description="Whether the joint's rotation bends the path (15), which rubs.")
 
 
 class Tendon(Description):
@@ -212,7 +212,7 @@ class FingerDescription(Description):
     name: Name = Field(description="Also the name of the robot in the URDF.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
-        (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="In the base frame."
+        (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="Base frame; in a hand `hand.gravity`."
     )
     joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
     tendons: dict[Name, Tendon] = Field(description="By name; at least one, unless there is a tree.")
