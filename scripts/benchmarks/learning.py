@@ -65,9 +65,13 @@ def _study(count: int) -> dict[str, Any]:
         exact = np.array([_exact(tensions) for tensions in episodes])
         errors = {name: rms(run(episodes[0]) - exact[0]) for name, run in runs.items()}
         errors["one"] = rms(np.array([one(tensions) for tensions in episodes]) - exact)
-        jobs = {name: partial(run, pulls(kind, count)) for name, run in {**runs, "many": many}.items()}
+        jobs: dict[str, Callable[[], Any]] = {
+            name: partial(run, pulls(kind, count)) for name, run in {**runs, "many": many}.items()
+        }
+        jobs["begin"] = partial(alone.reset, seed=0)
         times = {name: took / count for name, took in interleaved(jobs, _ROUNDS).items()}
         times["many"] /= _WORLDS
+        times["alone"] = times["one"] - times.pop("begin")
         found["kinds"][kind] = {"times": times, "errors": errors}
     found["reset"] = {name.removesuffix("-v0"): _reset_time(make()) for name, make in TASKS.items()}
     return found
@@ -128,12 +132,16 @@ def lines(study: Mapping[str, Any]) -> Iterator[str]:
 
     yield f"control steps of {1e3 * _PERIOD:g} ms of Reach: wall time of each, rms error of the angles"
     for kind, found in study["kinds"].items():
-        names = {"one": "one world", "many": f"{study['worlds']} worlds in threads, each"}
+        names = {
+            "one": "one world, with its episodes' begins",
+            "alone": "one world, its steps alone",
+            "many": f"{study['worlds']} worlds in threads, each, with begins",
+        }
         rows = [
             (
                 names.get(name, name),
                 f"{1e6 * took:.0f} us",
-                f"{found['errors'][name]:.1e} rad" if name != "many" else "",
+                f"{found['errors'][name]:.1e} rad" if name in found["errors"] else "",
             )
             for name, took in found["times"].items()
         ]

@@ -187,7 +187,7 @@ def stages():
         },
         "learning": {
             "worlds": 8,
-            "kinds": {"smooth": {"times": {"one": 1e-4, "many": 5e-5}, "errors": {"one": 1e-4}}},
+            "kinds": {"smooth": {"times": {"one": 1.1e-4, "alone": 1e-4, "many": 5e-5}, "errors": {"one": 1e-4}}},
             "reset": {"Reach": 2e-3},
         },
         "prepared": prepared,
