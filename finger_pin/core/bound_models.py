@@ -77,6 +77,7 @@ class Room(NamedTuple):
         )
 
 
+# In the order of the addresses of a `Model`.
 _THROUGH_SPACE = (measure, linearise_paths, fill_contact_gains, add_pushes, look)
 _MOVED = (move_base, bias_rate, base_power)
 
