@@ -237,7 +237,7 @@ class CompiledFinger:
     def forces(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
     ) -> FingerSignals:
-        """Return the same at many states with no more than the forces of rows and what they add up to."""
+        """Return the forces of rows at many states, and their sums; other signals are missing."""
         found = self.mechanism.evaluate(x, command, fingertip_force, base, accelerated=False, forces_only=True)
         return self.finger.signals(x, command, fingertip_force, found)
 

@@ -160,13 +160,11 @@ class Scenario(Description):
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
         controller, given = of_finger(self.controller, name), (self.controller.fingers or {}).get(name)
-        if given is not None and given.tensions is not None:
-            named = {
-                key if key.startswith(f"{name}.") else f"{name}.{key}": each for key, each in given.tensions.items()
-            }
+        if controller.tensions is not None:
+            # In a finger's own table its name may be left out.
+            tensions = (given.tensions if given else None) or {}
+            named = {f"{name}.{key.removeprefix(f'{name}.')}": each for key, each in tensions.items()}
             controller = controller.updated(tensions=own(self.controller.tensions or {}) | named)
-        elif controller.tensions is not None:
-            controller = controller.updated(tensions=own(controller.tensions))
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
             start = {"position": own(initial.position), "velocity": own(initial.velocity)}

@@ -95,7 +95,7 @@ def attributes_of(scenario: Scenario, trajectory: Trajectory, method: str) -> di
 
 
 def is_tracking(result: xr.Dataset) -> bool:
-    """Return whether joints were to follow a reference: none is where tensions are given and the reference rests."""
+    """Return whether joints were to follow a reference; under given tensions only one that moves counts."""
     given = result.attrs.get("controller") == "tensions" and "own" not in result.attrs
     return not given or bool(np.ptp(result["joint_reference"].values, axis=0).any())
 

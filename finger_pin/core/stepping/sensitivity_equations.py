@@ -40,7 +40,7 @@ class Derivative:
     """The motion of an island, and S over time, by the numbers that it feels."""
 
     def __init__(self, motion: IslandMotion, felt: list[int], ends: Array, solution: Array) -> None:
-        """Keep what is known.
+        """Keep a motion, the intervals of its derivatives, and S there.
 
         Args:
             motion: The motion.
