@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import time
 from itertools import pairwise
 
 import gymnasium
@@ -103,6 +104,22 @@ def test_seeds_alone_decide_what_happens(monkeypatch):
         # Three periods last an episode; the step after them begins the next.
         seen.append(alone.step(pull)[0] if len(seen) != 4 else alone.reset()[0])
     np.testing.assert_array_equal(np.array(seen), found[0][:5, 1])
+
+
+def test_steps_have_the_bits_of_each_world_alone_whenever_another_thread_comes_to_help():
+    """It watches for a while, sleeps then, and wakes late."""
+    rng = np.random.default_rng(3)
+    pulls, pauses = rng.uniform(0.5, 5.0, (60, 5, 4)), rng.choice([0.0, 5e-5, 1.5e-4, 2e-4, 1e-3], 60)
+    worlds, alone = VectorEnvironment(5, FIG6, reward=nothing), Environment(FIG6, reward=nothing)
+    worlds.reset(seed=1)
+    seen = []
+    for pull, pause in zip(pulls, pauses, strict=True):
+        seen.append(worlds.step(pull)[0])
+        time.sleep(pause)
+    for index in range(5):
+        alone.reset(seed=1 + index)
+        own = [alone.step(pull[index])[0] for pull in pulls]
+        np.testing.assert_array_equal(np.array(seen)[:, index], own)
 
 
 SHAKEN = {

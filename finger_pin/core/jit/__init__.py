@@ -5,7 +5,18 @@
 the core sees the names below.
 """
 
-from finger_pin.core.jit.calls import call_at, call_filling, call_shape, call_value, copy, copy_matrix, numbers, put
+from finger_pin.core.jit.calls import (
+    add_at,
+    call_at,
+    call_filling,
+    call_shape,
+    call_value,
+    copy,
+    copy_matrix,
+    numbers,
+    put,
+    put_at,
+)
 from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely, compiled_within
 from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
 from finger_pin.core.jit.tables import alike, bound, bound_at, call, copied, fits, indices, numbered, refill, taken
@@ -18,6 +29,7 @@ __all__ = [
     "Matrix",
     "Unit",
     "Vector",
+    "add_at",
     "address_of",
     "alike",
     "bound",
@@ -39,6 +51,7 @@ __all__ = [
     "numbered",
     "numbers",
     "put",
+    "put_at",
     "refill",
     "taken",
 ]

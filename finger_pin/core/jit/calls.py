@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -24,6 +25,24 @@ def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
         return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
 
     return types.int64(types.int64, types.int64, types.float64), generate
+
+
+@_generated
+def add_at(_typing: Any, address: Any, number: Any) -> Any:
+    """Add to the integer at an address that other threads add to as well; return what stood there before."""
+    return types.int64(types.int64, types.int64), partial(_exchange, "add")
+
+
+@_generated
+def put_at(_typing: Any, address: Any, number: Any) -> Any:
+    """Put an integer in the place of one at such an address, which is returned."""
+    return types.int64(types.int64, types.int64), partial(_exchange, "xchg")
+
+
+def _exchange(operation: str, _context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+    # Who sees the new integer sees all that was written before it.
+    place = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
+    return builder.atomic_rmw(operation, place, arguments[1], "acq_rel")
 
 
 @_generated

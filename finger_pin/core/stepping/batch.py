@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finger_pin.core.jit import Indices, Kind, Unit, Vector, bound, bound_at, call_at
+from finger_pin.core.jit import Indices, Kind, Unit, Vector, add_at, bound, bound_at, call_at, compiled, put_at
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.threads import usable_cores
 from finger_pin.description.routing import Array
 
 #: In the place of an end: this one is left alone.
 RESTING = -1.0
-# Pieces for each thread: some steppers take longer than others.
-_PIECES = 4
+# How often a thread that has nothing to do asks whether there is something, before it sleeps: helpers, which take 50 us
+# to wake, for 0.15 ms, and the one that waits for them for 0.1 ms; and then how long, s.
+_WATCH, _PATIENCE, _NAP = 40_000.0, 25_000.0, 1e-4
 
 
 class Batch(NamedTuple):
@@ -30,26 +30,63 @@ class Batch(NamedTuple):
         blocks: Addresses of what they are given, shape (m,).
         ends: Until when, shape (m,), s; `RESTING` for those that are left alone.
         statuses: Filled with what they return, shape (m,).
+        counts: How many are taken up, how many are done, and how many helpers watch, shape (3,).
     """
 
     units: Indices
     blocks: Indices
     ends: Vector
     statuses: Indices
+    counts: Indices
 
 
 BATCH = Kind(Batch)
 
 
 @Unit
-def advance_batch(address: int, _time: float) -> int:
-    """Advance everything in the `Batch` at an address."""
+def open_batch(address: int, helpers: float) -> int:
+    """Let threads take up the steppers of the `Batch` at an address; return how many helpers are to be sent."""
+    taken = bound_at(address, BATCH).counts.ctypes.data
+    put_at(taken + 8, 0)
+    put_at(taken, 0)
+    missing: int = max(int(helpers) - add_at(taken + 16, 0), 0)
+    add_at(taken + 16, missing)
+    return missing
+
+
+@Unit
+def advance_batch(address: int, patience: float) -> int:
+    """Advance what nobody has taken up yet of the `Batch` at an address; return whether all is done then."""
     batch = bound_at(address, BATCH)
-    for i in range(batch.ends.size):
-        batch.statuses[i] = 0
-        if batch.ends[i] >= 0.0:
-            batch.statuses[i] = call_at(batch.units[i], batch.blocks[i], batch.ends[i])
+    done, size = batch.counts.ctypes.data + 8, batch.ends.size
+    _take_up(batch)
+    while patience > 0.0 and add_at(done, 0) < size:
+        patience -= 1.0
+    return int(add_at(done, 0) >= size)
+
+
+@Unit
+def help_batch(address: int, patience: float) -> int:
+    """Advance what nobody has taken up yet, and again whenever the `Batch` at an address is opened soon."""
+    batch = bound_at(address, BATCH)
+    taken, size, asked = batch.counts.ctypes.data, batch.ends.size, 0.0
+    while asked <= patience:
+        asked += 1.0
+        if add_at(taken, 0) < size:
+            _take_up(batch)
+            asked = 0.0
+    add_at(taken + 16, -1)
     return 1
+
+
+@compiled
+def _take_up(batch: Any) -> None:
+    taken = batch.counts.ctypes.data
+    i = add_at(taken, 1)
+    while i < batch.ends.size:
+        batch.statuses[i] = call_at(batch.units[i], batch.blocks[i], batch.ends[i]) if batch.ends[i] >= 0.0 else 0
+        add_at(taken + 8, 1)
+        i = add_at(taken, 1)
 
 
 class Together:
@@ -61,16 +98,18 @@ class Together:
         self._owners = np.repeat(np.arange(len(steppers)), [len(stepper.parts) for stepper in steppers])
         self._first = np.searchsorted(self._owners, np.arange(len(steppers)))
         self._whole = len(parts) == len(steppers)
-        ready = [part.ready() for part in parts]
+        self._ready = [part.ready() for part in parts]
         # What the addresses lead to lives as long as this.
         self._steppers, self._parts = steppers, parts
-        self._pieces: dict[int, tuple[list[NDArray[np.uint8]], list[int]]] = {}
         self._batch = Batch(
-            np.array([unit.address for _, unit in ready], dtype=np.int64),
-            np.array([block for block, _ in ready], dtype=np.int64),
+            np.array([unit.address for _, unit in self._ready], dtype=np.int64),
+            np.array([block for block, _ in self._ready], dtype=np.int64),
             np.zeros(len(parts)),
             np.zeros(len(parts), dtype=np.int64),
+            np.zeros(3, dtype=np.int64),
         )
+        self._block = bound(self._batch, BATCH)
+        self._at, self._patience = int(self._block.ctypes.data), 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
@@ -78,17 +117,22 @@ class Together:
 
     def advance(self, ends: Sequence[float]) -> list[int]:
         """Advance each to a time, s, or not at all if that is `RESTING`; return their statuses, as `advance` does."""
+        if len(self._ready) == 1:
+            block, unit = self._ready[0]
+            return [unit(block, ends[0]) if ends[0] != RESTING else 0]
         batch = self._batch
         batch.ends[:] = ends if self._whole else np.asarray(ends)[self._owners]
-        threads = min(usable_cores(), len(self._parts)) if len(self._parts) > 1 else 1
-        # Whoever is free takes the next piece.
-        pieces = iter(self._bound(threads))
-        others = [_workers().submit(_advance_all, pieces) for _ in range(threads - 1)]
-        _advance_all(pieces)
-        for other in others:
-            other.result()
+        for _ in range(open_batch(self._at, min(usable_cores(), len(self._ready)) - 1)):
+            _workers().submit(self._help, self._patience)
+        # Who is called once has nobody wait for a second time.
+        self._patience = _WATCH
+        while not advance_batch(self._at, _PATIENCE):
+            time.sleep(_NAP)
         found = batch.statuses if self._whole else np.maximum.reduceat(batch.statuses, self._first)
         return list(found.tolist())
+
+    def _help(self, patience: float) -> None:
+        help_batch(self._at, patience)
 
     def read(self, out: Array) -> None:
         """Fill the packed states of all, shape (m, size), contiguous."""
@@ -97,26 +141,6 @@ class Together:
                 row[:] = part.x
         else:
             out[:] = [stepper.x for stepper in self._steppers]
-
-    def _bound(self, threads: int) -> list[int]:
-        """Return the addresses of pieces of the batch, for some threads."""
-        if threads not in self._pieces:
-            count = len(self._parts)
-            pieces = 1 if threads < 2 else min(_PIECES * threads, count)
-            edges = np.linspace(0, count, pieces + 1).astype(int).tolist()
-            parts = [self._part(slice(*each)) for each in pairwise(edges)]
-            blocks = [bound(part, BATCH) for part in parts]
-            self._pieces[threads] = blocks, [int(block.ctypes.data) for block in blocks]
-        return self._pieces[threads][1]
-
-    def _part(self, at: slice) -> Batch:
-        batch = self._batch
-        return Batch(batch.units[at], batch.blocks[at], batch.ends[at], batch.statuses[at])
-
-
-def _advance_all(pieces: Iterator[int]) -> None:
-    for piece in pieces:
-        advance_batch(piece)
 
 
 @cache
