@@ -171,7 +171,7 @@ def advance(address: int, end: float) -> int:
         status = _hopeless(integration, model.linear.mass.shape[0])
         if status != at.DONE:
             return status
-        if stretch.times.size > 0 and stretch.taken[0] == stretch.times.size:
+        if stretch.times.size > 0 and stretch.taken[0] == stretch.taken[1]:
             memory[at.HELD_STEP] = -memory[at.HELD_STEP]
             return at.FULL
         time, h = memory[at.TIME], memory[at.STEP]

@@ -100,7 +100,7 @@ def advance_driven(address: int, end: float) -> int:
             _sample(drives, integration.x, model.control.tension)
         if memory[TIME] >= end:
             return DONE
-        if stretch.taken[0] == times.size and times.size > 0:
+        if stretch.taken[0] == stretch.taken[1] and times.size > 0:
             return FULL
         status: int = call_at(driven.advance, driven.stretch, min(end, drives.taken[0] * drives.period))
         if status != DONE:

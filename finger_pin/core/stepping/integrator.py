@@ -12,7 +12,7 @@ import numpy as np
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.companion_motion import Companion
 from finger_pin.core.stepping.island_motion import IslandMotion
-from finger_pin.core.stepping.island_stepper import Part, Record, failure
+from finger_pin.core.stepping.island_stepper import Part, failure
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.stepping.textbook import Statistics, Stop, Trajectory, Watch
 from finger_pin.core.threads import in_threads
@@ -20,6 +20,8 @@ from finger_pin.description.routing import Array
 
 # The steps of a trajectory are kept in memory; this much of it, in bytes, holds millions of steps.
 _MOST_BYTES = 2e9
+# Room for so many of an island's to begin with; what is not used of it takes no memory.
+_ROOM = 8192
 
 # Slices of a simulation of several islands, between which it can be watched.
 _SLICES = 200
@@ -50,8 +52,7 @@ class _Recorder:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
-        self.kept = [part.room(0)]
-        self.room = part.room(chunk)
+        self.room, self._chunk = part.room(_ROOM), chunk
         self.taken = 0
         self.companion = Companion(part) if judged else None
         self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
@@ -60,9 +61,9 @@ class _Recorder:
         """Go to a time, or until some chunks are full; return the status."""
         part = self.part
         while chunks != 0:
-            status, steps = part.advance(end, self.room)
-            self.kept.append(self.room.first(steps))
-            self.taken += steps
+            if self.taken == len(self.room.times):
+                self.room = self.room.doubled()
+            status, self.taken = part.advance(end, self.room, slice(self.taken, self.taken + self._chunk))
             if self.companion is not None:
                 self.companion.look()
             chunks -= 1
@@ -82,8 +83,7 @@ class _Recorder:
 
     def steps(self) -> IslandMotion:
         """Return the steps that were taken."""
-        joined = {name: np.concatenate([getattr(record, name) for record in self.kept]) for name in vars(self.kept[0])}
-        return IslandMotion(self._stepper.mechanism, self.part, *self.start, Record(**joined))
+        return IslandMotion(self._stepper.mechanism, self.part, *self.start, self.room.first(self.taken))
 
 
 def integrate_compiled(

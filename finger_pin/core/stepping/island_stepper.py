@@ -53,11 +53,15 @@ class Record:
     @classmethod
     def of(cls, count: int, size: int, free: int, rows: int) -> Record:
         """Make room."""
-        return cls(np.zeros(count), np.zeros((count, size)), np.zeros((count, free, 4)), np.zeros((count, rows, size)))
+        return cls(np.empty(count), np.empty((count, size)), np.empty((count, free, 4)), np.empty((count, rows, size)))
 
     def first(self, count: int) -> Record:
-        """Return a copy of the first steps."""
-        return Record(*(part[:count].copy() for part in vars(self).values()))
+        """Return the first steps; no copy."""
+        return Record(*(part[:count] for part in vars(self).values()))
+
+    def doubled(self) -> Record:
+        """Return a copy with room for twice as many."""
+        return Record(*(np.concatenate([part, np.empty_like(part)]) for part in vars(self).values()))
 
 
 class Part:
@@ -129,7 +133,7 @@ class Part:
         place_all(tables, attitude)
         self.tables, self.control, self.tableau, self.judged = tables, control, tableau, judged
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, memory
-        self._nothing, self._taken = self.room(0), np.zeros(1, dtype=np.int64)
+        self._nothing, self._taken = self.room(0), np.zeros(2, dtype=np.int64)
         # What compiled code was given last: a record, loops and knots; and the blocks that hold them, what they are
         # for last.
         self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
@@ -156,15 +160,16 @@ class Part:
         """Time reached, s."""
         return float(self.memory[core.TIME])
 
-    def advance(self, end: float, record: Record | None = None) -> tuple[int, int]:
-        """Integrate to a time, or until a record is full; return the status and the number of recorded steps."""
-        block, unit = self.ready(record)
+    def advance(self, end: float, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, int]:
+        """Integrate to a time, or until rows of a record are full; return the status and the row after the last one."""
+        block, unit = self.ready(record, rows)
         return unit(block, end), int(self._taken[0])
 
-    def ready(self, record: Record | None = None) -> tuple[int, Unit]:
+    def ready(self, record: Record | None = None, rows: slice = slice(None)) -> tuple[int, Unit]:
         """Return the address of the `Stretch` to be advanced, and the unit that does it; into a record if given."""
-        self._taken[0] = 0
-        self._place(self._nothing if record is None else record)
+        own = self._nothing if record is None else record
+        self._taken[:] = rows.indices(len(own.times))[:2]
+        self._place(own)
         return self._at, self._advance
 
     def _place(self, record: Record) -> None:

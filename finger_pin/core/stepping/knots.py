@@ -52,5 +52,5 @@ def advance_knotted(address: int, end: float) -> int:
         if status != DONE:
             return status
         memory[TIME] = knot
-        if stretch.taken[0] == stretch.times.size and stretch.times.size > 0 and knot < end:
+        if stretch.taken[0] == stretch.taken[1] and stretch.times.size > 0 and knot < end:
             return FULL

@@ -87,7 +87,7 @@ class Stretch(NamedTuple):
         states: States there, with the angles of free bodies since the step's start, shape (m, size).
         attitudes: Quaternions of the free bodies there, shape (m, f, 4).
         dense: Interpolants of the steps, shape (m, rows of the tableau's dense, size).
-        taken: Number of steps recorded so far, shape (1,).
+        taken: Number of steps recorded so far, and that at which to stop, shape (2,).
     """
 
     integration: int
