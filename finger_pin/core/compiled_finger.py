@@ -105,7 +105,7 @@ class CompiledMechanism:
         mechanism, rates, rows = self.mechanism, room.rates, room.rows[:, room.first :][:, : len(room.packed)]
         width, joints = mechanism.coordinates, mechanism.body.model.nv
         if not len(rates):
-            rates = np.full((len(room.packed), mechanism.size), np.nan)
+            rates = np.broadcast_to(np.nan, room.packed.shape)
         acceleration, rate = rates[:, width : 2 * width], rates
         if mechanism.positions != width and len(room.rates):
             acceleration, (q, v, _) = acceleration.copy(), mechanism.split(room.packed)
