@@ -6,16 +6,34 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from math import ceil, inf
+from pathlib import Path
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
 _Found = TypeVar("_Found")
 
 
+# In a container of Linux: time that all its processes may use, and in which time, us.
+_CPU_MAX = Path("/sys/fs/cgroup/cpu.max")
+
+
 def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
+    """Return the number of cores that this process may use; of a container with less time than its cores, as many."""
     # Only Linux binds processes to cores.
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, ceil(min(bound, _share())))
+
+
+@cache
+def _share() -> float:
+    """Return the cores that a container's time is worth; infinite where it is not limited."""
+    try:
+        time, period = _CPU_MAX.read_text().split()
+        return float(time) / float(period)
+    except (OSError, ValueError, ZeroDivisionError):
+        return inf
 
 
 def threads() -> int:

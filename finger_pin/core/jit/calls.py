@@ -30,18 +30,26 @@ def call_at(_typing: Any, function: Any, address: Any, number: Any) -> Any:
 @_generated
 def add_at(_typing: Any, address: Any, number: Any) -> Any:
     """Add to the integer at an address that other threads add to as well; return what stood there before."""
-    return types.int64(types.int64, types.int64), partial(_exchange, "add")
+    return types.int64(types.int64, types.int64), partial(_shared, "add")
 
 
 @_generated
 def put_at(_typing: Any, address: Any, number: Any) -> Any:
     """Put an integer in the place of one at such an address, which is returned."""
-    return types.int64(types.int64, types.int64), partial(_exchange, "xchg")
+    return types.int64(types.int64, types.int64), partial(_shared, "xchg")
 
 
-def _exchange(operation: str, _context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-    # Who sees the new integer sees all that was written before it.
+@_generated
+def look_at(_typing: Any, address: Any) -> Any:
+    """Return the integer at such an address."""
+    return types.int64(types.int64), partial(_shared, "")
+
+
+def _shared(operation: str, _context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+    # Who sees a new integer sees all that was written before it.
     place = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
+    if not operation:
+        return builder.load_atomic(place, "acquire", 8)
     return builder.atomic_rmw(operation, place, arguments[1], "acq_rel")
 
 

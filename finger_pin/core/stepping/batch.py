@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger_pin.core.jit import Indices, Kind, Unit, Vector, add_at, bound, bound_at, call_at, compiled, put_at
+from finger_pin.core.jit import Indices, Kind, Unit, Vector, add_at, bound, bound_at, call_at, compiled, look_at, put_at
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.threads import usable_cores
 from finger_pin.description.routing import Array
@@ -19,7 +19,7 @@ from finger_pin.description.routing import Array
 RESTING = -1.0
 # How often a thread that has nothing to do asks whether there is something, before it sleeps: helpers, which take 50 us
 # to wake, for 0.15 ms, and the one that waits for them for 0.1 ms; and then how long, s.
-_WATCH, _PATIENCE, _NAP = 40_000.0, 25_000.0, 1e-4
+_WATCH, _PATIENCE, _NAP = 300_000.0, 50_000.0, 1e-4
 
 
 class Batch(NamedTuple):
@@ -49,7 +49,7 @@ def open_batch(address: int, helpers: float) -> int:
     taken = bound_at(address, BATCH).counts.ctypes.data
     put_at(taken + 8, 0)
     put_at(taken, 0)
-    missing: int = max(int(helpers) - add_at(taken + 16, 0), 0)
+    missing: int = max(int(helpers) - look_at(taken + 16), 0)
     add_at(taken + 16, missing)
     return missing
 
@@ -60,9 +60,9 @@ def advance_batch(address: int, patience: float) -> int:
     batch = bound_at(address, BATCH)
     done, size = batch.counts.ctypes.data + 8, batch.ends.size
     _take_up(batch)
-    while patience > 0.0 and add_at(done, 0) < size:
+    while patience > 0.0 and look_at(done) < size:
         patience -= 1.0
-    return int(add_at(done, 0) >= size)
+    return int(look_at(done) >= size)
 
 
 @Unit
@@ -72,7 +72,7 @@ def help_batch(address: int, patience: float) -> int:
     taken, size, asked = batch.counts.ctypes.data, batch.ends.size, 0.0
     while asked <= patience:
         asked += 1.0
-        if add_at(taken, 0) < size:
+        if look_at(taken) < size:
             _take_up(batch)
             asked = 0.0
     add_at(taken + 16, -1)
