@@ -92,7 +92,7 @@ class BoundModel:
 
     def __init__(self, tables: Tables, control: Control, work: Work, moved: bool = False) -> None:
         """Bind; arrays are taken as they are, not copied. The base may be ``moved`` by others than its control."""
-        size = 2 * len(work.torque) + int(tables.state.max(initial=-1)) + 1
+        size = 2 * len(work.torque) + len(tables.state_row)
         moved = moved or len(control.palm.harmonics) > 0
         through_space = len(tables.paths.columns) > 0
         units = [unit.address for unit in (evaluate, exert, linearise, condense)]

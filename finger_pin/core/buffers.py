@@ -74,9 +74,7 @@ class Work(NamedTuple):
 
 def build_work(tables: Tables, laws: Sequence[Law | ContactLaw], channels: int) -> Work:
     """Allocate the memory for tables whose rows follow some laws."""
-    size, count = len(tables.parents), len(tables.state)
-    width = size + len(tables.lumps)
-    tips = len(tables.tip_body)
+    size, count, width, tips = len(tables.parents), len(tables.state), len(tables.guided), len(tables.tip_body)
     columns, powers = widest(laws)
     work = Work(
         rotation=np.zeros((size, 3, 3)),
@@ -165,8 +163,7 @@ class Blocks(NamedTuple):
 
 def build_blocks(tables: Tables, control: Control) -> Blocks:
     """Return the blocks of tables while nothing touches."""
-    count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
-    states = int(tables.state.max(initial=-1)) + 1
+    count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
     atom, row_atom, atoms = np.zeros(width, dtype=np.int64), np.zeros(count, dtype=np.int64), 1
     if tables.touching:
         islands = find_islands(tables, control, touching=False)
@@ -259,8 +256,7 @@ class Linear(NamedTuple):
 
 def build_linear(tables: Tables, control: Control) -> Linear:
     """Allocate the linearisation of tables."""
-    count, width = len(tables.state), len(tables.parents) + len(tables.lumps)
-    states = int(tables.state.max(initial=-1)) + 1
+    count, width, states = len(tables.state), len(tables.guided), len(tables.state_row)
     wide = 2 * width + states + 1
     linear = Linear(
         mass=np.zeros((width, width)),

@@ -40,7 +40,7 @@ def test_states_that_are_off_by_small_angles_and_rates_differ_by_them():
     part.advance(1e-3)
     rng = np.random.default_rng(0)
     other, off = part.copy(), np.zeros_like(part.x)
-    width = len(part.tables.parents) + len(part.tables.lumps)
+    width = len(part.tables.guided)
     places = np.concatenate([part.objects, width + part.objects])
     off[places] = 1e-6 * rng.normal(size=len(places))
     x, attitude = part.x.copy(), part.attitude.copy()
@@ -61,7 +61,7 @@ def test_an_error_of_more_than_a_tenth_of_a_metre_is_that_of_another_motion(fast
     scenario = impact_scenario("drops", 0)
     part = next(each for each in Setup.of(scenario).stepper(scenario.simulation).parts if len(each.objects))
     part.advance(1e-3)
-    width, height = len(part.tables.parents) + len(part.tables.lumps), part.objects[2]
+    width, height = len(part.tables.guided), part.objects[2]
     part.drift[height], part.drift[width + height] = 0.04, faster
     companion = Companion(part)
     for _ in range(128):

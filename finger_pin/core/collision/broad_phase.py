@@ -178,3 +178,41 @@ def settle(tables: Any, rows: Any, own: Any, states: Any) -> bool:
             changed = True
             set_asleep(k, 1, own.asleep)
     return changed
+
+
+@compiled
+def rouse(tables: Any, work: Any) -> None:
+    """Wake all contacts, of which nothing is known."""
+    for k in range(tables.touching):
+        work.paths.asleep[k] = 0
+    for e in range(work.paths.path.size):
+        work.paths.path[e] = 0.0
+    list_awake(tables, work.paths)
+
+
+@compiled
+def wake_since(tables: Any, work: Any, first: Any, second: Any, before: Any, after: Any) -> None:
+    """Wake the contacts that may have closed since a state, from its quaternions and numbers and from those of now."""
+    for f in range(tables.charts.size):
+        # What a free body has turned by: its angles count from its attitude.
+        cosine = 0.0
+        for r in range(4):
+            cosine += first[f, r] * second[f, r]
+        before[tables.charts[f]] = after[tables.charts[f]] - 2.0 * np.arccos(min(abs(cosine), 1.0))
+    glide(before, after, tables.parents.size, work.paths)
+    wake(tables, work.paths)
+    width = work.torque.size
+    for k in range(tables.touching):
+        # Bent bristles tell of a contact that was closed meanwhile.
+        if tables.state[k] >= 0 and after[2 * width + tables.state[k]] != 0.0:
+            set_asleep(k - k % 3, 0, work.paths.asleep)
+    list_awake(tables, work.paths)
+
+
+@compiled
+def let_sleep(tables: Any, work: Any, state: Any, before: Any) -> None:
+    """Let contacts that are far apart at a state sleep, and keep it, for `wake_since`."""
+    arrive(tables, work.paths)
+    settle(tables, work.rows, work.paths, state[2 * work.torque.size :])
+    for c in range(state.size):
+        before[c] = state[c]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from finger_pin.core.collision.broad_phase import list_awake
+from finger_pin.core.collision.broad_phase import rouse
 from finger_pin.core.evaluation.attitude_charts import place_bodies, turn_small
 from finger_pin.core.jit import Indices, Kind, Layers, Matrix, Unit, Vector, bound_at, compiled, compiled_within, copy
 from finger_pin.core.model import MODEL
@@ -137,13 +137,8 @@ def _place(col: Any, step: int) -> None:
 def _awake(address: int) -> None:
     """Wake all contacts of a model, and release all rows from the sides of an earlier integration."""
     model = bound_at(address, MODEL)
-    paths = model.work.paths
     release(model.tables, model.work.rows)
-    for k in range(paths.asleep.size):
-        paths.asleep[k] = 0
-    for e in range(paths.path.size):
-        paths.path[e] = 0.0
-    list_awake(model.tables, paths)
+    rouse(model.tables, model.work)
 
 
 @compiled_within

@@ -112,7 +112,7 @@ def difference(part: Part, moment: Moment, other: Part) -> Array:
     either body's frame, become rates of these angles.
     """
     found: Array = other.x - moment.x
-    width = len(part.tables.parents) + len(part.tables.lumps)
+    width = len(part.tables.guided)
     for i, turn in zip(part.tables.charts, _turns(moment.attitude, other.attitude), strict=True):
         x, y = moment.x[width + i : width + i + 2]
         found[i : i + 3] = turn

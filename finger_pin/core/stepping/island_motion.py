@@ -66,7 +66,7 @@ class IslandMotion:
             attitudes=record.attitudes,
             dense=record.dense,
             charts=tables.charts,
-            width=len(tables.parents) + len(tables.lumps),
+            width=len(tables.guided),
             before=np.zeros_like(self.start),
             times=times,
             found=np.empty((kept, len(self.start))),

@@ -96,7 +96,7 @@ def _reads(control: Control) -> NDArray[np.bool_]:
 
 def select(tables: Tables, island: Island) -> Tables:
     """Return the tables of an island."""
-    rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.parents) + len(tables.lumps)
+    rows, paths, size, width = island.rows, tables.paths, len(tables.parents), len(tables.guided)
     bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
     present, groups = _groups(tables, rows)
     part = Subset()

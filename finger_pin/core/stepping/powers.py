@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from finger_pin.core.collision.broad_phase import let_sleep, rouse, wake_since
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.inputs import inputs
-from finger_pin.core.evaluation.signals import book, book_moved, exert_alone, let_sleep, rouse, wake_since
+from finger_pin.core.evaluation.signals import book, book_moved, exert_alone
 from finger_pin.core.jit import Kind, Matrix, Unit, Vector, bound_at, call_at, compiled, compiled_within
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.interpolation import Between, step_at, within

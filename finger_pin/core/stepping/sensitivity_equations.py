@@ -169,7 +169,7 @@ def _collocation(
     rows, columns, held = _bends(own.tables)
     bends = len(rows) + len(own.control.level)
     corners, shifts = _corners(motion.record.times, knots[0], knots[1:], changes)
-    width = len(own.tables.parents) + len(own.tables.lumps)
+    width = len(own.tables.guided)
     memory = np.zeros(MEMORY_SIZE)
     memory[TIME], memory[LENGTH] = motion.begin, motion.record.times[0] - motion.begin
     return Collocation(
