@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import xarray as xr
@@ -287,12 +288,28 @@ def step_many(
     for name, given in (("tensions", tensions), ("fingertip_forces", forces)):
         if len(given) != count:
             raise InputError(name, f"must be {count}, one per simulator", len(given))
+    if not count:
+        return []
     if len({id(each) for each in simulators}) < count:
         raise InputError("simulators", "must differ: one stands there twice; use clone")
     acting = [one._checked(inputs, dt, own) for one, inputs, own in zip(simulators, tensions, forces, strict=True)]
     for simulator, (command, force) in zip(simulators, acting, strict=True):
         simulator._hold(command, force)
-    statuses = Together([each._stepper for each in simulators]).advance([each.time + dt for each in simulators])
+    statuses = _together(simulators).advance([each.time + dt for each in simulators])
     for simulator in simulators:
         simulator._log.add(simulator._stepper.time, simulator._tension, simulator._force)
     return [simulator._reached(status) for simulator, status in zip(simulators, statuses, strict=True)]
+
+
+# By the first of the simulators that were stepped together: as a rule they are again.
+_TOGETHER: WeakKeyDictionary[Simulator, Together] = WeakKeyDictionary()
+
+
+def _together(simulators: Sequence[Simulator]) -> Together:
+    """Return what steps simulators side by side."""
+    steppers = [each._stepper for each in simulators]
+    found = _TOGETHER.get(simulators[0])
+    if found is None or not found.serves(steppers):
+        found = Together(steppers)
+        _TOGETHER[simulators[0]] = found
+    return found

@@ -238,11 +238,16 @@ def test_many_simulators_step_together_bit_by_bit_as_one_by_one(simulator: Simul
     rng = np.random.default_rng(2)
     together = [simulator.clone() for _ in range(5)]
     alone = [each.clone() for each in together]
-    for _ in range(4):
-        tensions = rng.uniform(0.0, 5.0, (5, 4))
-        states = fp.step_many(together, tensions, 0.01)
-        for one, tension, state in zip(alone, tensions, states, strict=True):
-            assert np.array_equal(one.finger.layout.pack(one.step(tension, 0.01)), one.finger.layout.pack(state))
+    for turn in range(6):
+        tensions, forces = rng.uniform(0.0, 5.0, (5, 4)), [None] * 5
+        if turn == 2:
+            forces[1] = [0.0, 0.0, 0.3]
+        for each in (together[2], alone[2]) if turn == 3 else ():
+            each.set_parameters({"finger.tendon_friction.coulomb": 0.2})
+        states = fp.step_many(together, tensions, 0.01, forces)
+        for one, tension, force, state in zip(alone, tensions, forces, states, strict=True):
+            assert np.array_equal(one.finger.layout.pack(one.step(tension, 0.01, force)), one.finger.layout.pack(state))
+    assert fp.step_many([], [], 0.01) == []
     assert together[3].result().equals(alone[3].result())
     with pytest.raises(fp.InputError, match="stands there twice"):
         fp.step_many([simulator, simulator], np.ones((2, 4)), 0.01)

@@ -115,6 +115,10 @@ class Together:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
         return Together, (self._steppers,)
 
+    def serves(self, steppers: Sequence[Stepper]) -> bool:
+        """Return whether these are its steppers, with islands, loops and knots as they were."""
+        return [part.ready() for stepper in steppers for part in stepper.parts] == self._ready
+
     def advance(self, ends: Sequence[float]) -> list[int]:
         """Advance each to a time, s, or not at all if that is `RESTING`; return their statuses, as `advance` does."""
         if len(self._ready) == 1:
