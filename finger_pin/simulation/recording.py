@@ -48,8 +48,10 @@ def recorded(motions: SampledMotion, names: Sequence[str] | None = None, entry: 
         del table[SHORTFALL]
     chosen = table if names is None else {name: table[name] for name in names}
     # A motion at the edge of what numbers hold has energies beyond it: that is told apart from this.
+    # And a few variables are no reason to keep what they are views of.
+    kept = np.asarray if names is None else np.array
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return {name: (each.dims, np.asarray(each.value(motions)), each.attributes) for name, each in chosen.items()}
+        return {name: (each.dims, kept(each.value(motions)), each.attributes) for name, each in chosen.items()}
 
 
 def refuse_unknown(entry: str, names: Iterable[str], known: Iterable[str]) -> None:

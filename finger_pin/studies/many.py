@@ -180,19 +180,21 @@ def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost], texts
         first = next(iter(having.values()))
         dims = tuple(map(str, first.dims))
         sizes = [len(labels[dim]) if dim in labels else first.sizes[dim] for dim in dims[1:]]
-        values = np.full((len(runs), len(times), *sizes), np.nan)
+        missing = [row for row in found if row not in having]
+        values = np.empty((len(runs), len(times), *sizes))
+        values[[row for row in range(len(runs)) if row not in having]] = np.nan
         for row, variable in having.items():
             own, count = {dim: variable[dim].values.tolist() for dim in dims[1:] if dim in labels}, len(variable)
             if all(labels[dim] == given for dim, given in own.items()):
-                values[row, :count] = variable.values
+                values[row, :count], values[row, count:] = variable.values, np.nan
                 continue
+            values[row] = np.nan
             places = [
                 [labels[dim].index(label) for label in own[dim]] if dim in own else range(size)
                 for dim, size in zip(dims[1:], sizes, strict=True)
             ]
             values[np.ix_([row], range(count), *places)] = variable.values
         attributes = dict(first.attrs)
-        missing = [row for row in found if row not in having]
         if missing:
             attributes["comment"] = f"NaN in runs that have none: {', '.join(map(str, missing))}"
         stacked[name] = (("run", *dims), values, attributes)
