@@ -14,6 +14,7 @@ from finger_pin.description.routing import Array
 G = 9.81
 #: Touches that are not as deep, m, and misses that are as near, are left out: they are within the tolerances.
 DEPTH = 1e-7
+_FASTEST = 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,9 @@ def _surface(rng: np.random.Generator) -> dict[str, float]:
 
 
 def _velocity(rng: np.random.Generator) -> Array:
-    return np.asarray(rng.normal(size=3) * 10 ** rng.uniform(-1.5, 1))
+    found = np.asarray(rng.normal(size=3) * 10 ** rng.uniform(-1.5, 1))
+    # So that nothing starts further away than objects may.
+    return found * min(1.0, _FASTEST / float(np.linalg.norm(found)))
 
 
 def ball_and_plate(rng: np.random.Generator) -> Flight:

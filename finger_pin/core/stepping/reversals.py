@@ -3,6 +3,9 @@
 The rate of bristles bends where the sign of their speed changes. Frictions are held on the side of their speed at the
 start of a step. From where the speed turns on, that misleads the rate in proportion to the speed there, and the
 interpolant of a step tells where that is. What is misled by more than the tolerance is not taken.
+
+Friction above what it can bear, as when a tendon goes slack while its mass rings, runs away: the faster it slides, the
+less it holds. Steps too long for that hold it instead, and misled a little each, it grows with what pulls.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED
+from finger_pin.core.evaluation.law_code import RATE, SIDE, SPEED, STATE
 from finger_pin.core.jit import call_value, compiled, compiled_within
 from finger_pin.core.tables import END, FIRST, KINK
 
@@ -20,6 +23,9 @@ from finger_pin.core.tables import END, FIRST, KINK
 _MOST, _LEAST, _WANTED = 0.18, 0.018, 0.08
 # The speed is looked at so often in a step, and so many ends of a step are tried.
 _LOOKS, _TRIALS = 8, 8
+# Bristles bent by so many times what they can bear bend no further, but for so much of their tolerance; what that is at
+# no less than so slow a speed, m/s.
+_BEYOND, _BENT, _SLOW = 2.0, 0.1, 1e-9
 
 
 @compiled
@@ -107,3 +113,38 @@ def _more(tables: Any, rows: Any, g: int, k: int, speed: float) -> Any:
         call_value(tables.laws[g, 0], rows, tables.parameters, k, k + 1)
         more += weight * rows[RATE, k]
     return more
+
+
+@compiled_within
+def overloaded(integration: Any, model: Any) -> Any:
+    """Return whether bristles have bent further in a step although they were bent far beyond what they can bear.
+
+    No motion does that: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level). But implicit methods damp what grows, too.
+    """
+    tables, x, state, width = model.tables, integration.x, model.state, model.linear.mass.shape[0]
+    for g in range(tables.groups.shape[0]):
+        if tables.groups[g, KINK] == SPEED:
+            for k in range(tables.groups[g, FIRST], tables.groups[g, END]):
+                c = 2 * width + tables.state[k]
+                more = abs(state[c]) - abs(x[c])
+                if more > _BENT * (integration.atol[c] + integration.rtol * abs(state[c])) and x[c] * state[c] > 0.0:
+                    if _burden(model, g, k, np.sign(x[c])) > _BEYOND:
+                        return True
+    return False
+
+
+@compiled
+def _burden(model: Any, g: int, k: int, way: float) -> Any:
+    """Return by how much a row's bristles are bent, of what they can bear at its speed, if it slides on that way."""
+    rows, parameters, law = model.work.rows, model.tables.parameters, model.tables.laws[g, 0]
+    side, speed, bent = rows[SIDE, k], rows[SPEED, k], rows[STATE, k]
+    rows[SIDE, k], rows[SPEED, k] = way, way * max(abs(speed), _SLOW)
+    call_value(law, rows, parameters, k, k + 1)
+    rate = rows[RATE, k]
+    rows[STATE, k] = 0.0
+    call_value(law, rows, parameters, k, k + 1)
+    # sigma_0 v and sigma_0 v (1 - |F^s| / level).
+    burden = 1.0 - rate / rows[RATE, k]
+    rows[SIDE, k], rows[SPEED, k], rows[STATE, k] = side, speed, bent
+    call_value(law, rows, parameters, k, k + 1)
+    return burden

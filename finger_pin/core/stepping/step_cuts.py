@@ -12,10 +12,10 @@ from finger_pin.core.model import MODEL
 from finger_pin.core.stepping import rosenbrock as at
 from finger_pin.core.stepping.interpolation import cut, interpolant
 from finger_pin.core.stepping.kink_sides import crossing, passed, past_kink, price, strayed
-from finger_pin.core.stepping.reversals import before_reversal
+from finger_pin.core.stepping.reversals import before_reversal, overloaded
 
-# What a step that is cut at a kink keeps of its length at least and at most.
-_SHORTEST, _LONGEST = 0.1, 0.9
+# What a step that is cut at a kink keeps of its length at least and at most, and one that holds what runs away.
+_SHORTEST, _LONGEST, _SHORTENED = 0.1, 0.9, 0.25
 
 
 @Unit
@@ -30,6 +30,8 @@ def cut_step(address: int, h: float) -> int:
         if before < share:
             memory[at.AFTER], share = np.inf, 1.0
         part *= before
+        if overloaded(integration, model) and part * h > 1e-12 * max(1.0, abs(memory[at.TIME])):
+            kept = _SHORTENED * part
     memory[at.PART], memory[at.KEPT], memory[at.SHARE] = part, kept, share
     return 1
 
