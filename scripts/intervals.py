@@ -5,6 +5,7 @@ the same canal on a drum with a spring, integrated by scipy: bristles of the ten
 noise of which neighbours err alike. Both are written out here.
 """
 
+import argparse
 import sys
 from collections.abc import Callable
 
@@ -109,9 +110,14 @@ KINDS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the share of intervals that hold the truth, by parameter."""
-    given = sys.argv[1:] if arguments is None else arguments
-    for kind in given[1:] or KINDS:
-        found = held(int(given[0]), *KINDS[kind])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", type=int, help="data sets of each kind")
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)}; by default all")
+    given = parser.parse_args(arguments)
+    if wrong := set(given.kinds) - set(KINDS):
+        parser.error(f"KIND: {', '.join(wrong)}: must be one of {', '.join(KINDS)}")
+    for kind in given.kinds or KINDS:
+        found = held(given.count, *KINDS[kind])
         for key, share in zip(KINDS[kind][2], found.mean(axis=0), strict=True):
             print(f"{kind} {key}: {share:.1%} of {len(found)}")
     return 0

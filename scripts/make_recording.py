@@ -1,7 +1,9 @@
 """Writes the recordings of benches that are made up; the numbers that they hide stand in the benches."""
 
+import argparse
 import csv
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -121,8 +123,12 @@ MADE = {"to_and_fro": to_and_fro, "weights": weights, "winding": winding, "press
 
 def main(arguments: list[str] | None = None) -> int:
     """Write the CSV file that is named, the recording of the bench that has its name."""
-    (path,) = sys.argv[1:] if arguments is None else arguments
-    found = MADE[path.replace("\\", "/").rpartition("/")[2].removesuffix(".csv")]()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path, help=f"{', '.join(MADE)}, with .csv")
+    path = parser.parse_args(arguments).file
+    if path.stem not in MADE or path.suffix != ".csv":
+        parser.error(f"FILE: {path}: must be one of {', '.join(MADE)}, with .csv")
+    found = MADE[path.stem]()
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(found)

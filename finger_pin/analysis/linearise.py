@@ -57,7 +57,7 @@ def linearise(
     Args:
         finger_or_scenario: The finger or its description; or a scenario with one (and objects), its name, or the path
             of its file.
-        state: Packed state x, shape (n,), as of `Finger.rest_state`.
+        state: Packed state x, shape (n,), the state by name, or angles of rest, rad.
         inputs: u, shape (m,): tensions of the actuated tendons, N; of a motor in position drive its voltage, V.
         dt: Without it f is differentiated; with it, s, the map x -> x(dt) with the inputs held.
         parameters: Dotted keys of numbers of the scenario.
@@ -84,7 +84,7 @@ def linearise(
         raise InputError("dt", "must be above 0", dt)
     if parameters and scenario is None:
         raise InputError("parameters", "are those of a scenario: give one in place of the finger", list(parameters))
-    x = finite_vector("state", np.asarray(state, dtype=float), finger.layout.size)
+    x = finger.packed(state, "state")
     u = finite_vector("inputs", np.asarray(inputs, dtype=float), finger.mechanism.channels)
     change = _rate if dt is None else _over(finger, x, u, dt)
     maps: tuple[_Map, _Map] = (change, _outputs)

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
@@ -25,7 +26,7 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Routes
 from finger_pin.mechanism.rows import Rows, RowSignals
-from finger_pin.mechanism.state import Layout
+from finger_pin.mechanism.state import Layout, State
 from finger_pin.mechanism.surroundings import Surroundings, same_but_for_path
 from finger_pin.mechanism.tree import build_tree, tree_rows
 
@@ -196,6 +197,24 @@ class Finger:
             assert state.object_pose is not None and state.object_velocity is not None
             state.object_pose[:], state.object_velocity[:] = self.surroundings.start()
         return x
+
+    def packed(self, state: State | ArrayLike, name: str) -> Array:
+        """Return a packed state, shape (size,), from one, from the state by name, or from theta, shape (n,), of rest.
+
+        Raises:
+            InputError: If it has another size, or a number is not finite; ``name`` names the argument.
+        """
+        given = self.layout.pack(state) if isinstance(state, State) else state
+        try:
+            found = np.array(given, dtype=float)
+        except (TypeError, ValueError):
+            found = np.array(np.nan)
+        joints, size = len(self.routing.joints), self.layout.size
+        if found.shape not in ((joints,), (size,)) or not np.isfinite(found).all():
+            told = found.tolist() if found.ndim else type(state).__name__
+            allowed = f"must be {size} finite numbers, a packed state, or {joints}, angles of rest"
+            raise InputError(name, allowed, told)
+        return found if found.shape == (size,) else self.rest_state(found)
 
     def evaluate(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None
