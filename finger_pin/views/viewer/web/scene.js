@@ -299,7 +299,9 @@ class FingerScene {
       }));
     }
     places.forEach((place) => {
-      const [x, y] = [place.x - 6, place.y].map((value) => value.toFixed(1));
+      // A long name at the edge of a narrow window is read over the finger rather than cut off.
+      const left = place.x > 0 ? place.label.offsetWidth + 4 : -Infinity;
+      const [x, y] = [Math.max(place.x - 6, left), place.y].map((value) => value.toFixed(1));
       place.label.style.transform = `translate(${x}px, ${y}px) translate(-100%, -50%)`;
     });
   }
