@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from math import ceil, inf
 from pathlib import Path
@@ -49,5 +49,30 @@ def in_threads(task: Callable[[_Item], _Found], items: Sequence[_Item]) -> list[
     workers = min(len(items), threads())
     if workers < 2:
         return [task(item) for item in items]
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(task, items))
+    found: dict[int, _Found] = {}
+    # Whoever is free takes the next one.
+    left = iter(range(len(items)))
+
+    def work() -> None:
+        for index in left:
+            found[index] = task(items[index])
+
+    others = [pool().submit(work) for _ in range(workers - 1)]
+    try:
+        work()
+    finally:
+        wait(others)
+    for other in others:
+        other.result()
+    return [found[index] for index in range(len(items))]
+
+
+@cache
+def pool() -> ThreadPoolExecutor:
+    """Return threads that stay: to start them takes longer than many a task."""
+    return ThreadPoolExecutor(usable_cores(), "finger_pin")
+
+
+if hasattr(os, "register_at_fork"):
+    # A process that is forked has none of them.
+    os.register_at_fork(after_in_child=pool.cache_clear)

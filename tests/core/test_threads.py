@@ -1,6 +1,8 @@
 """Cores that threads may use, as the system tells them."""
 
+import multiprocessing
 import os
+import threading
 
 import pytest
 
@@ -22,3 +24,37 @@ def test_a_container_with_less_time_than_cores_uses_as_many_as_its_time_is_worth
         assert threads.usable_cores() == cores
     finally:
         threads._share.cache_clear()
+
+
+@pytest.fixture
+def two_cores(monkeypatch):
+    monkeypatch.setattr(threads, "usable_cores", lambda: 2)
+    threads.pool.cache_clear()
+    yield
+    threads.pool.cache_clear()
+
+
+def test_tasks_go_on_side_by_side_and_return_in_order(two_cores):
+    """Two that wait for each other end only if both are under way."""
+    both = threading.Barrier(2, timeout=10.0)
+
+    def task(number):
+        if number < 2:
+            both.wait()
+        return number**2
+
+    assert threads.in_threads(task, range(40)) == [number**2 for number in range(40)]
+    with pytest.raises(ZeroDivisionError):
+        threads.in_threads(lambda number: 1 // (number - 30), range(40))
+
+
+def _squares(count):
+    return threads.in_threads(lambda number: number**2, range(count))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(two_cores):
+    assert _squares(3) == [0, 1, 4]
+    with multiprocessing.get_context("fork").Pool(1) as processes:
+        assert processes.apply_async(_squares, (5,)).get(timeout=20.0) == [0, 1, 4, 9, 16]

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from finger_pin.core.jit import Indices, Kind, Unit, Vector, add_at, bound, bound_at, call_at, compiled, look_at, put_at
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.threads import usable_cores
+from finger_pin.core.threads import pool, usable_cores
 from finger_pin.description.routing import Array
 
 #: In the place of an end: this one is left alone.
@@ -127,7 +125,7 @@ class Together:
         batch = self._batch
         batch.ends[:] = ends if self._whole else np.asarray(ends)[self._owners]
         for _ in range(open_batch(self._at, min(usable_cores(), len(self._ready)) - 1)):
-            _workers().submit(self._help, self._patience)
+            pool().submit(self._help, self._patience)
         # Who is called once has nobody wait for a second time.
         self._patience = _WATCH
         while not advance_batch(self._at, _PATIENCE):
@@ -145,9 +143,3 @@ class Together:
                 row[:] = part.x
         else:
             out[:] = [stepper.x for stepper in self._steppers]
-
-
-@cache
-def _workers() -> ThreadPoolExecutor:
-    """Return threads that stay: to start them takes longer than many a step."""
-    return ThreadPoolExecutor(usable_cores(), "finger_pin")
