@@ -25,6 +25,7 @@ FAMILIES = {
     "mujoco": "mujoco_motion",
     "lugre": "lugre",
     "closed-forms": "closed_forms",
+    "servo": "servo",
     "methods": "methods",
     "order": "order",
     "symmetry": "symmetry",

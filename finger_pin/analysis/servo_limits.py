@@ -1,9 +1,8 @@
 """Limits of motors and gears in slow motion: the share of a command that arrives, and the largest tension.
 
-A gearbox at the edge of sliding carries N = |x r f - tau| and takes c + m N of the motor's torque tau, with c = c0 + c1
-and m = m0 + m1. It pulls while tau - r f >= c + m N, and lets go from r f - tau >= c + m N on. With the two signs that
-the content of N may have, each is two lines, of which the one with less tension counts while pulling, and the other one
-while letting go. For large tensions, where c does not count, r f is a share of tau.
+A gearbox at the edge of sliding carries N = x r f + tau and takes c + m N of the motor's torque tau, with c = c0 + c1
+and m = m0 + m1. It pulls while tau - r f >= c + m N, and lets go from r f - tau >= c + m N on. For large tensions,
+where c does not count, r f is a share of tau. From m = 1 on no motor turns the gears, from m x = 1 on no tendon.
 """
 
 from __future__ import annotations
@@ -33,14 +32,8 @@ def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float,
         dry, weight = dry + gears.stribeck, gears.external_weight
         by_load = gears.by_load + gears.stribeck_by_load
         sign = 1.0 if holding else -1.0
-        # tau - r f >= c + m (x r f - tau) and c + m (tau - x r f), or with the signs of helping.
-        steep, flat = 1.0 - by_load * weight, 1.0 + by_load * weight
-        ends = [(torque * (1.0 + by_load) + sign * dry) / flat]
-        if steep > 0.0:
-            ends.append((torque * (1.0 - by_load) + sign * dry) / steep)
-        elif holding:
-            ends.append(np.inf)
-        most = max(0.0, max(ends) if holding else min(ends))
+        arriving, over = torque * (1.0 + sign * by_load) + sign * dry, 1.0 - sign * by_load * weight
+        most = max(0.0, arriving / over) if over > 0.0 else np.inf
         for tendon, radius in zip(actuator.tendons, expand(actuator.spool_radius, len(actuator.tendons)), strict=True):
             limits[finger.routing.tendons.index(tendon)] = most / radius
     return tuple(limits.tolist())
@@ -60,9 +53,7 @@ def gear_shares(finger: FingerLike) -> Array:
             continue
         gears = actuator.motor.friction
         by_load, weight = gears.by_load + gears.stribeck_by_load, gears.external_weight
-        near = (1.0 + by_load) / (1.0 + by_load * weight)
-        steep = 1.0 - by_load * weight
-        far = (1.0 - by_load) / steep if steep > 0.0 else np.inf
-        index = names.index(actuator.tendons[0])
-        shares[:, index] = min(near, far), max(near, far)
+        over = 1.0 - by_load * weight
+        drawn_in = max(0.0, 1.0 - by_load) / (1.0 + by_load * weight)
+        shares[:, names.index(actuator.tendons[0])] = drawn_in, (1.0 + by_load) / over if over > 0.0 else np.inf
     return shares

@@ -70,8 +70,9 @@ def steady_state(
 def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:
     """Return the motors' currents, A, shape (m, k), that hold the tendons' torque and slide the gears.
 
-    With s the sign of the speed w and T the tendons' torque, tau = T + s level + b w and N = |tau - x T|; the level
-    is linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign.
+    With s the sign of the speed w and T the tendons' torque, tau = T + s level + b w and N = |tau + x T|; the level
+    is linear in N, so that either sign of what N is made of gives a level, of which one keeps that sign. Where gears
+    take all that a motor adds, slope >= 1, no current slides them: it is infinite.
     """
     base, by_load, more, more_by_load, velocity, exponent, viscous, _, driving, driven = actuators.gearbox
     torque = command[:, actuators.tendons] @ actuators.spools
@@ -80,8 +81,12 @@ def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> A
     way, share = np.sign(speed), stribeck_share(speed, velocity, exponent)
     lost = loss_share(torque, speed, driving, driven) * np.abs(torque)
     dry, slope = base + more * share + lost, by_load + more_by_load * share
-    unheld = (1.0 - actuators.external_weight) * torque + viscous * speed
-    sided = [(side, (dry + slope * side * unheld) / (1.0 - slope * side * way)) for side in (1.0, -1.0)]
-    level = np.where(unheld + way * sided[0][1] >= 0.0, sided[0][1], sided[1][1])
+    unlevelled = (1.0 + actuators.external_weight) * torque + viscous * speed
+
+    def level_of(side: float) -> Array:
+        left = 1.0 - slope * side * way
+        return np.where(left > 0.0, (dry + slope * side * unlevelled) / np.where(left > 0.0, left, 1.0), np.inf)
+
+    level = np.where(unlevelled + way * level_of(1.0) >= 0.0, level_of(1.0), level_of(-1.0))
     current: Array = (torque + way * level + (0.0 if at_rest else viscous * speed)) / actuators.motor[0]
     return current

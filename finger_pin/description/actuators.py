@@ -70,8 +70,8 @@ class GearFriction(Description):
         1.0,
         unit="1",
         source="fit",
-        doc="How much more the tendons' torque counts in N than the motor's: N = |x r f - tau|; above 1 / m0 no tendon "
-        "turns the gears.",
+        doc="x, how much more the tendons' torque counts in N than the motor's: N = |x r f + tau|, twice what is held "
+        "at x = 1; from 1 / m0 on no tendon turns the gears.",
     )
 
 
@@ -166,7 +166,10 @@ class PositionLoop(Description):
         1e-3, unit="s", source="common in such servos", doc="From sample to sample."
     )
     proportional: Annotated[float, real(0.0, 1e6)] = quantity(
-        2.3, unit="1/rad", source="XL330 as it ships: gain 400 of 128, 4096 steps a turn, 885 for all", doc="k_p."
+        1.15,
+        unit="1/rad",
+        source="XL330 recorded: gain 400 as it ships, of 256, 4096 steps a turn, 885 all",
+        doc="k_p.",
     )
     derivative: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="s/rad", source="as it ships", doc="k_d.")
     integral: Annotated[float, real(0.0, 1e6)] = quantity(0.0, unit="1/(rad s)", source="as it ships", doc="k_i.")
@@ -207,7 +210,10 @@ class Actuator(Description):
         0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of two tendons all there is."
     )
     friction_compensation: Annotated[float, real(0.0, 2.0)] = quantity(
-        0.0, unit="1", source="chosen", doc="Tension drive: part of the sliding gear friction that current overcomes."
+        0.0,
+        unit="1",
+        source="chosen",
+        doc="Tension drive: part of coulomb, by_load and viscous that current overcomes.",
     )
     reversal_speed: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
         0.5, unit="rad/s", source="chosen", doc="Tension drive: speed below which that is smoothed."

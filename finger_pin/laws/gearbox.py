@@ -3,18 +3,21 @@
     level = [c0 + m0 N] + [c1 + m1 N] exp(-(|v| / w)^p)
 
 The load-dependent Stribeck model of servo identification (Duclusaud and Passault, "Extended friction models for the
-physics simulation of servo actuators", 2024, models M1 to M4).
+physics simulation of servo actuators", 2024, models M1 to M4). They have N = |external - motor| of torques whose sum
+moves the rotor. Of T, with which tendons pull against winding in, and the motor's tau that is N = |T + tau|: twice
+what is held.
 
 Gears lose more where the motor drives its load than where the load drives the motor, or less. So the level may have a
-part m_d |T| while driving, T v > 0, and m_b |T| while driven, T the torque with which tendons pull against winding in.
-Gears that slide then take T (1 + m_d) from the motor to wind in and leave it T (1 - m_b) to pay out: from m_b = 1 on no
-tendon turns them. Those two numbers are, in steady sliding, a level |c_e T + c_m tau| with a coefficient for each
-side's torque (the authors' model M5), m_d = (c_e + c_m) / (1 - c_m) and m_b = (c_e + c_m) / (1 + c_m); and a loss
-mu_avg |T| z + mu_dif T z^2 with bristles z (github.com/google-deepmind/mujoco, discussion 3528), m_d = mu_avg + mu_dif
-and m_b = mu_avg - mu_dif. The level jumps at v = 0, where the rate of (9a) does not depend on it.
- Below p = 1 the exponential has an infinite slope at
-rest. Here (|v| / w)^p is ((v / w)^2 + eps^2)^(p / 2) - eps^p with eps = 1e-4: smooth, zero at rest, and the level is
-off by at most eps^p of its Stribeck part, 1e-3 of it for p = 0.76.
+part m_d |T| while driving, T v > 0, and m_b |T| while driven. Gears that slide then take T (1 + m_d) from the motor to
+wind in and leave it T (1 - m_b) to pay out: from m_b = 1 on no tendon turns them. Those two numbers are, in steady
+sliding, a level |c_e T + c_m tau| with a coefficient for each side's torque (the authors' model M5),
+m_d = (c_e + c_m) / (1 - c_m) and m_b = (c_e + c_m) / (1 + c_m); and a loss mu_avg |T| z + mu_dif T z^2 with bristles z
+(github.com/google-deepmind/mujoco, discussion 3528), m_d = mu_avg + mu_dif and m_b = mu_avg - mu_dif. The level jumps
+at v = 0, where the rate of (9a) does not depend on it.
+
+Below p = 1 the exponential has an infinite slope at rest. Here (|v| / w)^p is ((v / w)^2 + eps^2)^(p / 2) - eps^p
+with eps = 1e-4: smooth, zero at rest, and the level is off by at most eps^p of its Stribeck part, 1e-3 of it for
+p = 0.76.
 """
 
 from __future__ import annotations

@@ -2,9 +2,10 @@
 
     i = clip((U - K_t w) / R, -I_max, I_max),   |U| <= V
 
-It is driven by a voltage, its command; or by a current, K_t i being command times gain plus what is to overcome
-friction: then the electronics apply U = R i + K_t w as far as they can. Where the current is limited they apply less
-than was asked for, so that U i = R i^2 + tau w always.
+It is driven by a voltage, its command; or by a current, K_t i being T, command times gain, plus what is to overcome
+friction: sign(w) level + b w with the level c + m |u T + sign(w) level| of gears that slide slowly, in which u T is the
+part of their load that grows with T. Then the electronics apply U = R i + K_t w as far as they can. Where the current
+is limited they apply less than was asked for, so that U i = R i^2 + tau w always.
 """
 
 from __future__ import annotations
@@ -15,16 +16,37 @@ import numpy as np
 
 from finger_pin.laws.law import Law, Row
 
+# Least share of a torque that gears are expected to leave.
+_LEAST = 1e-3
 
-def friction_torque(speed: Any, dry: Any, viscous: Any, reversal: Any) -> Any:
-    """Return the torque that is expected to overcome friction, N m; smooth over a reversal."""
-    return dry * np.tanh(speed / reversal) + viscous * speed
+
+def friction_torque(speed: Any, torque: Any, p: Any) -> tuple[Any, Any, Any]:
+    """Return the torque that is expected to overcome friction, N m, smooth over a reversal, and its slopes.
+
+    With s = tanh(w / w_r) for the sign of w, the level is linear in its load of either sign; one sign comes out.
+
+    Args:
+        speed: w, rad/s.
+        torque: T, N m; a negative one pulls no tendon.
+        p: Numbers of `MOTOR`.
+
+    Returns:
+        The torque, and its derivatives by w and by T.
+    """
+    dry, by_torque, by_load, viscous, reversal = p[6:]
+    eased, pull = np.tanh(speed / reversal), np.maximum(torque, 0.0)
+    side = np.where(by_torque * pull + by_load * eased * dry >= 0.0, 1.0, -1.0)
+    left = np.maximum(1.0 - side * by_load * eased, _LEAST)
+    level = (dry + side * by_torque * pull) / left
+    by_eased = level * (1.0 + side * by_load * eased / left * (left > _LEAST))
+    by_speed = by_eased * (1.0 - eased * eased) / reversal + viscous
+    return eased * level + viscous * speed, by_speed, eased * side * by_torque / left * (torque > 0.0)
 
 
 def asked_voltage(speed: Any, command: Any, p: Any) -> Any:
     """Return the voltage that the drive asks for before any limit, V; see `MOTOR` for ``p``."""
-    constant, resistance, _, _, by_current, gain, dry, viscous, reversal = p
-    torque = gain * command + friction_torque(speed, dry, viscous, reversal)
+    constant, resistance, by_current, gain = p[0], p[1], p[4], p[5]
+    torque = gain * command + friction_torque(speed, gain * command, p)[0]
     return by_current * (resistance * torque / constant + constant * speed) + (1.0 - by_current) * command
 
 
@@ -43,14 +65,13 @@ def _value(row: Row, p: Any) -> Any:
 
 
 def _slopes(row: Row, p: Any, signals: Any) -> Any:
-    constant, resistance, supply, limit, by_current, gain, dry, viscous, reversal = p
+    constant, resistance, supply, limit, by_current, gain = p[0], p[1], p[2], p[3], p[4], p[5]
     asked = asked_voltage(row.speed, row.command, p)
     within = constant / resistance * (np.abs(free_current(row.speed, asked, p)) < limit)
     followed = within * (np.abs(asked) < supply)
-    eased = np.tanh(row.speed / reversal)
-    steeper = dry * (1.0 - eased * eased) / reversal + viscous
+    _, steeper, by_torque = friction_torque(row.speed, gain * row.command, p)
     by_speed = followed * by_current * (resistance * steeper / constant + constant) - within * constant
-    by_command = followed * (by_current * resistance * gain / constant + 1.0 - by_current)
+    by_command = followed * (by_current * resistance * gain * (1.0 + by_torque) / constant + 1.0 - by_current)
     return (0.0, by_speed, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -70,6 +91,8 @@ MOTOR = Law(
         "by_current",
         "gain",
         "dry",
+        "by_torque",
+        "by_load",
         "viscous",
         "reversal_speed",
     ),

@@ -2,10 +2,11 @@
 
     tendon     e = r theta_m - l(q) + e0,   f^m = max(0, K e + D e')
     rotor      J theta_m'' = tau - tau_g - sum of r f^m
-    gearbox    tau_g by (9), loaded by N = |x sum of r f^m - tau|
+    gearbox    tau_g by (9), loaded by N = |x sum of r f^m + tau|
 
 An elastic tendon is a row that acts on rotor and finger alike; what its canal takes away is the row of the driven
-tendon. Of a spool that winds two tendons the second has a negative radius.
+tendon. Of a spool that winds two tendons the second has a negative radius. A load that the motor holds presses the
+teeth from both sides, so that its torque and the motor's add up in N.
 """
 
 from __future__ import annotations
@@ -84,10 +85,10 @@ class Actuators:
             constant, resistance, dry = motor.constants
             by_current = float(actuator.drive == "tension")
             share = by_current * actuator.friction_compensation
-            # Of gears that slide slowly under a steady load, N is what they take themselves.
-            sliding = dry / max(1.0 - gears.by_load, 1e-3)
             electrical = (constant, resistance, motor.voltage, motor.maximum_current)
-            overcome = (share * sliding, share * gears.viscous, actuator.reversal_speed)
+            # Of N = |x T + tau| at tau = T + friction, T is known from the command.
+            by_torque = share * gears.by_load * (1.0 + gears.external_weight)
+            overcome = (share * dry, by_torque, gears.by_load, share * gears.viscous, actuator.reversal_speed)
             motors.append((*electrical, by_current, radius, *overcome))
             level = (dry, gears.by_load, gears.stribeck, gears.stribeck_by_load)
             shape = (gears.stribeck_velocity, gears.stribeck_exponent, gears.viscous, gears.stiffness)
@@ -193,7 +194,7 @@ class Actuators:
                 self.gearbox,
                 turns,
                 inputs=self._wired(self.spools.T) if one_way else {},
-                loads={"motors": np.eye(count), **self._wired(-self.external_weight[:, None] * self.spools.T)},
+                loads={"motors": np.eye(count), **self._wired(self.external_weight[:, None] * self.spools.T)},
                 stored=Energy("gearboxes", "gear bristles"),
                 powers=(Energy("gearbox_coulomb", "gears sliding"), Energy("gearbox_viscous", "gears viscous")),
             ),

@@ -22,7 +22,7 @@ def finger(weight, **motor):
 
 def balance(tension, torque, weight, dry, sign):
     """The torque left to a motor for pulling (1), or to gears and motor for holding (-1), N m."""
-    carried = abs(weight * RADIUS * tension - torque)
+    carried = abs(weight * RADIUS * tension + torque)
     return sign * (torque - RADIUS * tension) - dry * (GEARS["coulomb"] + GEARS["stribeck"]) - 0.15 * carried
 
 
@@ -38,8 +38,8 @@ def test_the_greatest_tension_is_where_gears_take_what_the_motor_has_over(weight
 
 @pytest.mark.parametrize("weight", [0.5, 1.0, 3.0])
 def test_the_share_of_a_large_command_is_that_of_gears_without_dry_friction(weight):
-    drawn = brentq(lambda f: balance(f, 1.0, weight, 0.0, 1.0), 0.0, 1.0 / RADIUS * 1.0000001)
-    let_out = brentq(lambda f: balance(f, 1.0, weight, 0.0, -1.0), 0.9999999 / RADIUS, 1e4)
+    drawn = brentq(lambda f: balance(f, 1.0, weight, 0.0, 1.0), 0.0, 1.0 / RADIUS)
+    let_out = brentq(lambda f: balance(f, 1.0, weight, 0.0, -1.0), 1.0 / RADIUS, 1e4)
     shares = gear_shares(finger(weight))
     np.testing.assert_allclose(shares[:, 2:], RADIUS * np.array([[drawn] * 2, [let_out] * 2]), rtol=1e-6)
     np.testing.assert_array_equal(shares[:, :2], 1.0)
@@ -53,12 +53,15 @@ def test_gears_that_no_load_turns_hold_any_tension_and_lock_a_tension_drive():
     assert self_locking_margin(scenario, samples=50).margin > 1.0
 
 
-def test_gears_that_count_both_torques_alike_move_no_margin_and_others_narrow_it():
+def test_gears_that_lose_nothing_by_load_move_no_margin_and_others_narrow_it():
     """Of strong motors without dry friction, where only shares count."""
     strong = {f"{EVERY}.friction.coulomb": 0.0, f"{EVERY}.voltage": 1e4, f"{EVERY}.maximum_current": 1e4}
     margins = [
         self_locking_margin(fp.load_scenario("servo", {**strong, **other}), samples=12, servos=True).margin
-        for other in ({}, {f"{EVERY}.friction.external_weight": 4.0})
+        for other in (
+            {f"{EVERY}.friction.by_load": 0.0, f"{EVERY}.friction.stribeck_by_load": 0.0},
+            {f"{EVERY}.friction.external_weight": 4.0},
+        )
     ]
     alone = self_locking_margin(fp.load_scenario("servo"), samples=12).margin
     assert margins[0] == pytest.approx(alone, rel=1e-2) and margins[1] < 0.9 * alone
@@ -77,7 +80,7 @@ def test_the_force_polytope_of_servos_is_that_of_their_limits_and_shrinks_with_t
     for current in (0.4, 0.8):
         built = fp.Finger(fp.load_scenario("servo", {f"{EVERY}.maximum_current": current}).finger)
         limits = tension_limits(built)
-        # XL330: (K_t I - c0 / (1 - m)) / r with m = m0 + m1.
-        assert limits[0] == pytest.approx((0.3862 * current - 8.76e-3 / (1.0 - 0.1418)) / RADIUS, rel=1e-9)
+        # XL330: r f + c0 + m (r f + K_t I) = K_t I with m = m0 + m1.
+        assert limits[0] == pytest.approx((0.3862 * current * (1.0 - 0.1418) - 8.76e-3) / 1.1418 / RADIUS, rel=1e-9)
         sizes.append(force_polytope(built, posture, limits).support([0.0, 0.0, 1.0]))
     assert 0.0 < sizes[0] < sizes[1]

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from validate import FAMILIES, import_module, validate
-from validation import methods, stiffness, symmetry
+from validation import methods, servo, stiffness, symmetry
 from validation.check import Section, Verdict, compare, skipped
 from validation.page import page
 from validation.report import Family, Report, headline, text
 
 from finger_pin.commands.application import run_function
+from finger_pin.description.actuators import PositionLoop
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +36,29 @@ def test_the_motion_of_all_joints_settles_in_proportion_to_one_over_the_stiffnes
 def test_the_distance_from_the_gear_is_the_stretch_that_the_tensions_make(stiffened):
     for each in stiffened.stretch:
         np.testing.assert_allclose(each.measured, each.expected, rtol=1e-6, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def swung():
+    return servo.swing()
+
+
+def test_an_xl330_swings_a_weight_as_its_published_equations_do(swung):
+    """But for gears that give: 12 recordings are missed by as much."""
+    np.testing.assert_allclose(swung.ours, swung.added, atol=servo.GIVING)
+
+
+def test_gears_carry_the_sum_of_what_they_hold_and_what_holds_it(swung):
+    """|T + tau| is nearer to all recordings but one, and to all together, than |T - tau|; so are ours."""
+    for each in (swung.ours, swung.added):
+        assert np.count_nonzero(each < swung.subtracted) >= 11
+        assert np.mean(each**2) < 0.8 * np.mean(swung.subtracted**2)
+
+
+def test_the_gain_of_a_position_loop_is_that_of_the_recorded_servo():
+    """Of 400 in its register: 4096 steps a turn, over 885 for all of the voltage, over some divisor."""
+    assert PositionLoop().proportional == pytest.approx(servo.measured_gain(), rel=1e-2)
+    assert 400.0 * servo.STEPS / servo.measured_gain() == pytest.approx(256.0, rel=5e-3)
 
 
 @pytest.mark.parametrize(("scenario", "window"), [("fig6", 0.004), ("stick_slip", 0.002)])

@@ -46,8 +46,10 @@ def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances(
 
 def test_friction_above_what_it_can_bear_does_not_grow_at_a_loose_tolerance_either():
     """A tendon goes slack and rings: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level)."""
+    light = {f"finger.actuators.*.motor.friction.{name}": 0.0 for name in ("by_load", "stribeck_by_load")}
     settings = {"simulation.duration": 5.2, "simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
-    scenario = fp.load_scenario("servo", settings)
+    # Gears without losses by load and little damping let it ring.
+    scenario = fp.load_scenario("servo", settings | light | {"controller.damping": 0.1})
     setup = Setup.of(scenario)
     exact = scenario.updated(simulation={"rtol": 1e-9, "atol_scale": 1e-9})
     loose, tight = setup.integrate(), setup.integrate(scenario=exact)
@@ -56,6 +58,7 @@ def test_friction_above_what_it_can_bear_does_not_grow_at_a_loose_tolerance_eith
     bent = np.abs(np.concatenate([tendons.driven.row.state, tendons.passive.row.state], axis=1))
     bearable = np.concatenate([tendons.driven["level"], tendons.passive["level"]], axis=1)
     beyond = (bent > 2.0 * bearable)[:-1] & (bent > 2.0 * bearable)[1:]
+    assert beyond.any()
     assert np.sum(np.maximum(np.diff(bent, axis=0), 0.0), where=beyond) < 0.02
     times = np.linspace(0.0, 5.2, 1001)
     errors = (loose.interpolate(times) - tight.interpolate(times))[:, :4]

@@ -73,7 +73,7 @@ def test_the_account_of_a_servo_finger_with_all_of_these_losses_closes():
 
 
 def test_the_current_of_a_servo_that_slides_evenly_balances_its_torques():
-    """Put back into K_t i = T + s level + b w, with the level of the law at N = |K_t i - x T|."""
+    """Put back into K_t i = T + s level + b w, with the level of the law at N = |K_t i + x T|."""
     losses = {f"finger.actuators.M1.motor.friction.{way}": share for way, share in (("driving", 0.2), ("driven", 0.1))}
     finger = fp.load_scenario("servo_bench", losses).finger
     pull, speed = np.array([[5.0], [5.0], [9.0]]), np.array([0.02, -0.02, 0.05])
@@ -81,11 +81,22 @@ def test_the_current_of_a_servo_that_slides_evenly_balances_its_torques():
     motor, gears = finger.actuators["M1"].motor, finger.actuators["M1"].motor.friction
     for each, f, v in zip(current, pull[:, 0], speed, strict=True):
         torque, load, w = motor.constants[0] * each, 0.008 * f, v / 0.008
-        carried = abs(torque - gears.external_weight * load)
+        carried = abs(torque + gears.external_weight * load)
         share = np.exp(-((abs(w) / gears.stribeck_velocity) ** gears.stribeck_exponent))
         level = gears.coulomb + gears.by_load * carried + (gears.stribeck + gears.stribeck_by_load * carried) * share
         level += (gears.driving if v > 0.0 else gears.driven) * load
         assert torque == pytest.approx(load + np.sign(w) * level + gears.viscous * w, rel=2e-4)
+
+
+def test_no_current_winds_in_by_gears_that_take_all_that_it_adds():
+    """T + c + m (x T + tau) = tau has no solution from m = 1 on; they are let out by tau (1 + m) = T (1 - m x) - c."""
+    friction = {"coulomb": 0.01, "by_load": 1.2, "stribeck_by_load": 0.0, "viscous": 0.0}
+    told = {f"finger.actuators.M1.motor.friction.{name}": value for name, value in friction.items()}
+    finger = fp.load_scenario("servo_bench", told).finger
+    found = steady_state(finger, np.array([[5.0], [5.0]]), np.array([0.02, -0.02])).current[:, 0]
+    load, constant = 0.008 * 5.0, finger.actuators["M1"].motor.constants[0]
+    assert found[0] == np.inf
+    assert found[1] == pytest.approx((load * (1.0 - 1.2) - 0.01) / 2.2 / constant, rel=1e-12)
 
 
 def loop(share, stiffness, ratio, low, high):

@@ -133,13 +133,14 @@ def test_without_power_a_backdrivable_gear_lets_a_load_down_and_another_one_hold
 
 
 def test_a_motor_overcomes_a_gear_that_no_load_turns():
-    """With m0 = 0.3 and x = 4 the gear lifts what it holds: 0.3 |4 r f - tau| is below tau - r f at tau = 2 r f."""
+    """At m0 = 0.3, x = 4 it lifts from tau = 22 / 7 r f on: 0.3 (4 r f + tau) is below tau - r f at tau = 4 r f."""
     friction = {"coulomb": 1e-4, "by_load": 0.3, "external_weight": 4.0}
     lifting = finger({**SMOOTH, "friction": friction}, gravity=9.81)
     load = 0.02 * 9.81 * 0.03 / RADIUS
-    moved = stepped(lifting, [2.0 * load], [0.0, 0.3], spool=load / (STIFFNESS * SPOOL), rtol=1e-6)[:, 2]
-    # J w' = 0.4 r f.
-    assert moved[1] - moved[0] == pytest.approx(0.2 * SPOOL * load / INERTIA * 0.3**2, rel=0.1)
+    # Gears that slide from the start: J w' = 4 r f - r f - 0.3 (4 + 4) r f.
+    spool, level = load / (STIFFNESS * SPOOL), 0.3 * 8.0 * SPOOL * load
+    moved = stepped(lifting, [4.0 * load], [0.0, 0.3], spool=spool, stiction=level, rtol=1e-6)[:, 2]
+    assert moved[1] - moved[0] == pytest.approx(0.3 * SPOOL * load / INERTIA * 0.3**2, rel=0.1)
 
 
 @pytest.mark.parametrize("exponent", [0.76, 1.0, 2.0])
@@ -147,15 +148,33 @@ def test_the_level_of_the_gears_is_the_published_one_but_for_a_thousandth_of_its
     c0, m0, c1, m1, w = 8.76e-3, 0.068, 2e-3, 0.0738, 2.558
     gears = {"coulomb": c0, "by_load": m0, "stribeck": c1, "stribeck_by_load": m1, "stribeck_velocity": w}
     geared = finger({**SMOOTH, "friction": {**gears, "stribeck_exponent": exponent}})
-    x = geared.rest_state(np.zeros(1))
+    x = geared.rest_state(np.zeros(1), tension=np.array([4.0]))
     for speed in (0.0, 1e-4, 1e-3, 0.1, 2.0, 10.0):
         geared.layout.unpack(x).motor_velocity[:] = -speed
         found = geared.evaluate(x, np.array([7.0]))
-        load = 7.0 * SPOOL - SPOOL * found.tendons.entering[0]
+        load = 7.0 * SPOOL + SPOOL * found.tendons.entering[0]
         assert found.motors.load[0] == pytest.approx(load, rel=1e-12)
         part = c1 + m1 * load
         level = c0 + m0 * load + part * np.exp(-((speed / w) ** exponent))
         assert abs(found.mechanism.rows["gearboxes"]["level"][0] - level) <= 1.1e-3 * part
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0], ids=["winding in", "paying out"])
+@pytest.mark.parametrize("pull", [0.5, 6.0])
+def test_a_drive_that_overcomes_all_of_its_friction_slides_its_gears_under_the_commanded_load(way, pull):
+    """At the tension that it was told, bristles at the level of that load, it neither speeds up nor slows down."""
+    c0, m0, b, x0, speed, torque = 0.01, 0.3, 4e-3, 1.5, way * 6.0, SPOOL * pull
+    friction = {"coulomb": c0, "by_load": m0, "viscous": b, "external_weight": x0}
+    # Of either sign of x T + tau with tau = T + way (c0 + m0 |x T + tau|), the one that comes out.
+    levels = {side: (c0 + side * m0 * (1.0 + x0) * torque) / (1.0 - side * way * m0) for side in (1.0, -1.0)}
+    (level,) = [each for side, each in levels.items() if side * ((1.0 + x0) * torque + way * each) > 0.0]
+    driven = finger({**SMOOTH, "friction": friction}, friction_compensation=1.0, tendon_damping=0.0)
+    x = driven.rest_state(np.zeros(1), tension=np.array([pull]))
+    state = driven.layout.unpack(x)
+    state.motor_velocity[:], state.gearbox_stiction[:] = speed, way * level
+    found = driven.evaluate(x, np.array([pull]))
+    assert found.mechanism.acceleration[-1] == pytest.approx(0.0, abs=1e-6)
+    assert found.motors.load[0] == pytest.approx(abs((1.0 + x0) * torque + way * level + b * speed), rel=1e-6)
 
 
 def test_a_finger_with_ideal_and_servo_tendons_gives_each_strand_to_the_joints():

@@ -49,7 +49,7 @@ def test_the_fitted_xl330_moves_a_pendulum_through_a_spool_as_scipy_has_it():
         delivered = max(0.0, pull - z)
         slide = RADIUS * v
         level = (delivered + pull) * drag * (1.0 + (canal["rho"] - 1.0) * np.exp(-abs(slide) / canal["w"]))
-        torque, load = SPOOL * wanted, abs(SPOOL * wanted - SPOOL * pull)
+        torque, load = SPOOL * wanted, abs(SPOOL * wanted + SPOOL * pull)
         # |w|^p smoothed at rest, as the law says.
         power = ((w / gears["w"]) ** 2 + 1e-8) ** (gears["p"] / 2.0) - 1e-4 ** gears["p"]
         friction = 8.76e-3 + 0.0680 * load + 0.0738 * load * np.exp(-power)
