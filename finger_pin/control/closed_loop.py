@@ -154,12 +154,14 @@ class ClosedLoop:
             settings = [each.get(axis, _NO_FORCE) for each in signals for axis in AXES]
             force = Signal.from_settings(settings, scenario.simulation.rtol)
             loop = replace(loop, varying_force=force.later(start))
-        initial = scenario.simulation.initial
-        if initial is not None:
+        initial, keyframe = scenario.simulation.initial, scenario.keyframe
+        if initial is not None or keyframe is not None:
+            given = (keyframe.position if keyframe else {}) | (initial.position if initial else {})
+            speeds = initial.velocity if initial else {}
             joints = finger.routing.joints
             position = loop.reference.at(0.0).position
-            moved = [initial.position.get(name, own) for name, own in zip(joints, position, strict=True)]
-            velocity = [initial.velocity.get(name, 0.0) for name in joints]
+            moved = [given.get(name, own) for name, own in zip(joints, position, strict=True)]
+            velocity = [speeds.get(name, 0.0) for name in joints]
             loop = replace(loop, start=loop.rest_state(np.array(moved), np.array(velocity)))
         return loop
 

@@ -22,8 +22,6 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.references.signal import Signal
 
-_NOTHING = InputSignal()
-
 
 @dataclass(frozen=True, eq=False)
 class OpenLoopTensions(LoopController):
@@ -41,15 +39,16 @@ class OpenLoopTensions(LoopController):
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, routing: Routing) -> OpenLoopTensions:
-        """Read ``controller.tensions``; a tendon without any is held at its minimum tension."""
+        """Read ``controller.tensions`` and ``inputs``; what has none holds the keyframe's, else the minimum or 0."""
         given = scenario.controller.tensions or {}
+        held = scenario.keyframe.inputs if scenario.keyframe else {}
         least = expand(scenario.controller.minimum_tension, len(routing.tendons))
         settings: list[SignalSettings] = [
-            given.get(name) or _constant(float(tension))
+            given.get(name) or _constant(held.get(name, float(tension)))
             for name, tension in zip(routing.tendons[: routing.actuated], least, strict=False)
         ]
         driven = scenario.controller.inputs or {}
-        settings += [driven.get(name, _NOTHING) for name in _actuators(scenario)]
+        settings += [driven.get(name) or _input(held.get(name, 0.0)) for name in _actuators(scenario)]
         return cls(
             Signal.from_settings(settings, scenario.simulation.rtol).later(scenario.simulation.start_time), routing
         )
@@ -110,6 +109,11 @@ class OpenLoopTensions(LoopController):
 @lru_cache
 def _constant(tension: float) -> ForceSignal:
     return ForceSignal(offset=tension)
+
+
+@lru_cache
+def _input(value: float) -> InputSignal:
+    return InputSignal(offset=value)
 
 
 def _actuators(scenario: Scenario) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from finger_pin.core.chains import Chains
 from finger_pin.core.collision.motion_bounds import Carrying, levers
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
-from finger_pin.mechanism.pieces import Leg, Piece
+from finger_pin.mechanism.pieces import Leg, Piece, Place
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
 COLUMNS, WRENCH = 3, 12
@@ -25,8 +25,8 @@ class Paths(NamedTuple):
     """E pieces, and the L legs with which R rows use them.
 
     Attributes:
-        carriers: Bodies of both points and of the frame, -1 for the base, shape (E, 3).
-        points: Both points in the frames of their bodies, shape (E, 6), m.
+        carriers: Bodies of both points, of the frame, and of a side point, -1 for the base, shape (E, 4).
+        points: Both points, and the side point, in the frames of their bodies, shape (E, 9), m.
         rotation: Of the piece's frame in its body's, shape (E, 3, 3).
         origin: Of the piece's frame in its body's, shape (E, 3), m.
         shapes: Addresses of value and slopes, shape (E, 2).
@@ -49,6 +49,7 @@ class Paths(NamedTuple):
         column: Of each leg, shape (L,).
         follows: Of each leg, shape (L,).
         weights: Of each leg in the arm and in the length, shape (L, 2).
+        bends: Whether each leg's turn counts, shape (L,).
     """
 
     carriers: Annotated[IndexTable, along("piece", "x", of="body")]
@@ -74,6 +75,7 @@ class Paths(NamedTuple):
     column: Annotated[Indices, along("leg")]
     follows: Annotated[Indices, along("leg")]
     weights: Annotated[Matrix, along("leg", "x")]
+    bends: Annotated[Indices, along("leg")]
 
 
 class PathWork(NamedTuple):
@@ -98,12 +100,12 @@ class PathWork(NamedTuple):
         looks: Moments of a step, and what was seen there of a gap, shape (LOOKS, 6).
         frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
         origin: Its origin, shape (E, 3), m.
-        ends: Both points, base frame, shape (E, 6), m.
+        ends: Both points and the side point, base frame, shape (E, 9), m.
         wrench: Unit wrenches on the first and on the second body, shape (E, COLUMNS, WRENCH).
         push: Force of a contact on the first body, shape (E, 3), N.
         length: Of every row, shape (K,).
         turn: Of every row, shape (K,).
-        seen: Both points as each piece's frame sees them, shape (E, 6), m.
+        seen: All three as each piece's frame sees them, shape (E, 9), m.
         gather: Shape (N,).
         slopes: Of a shape, shape (SLOPES,).
         wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, COLUMNS, WRENCH).
@@ -144,16 +146,17 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
     number = {piece: e for e, piece in enumerate(pieces)}
     first_row = {leg.piece: k for k, each in reversed(list(enumerate(paths))) for leg in each}
     legs = [leg for each in paths for leg in each]
-    carriers = np.array([[last[p.ends[0].joint], last[p.ends[1].joint], last[p.joint]] for p in pieces], dtype=np.int64)
-    carriers = carriers.reshape(-1, 3)
+    ends = [(*p.ends, Place(0, np.zeros(3)))[:3] for p in pieces]
+    carried = [(a.joint, b.joint, p.joint, side.joint) for p, (a, b, side) in zip(pieces, ends, strict=True)]
+    carriers = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, 4)
     entries = [_movers(row, parents) for row in carriers]
     parameters = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
     for row, piece in zip(parameters, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
-    points = [np.concatenate([turns[end.joint].T @ end.point for end in p.ends]) for p in pieces]
+    points = [np.concatenate([turns[end.joint].T @ end.point for end in row]) for row in ends]
     carrying = Carrying.of(chains)
     found = [levers(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
-    halves = [0.5 * float(np.linalg.norm(row[3:] - row[:3])) for row in points]
+    halves = [0.5 * float(np.linalg.norm(row[3:6] - row[:3])) for row in points]
     rows = np.array([k for k, each in enumerate(paths) if each], dtype=np.int64)
     carries = np.zeros((len(parents), len(parents)), dtype=np.int64)
     for body, parent in enumerate(parents):
@@ -162,7 +165,7 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
             carries[parent, body] = 1
     return Paths(
         carriers=carriers,
-        points=np.array(points).reshape(-1, 6),
+        points=np.array(points).reshape(-1, 9),
         rotation=np.array([turns[p.joint].T @ p.frame.rotation for p in pieces]).reshape(-1, 3, 3),
         origin=np.array([turns[p.joint].T @ p.frame.translation for p in pieces]).reshape(-1, 3),
         shapes=np.array([shape_addresses(p.shape) for p in pieces], dtype=np.int64).reshape(-1, 2),
@@ -184,6 +187,7 @@ def read_paths(paths: Sequence[Sequence[Leg]], chains: Chains) -> Paths:
         column=np.array([leg.column for leg in legs], dtype=np.int64),
         follows=np.array([leg.follows for leg in legs], dtype=np.int64),
         weights=np.array([(leg.arm, leg.length_weight) for leg in legs], dtype=float).reshape(-1, 2),
+        bends=np.array([leg.bends for leg in legs], dtype=np.int64),
     )
 
 
@@ -197,15 +201,15 @@ def reached(paths: Paths, count: int, width: int) -> NDArray[np.bool_]:
 
 
 def _movers(carriers: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the coordinates that move three bodies, and a mask of the three for each."""
-    moves = np.zeros((len(parents), 3), dtype=np.int64)
+    """Return the coordinates that move some bodies, and a mask of the first three for each."""
+    moves = np.zeros((len(parents), 4), dtype=np.int64)
     for which, body in enumerate(carriers):
         at = int(body)
         while at >= 0:
             moves[at, which] = 1
             at = int(parents[at])
     moved = np.flatnonzero(moves.any(axis=1))
-    return moved, np.ascontiguousarray(moves[moved])
+    return moved, np.ascontiguousarray(moves[moved, :3])
 
 
 def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
@@ -228,12 +232,12 @@ def build_path_work(paths: Paths, count: int, width: int) -> PathWork:
         looks=np.zeros((LOOKS, 6)),
         frame=np.zeros((pieces, 3, 3)),
         origin=np.zeros((pieces, 3)),
-        ends=np.zeros((pieces, 6)),
+        ends=np.zeros((pieces, 9)),
         wrench=np.zeros((pieces, COLUMNS, WRENCH)),
         push=np.zeros((pieces, 3)),
         length=np.zeros(count),
         turn=np.zeros(count),
-        seen=np.zeros((pieces, 6)),
+        seen=np.zeros((pieces, 9)),
         gather=np.zeros(width),
         slopes=np.zeros(SLOPES),
         turn_slope=np.zeros(entries),

@@ -35,9 +35,10 @@ def exercise(description: FingerDescription, duration: float = 4.0) -> dict[str,
         return {"offset": middle, "amplitude": half, "frequency": _FREQUENCY, "phase": phase}
 
     position = {}
+    first = next(iter(tree.keyframes.values())).position if tree.keyframes else {}
     for name, joint in description.joints.items():
         lower, upper = joint.range
-        position[name] = min(max(tree.joints[name].reference, lower), upper)
+        position[name] = first.get(name, min(max(tree.joints[name].reference, lower), upper))
     return {
         "name": description.name,
         "title": f"{description.name}: every actuator to and fro",

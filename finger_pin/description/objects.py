@@ -6,13 +6,14 @@ import math
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.palm import PathSignal
-from finger_pin.description.routing import Array
 from finger_pin.description.surface import MILLIMETRES, SIZES, Shaped
 from finger_pin.description.validation import Name, choice, problem, quantity, real, vector
 
+Array = NDArray[np.float64]
 #: The coordinates of an object's path.
 PATH = ("x", "y", "z")
 

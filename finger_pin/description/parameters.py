@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from finger_pin.description.hand import HandSettings
 
 _MILLIMETRES = " m (is it in millimetres?)"
+_MOST_TENSION = 1e6
 
 
 class Link(Description):
@@ -112,6 +113,11 @@ class Joint(Description):
     range: Annotated[tuple[float, float], vector(2, -MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] = quantity(
         ..., unit="rad", source="(2)", doc="Lower and upper limit that the stroke limiter guards."
     )
+    limited: bool = Field(
+        True,
+        strict=True,
+        description="Whether the stroke limiter guards the range; else only searches and pictures go through it.",
+    )
     spring: Spring | None = Field(None, description="A return spring; none in the paper.")
     link: Link | None = Field(None, description="The link that this joint moves; none on a foreign model.")
 
@@ -143,6 +149,9 @@ class Tendon(Description):
     )
     crossings: dict[Name, Crossing] = Field({}, description="By joint, in order along the tendon.")
     along: Name | None = Field(None, description="In place of crossings: the tendon of the tree whose path it takes.")
+    maximum_tension: Annotated[float, real(0.0, _MOST_TENSION, above=True)] | None = quantity(
+        None, unit="N", source="design", doc="The most that its ideal source pulls with; without end if left out."
+    )
     mass_after: int | None = Field(
         None,
         ge=0,
@@ -152,6 +161,8 @@ class Tendon(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.kind == "passive" and self.maximum_tension is not None:
+            raise problem("maximum_tension", "is for actuated tendons only", self.maximum_tension)
         if self.kind == "actuated" and self.mass_after is not None:
             raise problem("mass_after", "is for passive tendons only", self.mass_after)
         if self.mass_after is not None and self.mass_after > len(self.crossings):
@@ -250,9 +261,20 @@ class FingerDescription(Description):
                 if joint not in self.joints:
                     allowed = f"no such joint; the joints are {', '.join(joints)}"
                     raise problem(f"tendons.{name}.crossings.{joint}", allowed)
+        driven = (*self.actuated_names, *self.tree.actuators) if self.tree is not None else ()
+        for key, keyframe in (self.tree.keyframes if self.tree is not None else {}).items():
+            for name in keyframe.inputs:
+                if name not in driven:
+                    allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
+                    raise problem(f"tree.keyframes.{key}.inputs.{name}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
+        for key, each in self.actuators.items():
+            for name in each.tendons:
+                if self.tendons[name].maximum_tension is not None:
+                    allowed = f"is for ideal sources: actuators.{key} pulls it"
+                    raise problem(f"tendons.{name}.maximum_tension", allowed, self.tendons[name].maximum_tension)
         for group, names, what in (
-            ("tendon_friction", tendons, "tendon"),
+            ("tendon_friction", (*tendons, *self.canals), "tendon"),
             ("joint_friction", joints, "joint"),
             ("passive_tendon", self.passive_names, "passive tendon"),
             ("stroke_limiter", joints, "joint"),
@@ -279,6 +301,11 @@ class FingerDescription(Description):
         """The palm and the fingers on it, if it is a hand of such."""
         hand: HandSettings | None = self._hand
         return hand
+
+    @property
+    def canals(self) -> tuple[str, ...]:
+        """Names of the tree's tendons that something else than ideal sources pulls: they rub as all tendons do."""
+        return self.tree.rubbing if self.tree is not None else ()
 
     @property
     def passive_names(self) -> tuple[str, ...]:

@@ -71,7 +71,8 @@ class Routing:
                 crossed[column[joint], order] = 1.0
             if tendon.along is not None and description.tree is not None:
                 # Its arms depend on the posture; which joints it crosses does not.
-                crossed = np.array([[float(joint in description.tree.crossed(tendon.along))] for joint in joints])
+                parts = description.tree.crossed(tendon.along)
+                crossed = np.array([[sum(1.0 / divisor for divisor, own in parts if j in own)] for j in joints])
             coupling.append(radii.sum(axis=1))
             curvature.append(bends.sum(axis=1))
             split = tendon.proximal_crossings

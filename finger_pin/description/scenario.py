@@ -30,6 +30,7 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
 from finger_pin.description.tautness import Tautness
+from finger_pin.description.tree import Keyframe
 from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
 from finger_pin.exceptions import InputError
 
@@ -110,6 +111,10 @@ class Scenario(Description):
             object.__setattr__(self, "finger", self.hand.joined())
         if self.finger is None:
             raise problem("finger", "is missing: a finger, or a hand")
+        tree, objects = self.finger.tree, self.environment.objects
+        if tree is not None and tree.objects:
+            environment = self.environment.updated(objects={**tree.objects, **(objects or {})})
+            object.__setattr__(self, "environment", environment)
         self._check_names()
         fingers, finger = () if self.hand is None else tuple(self.hand.fingers), self.finger
         tables = finger.joints, finger.tendons, finger.actuators
@@ -178,15 +183,24 @@ class Scenario(Description):
             simulation=simulation,
         )
 
+    @property
+    def keyframe(self) -> Keyframe | None:
+        """The posture of a tree that the run starts from, and the inputs that go with it; None without any."""
+        known, initial = self.finger.tree.keyframes if self.finger.tree else {}, self.simulation.initial
+        name = initial.keyframe if initial else None
+        return known[name] if name else next(iter(known.values()), None)
+
     def _check_names(self) -> None:
         """Refuse a table for a joint or a finger that is not there."""
         initial = self.simulation.initial or InitialSettings()
+        keyframes = tuple(self.finger.tree.keyframes) if self.finger.tree else ()
         joints, fingers = tuple(self.finger.joints), tuple(self.hand.fingers) if self.hand else ()
         pulled = dict.fromkeys(key.partition(".")[0] for key in (self.controller.tensions or {}) if self.hand)
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),
             "simulation.initial.position": (initial.position, "joint", joints),
             "simulation.initial.velocity": (initial.velocity, "joint", joints),
+            "simulation.initial.keyframe": ([initial.keyframe] if initial.keyframe else (), "keyframe", keyframes),
             "controller.fingers": (self.controller.fingers or (), "finger", fingers),
             "controller.tensions": (pulled, "finger", fingers),
             "environment.fingers": (self.environment.fingers or (), "finger", fingers),
@@ -198,7 +212,8 @@ class Scenario(Description):
             for name in names:
                 if name not in allowed:
                     hint = suggestion(name, allowed)
-                    listed = f"the {what}s are {', '.join(allowed)}" if allowed else "there is no hand"
+                    missing = "there is none" if what == "keyframe" else "there is no hand"
+                    listed = f"the {what}s are {', '.join(allowed)}" if allowed else missing
                     raise problem(f"{table}.{name}", f"no such {what}; {listed}{hint}")
 
     def _check(self) -> None:

@@ -12,6 +12,7 @@ from finger_pin.description.validation import (
     MOST_ANGLE,
     Description,
     FullName,
+    Name,
     choice,
     problem,
     quantity,
@@ -29,10 +30,13 @@ class InitialSettings(Description):
     """The start of the joints; the rest of the state follows: bristles relaxed, passive tendons taut in between."""
 
     position: dict[FullName, Annotated[float, real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)]] = quantity(
-        {}, unit="rad", source="chosen", doc="theta(0) by joint; a joint left out starts on its reference."
+        {}, unit="rad", source="chosen", doc="theta(0) by joint; one left out starts on its reference, or keyframe."
     )
     velocity: dict[FullName, Annotated[float, real(-1e4, 1e4)]] = quantity(
         {}, unit="rad/s", source="chosen", doc="theta'(0) by joint; a joint left out starts at rest."
+    )
+    keyframe: Name | None = Field(
+        None, description="Of a tree, the posture that it starts from, below position; by default its first, if any."
     )
 
     _flat = field_validator("position", "velocity", mode="before")(flat_numbers)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 
@@ -15,6 +15,13 @@ _MILLIMETRES = " m (is it in millimetres?)"
 #: A place in a body's frame.
 PLACE = vector(3, -10.0, 10.0, _MILLIMETRES)
 Triple = tuple[float, float, float]
+
+
+class SidePoint(Description):
+    """The side point of a wrap, carried by another body."""
+
+    body: Name | None = Field(None, description="Body that carries it; the base if left out.")
+    position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
 
 
 class Waypoint(Description):
@@ -36,9 +43,18 @@ class Waypoint(Description):
     side: Annotated[Triple, PLACE] | None = quantity(
         None, unit="m", source="design", doc="Side point of a wrap, in its frame; nearer than the radius: inside."
     )
+    side_point: SidePoint | None = Field(
+        None, description="In place of side: a side point that another body carries than the wrap's."
+    )
     divisor: Annotated[float, real(0.0, 1e3, above=True)] = quantity(
         1.0, unit="1", source="design", doc="Of a pulley: the path after it counts as this much less."
     )
+
+    @model_validator(mode="after")
+    def _one_side(self) -> Self:
+        if self.side is not None and self.side_point is not None:
+            raise problem("side_point", "has no place beside side")
+        return self
 
     def holds(self, point: Waypoint) -> bool:
         """Return whether a point lies inside of a wrap of the same body; False for another body's."""

@@ -1,4 +1,9 @@
-"""An actuator whose force is affine in its input and in its own motion, both within limits: a motor, or a servo."""
+"""An actuator whose force is affine in its input and in its own motion, both within limits: a motor, or a servo.
+
+One with a state answers late, or sums up: z' = r_u u + r_l l + r_z z, and its force has a part that is proportional to
+z. With r_u = 1 / T = -r_z it is a filter of its input, with r_u = 1 its integral, with r_u = 1 = -r_l that of a servo's
+error.
+"""
 
 from __future__ import annotations
 
@@ -36,4 +41,53 @@ ACTUATOR = Law(
     account=_account,
     signals=("wanted",),
     supplies=("actuators",),
+)
+
+# How fast a state comes to rest at its limits, 1/s.
+_STOPS = 1e3
+
+
+def _moved(row: Row, p: Any) -> Any:
+    """Return u within its limits, and z' free of its limits and within them."""
+    held = np.minimum(np.maximum(row.command, p[4]), p[5])
+    rate = p[9] * held + p[10] * row.length + p[11] * row.state
+    return held, rate, np.minimum(np.maximum(rate, _STOPS * (p[12] - row.state)), _STOPS * (p[13] - row.state))
+
+
+def _value_of_state(row: Row, p: Any) -> Any:
+    gain, offset, by_length, by_speed, _, _, least, most, by_state = p[:9]
+    held, free, rate = _moved(row, p)
+    wanted = gain * held + offset + by_length * row.length + by_speed * row.speed + by_state * row.state
+    return np.minimum(np.maximum(wanted, least), most), rate, wanted, free
+
+
+def _slopes_of_state(row: Row, p: Any, signals: Any) -> Any:
+    gain, _, by_length, by_speed, lowest, highest, least, most, by_state = p[:9]
+    wanted, rate = signals
+    free = 1.0 * (wanted > least) * (wanted < most)
+    heard = 1.0 * (row.command > lowest) * (row.command < highest)
+    stopped = 1.0 * (rate > _STOPS * (p[13] - row.state)) + 1.0 * (rate < _STOPS * (p[12] - row.state))
+    moves = 1.0 - stopped
+    force = (free * by_length, free * by_speed, free * by_state, 0.0, 0.0, free * heard * gain, 0.0)
+    return force, (moves * p[10], 0.0, moves * p[11] - stopped * _STOPS, 0.0, moves * heard * p[9], 0.0)
+
+
+#: The same with a state: a lag, an integrating input, or the integral part of a servo.
+ACTUATOR_WITH_STATE = Law(
+    name="actuator with a state",
+    parameters=(
+        *ACTUATOR.parameters,
+        "by_state",
+        "state_by_input",
+        "state_by_length",
+        "state_by_state",
+        "least_state",
+        "most_state",
+    ),
+    value=_value_of_state,
+    slopes=_slopes_of_state,
+    account=_account,
+    signals=("wanted", "free_rate"),
+    supplies=("actuators",),
+    scale=1.0,
 )

@@ -28,6 +28,8 @@ from finger_pin.laws.bristle import (
 )
 from finger_pin.laws.law import Law, Row, direction, magnitude
 
+# More than any tendon bears, N.
+_ANY_FORCE = 1e30
 # What integrators take for an instant, s: about a hundred times the resolution of time.
 _INSTANT = 1e-12
 
@@ -195,4 +197,75 @@ PASSIVE_FRICTION = Law(
     losses=("coulomb", "viscous", "micro_damping"),
     scale=1.0,
     kink="speed",
+)
+
+
+def _canal(row: Row, p: Any) -> Any:
+    surface, ratio, stiffness, viscous, stribeck, _, exponent, lag, _, one_way = p
+    # What pushes, where it can.
+    lowest = -_ANY_FORCE * (one_way <= 0.0)
+    tension = np.maximum(row.command, lowest)
+    coefficient = capstan_coefficient(surface, row.curvature)
+    left = tension - friction_force(row.state, row.speed, viscous)
+    pressing = np.maximum(left, lowest)
+    normal = np.abs(pressing) + np.abs(tension)
+    sliding = friction_coefficient(row.speed, coefficient, ratio * coefficient, stribeck, exponent, row.side)
+    level = _level(normal, sliding, row, p)
+    rate = stiction_rate(row.state, row.speed, level, stiffness, row.side)
+    loss = friction_force(row.state, row.speed, viscous, rate, lag)
+    force = np.maximum(-loss, lowest - tension)
+    return force, rate, loss, normal, coefficient, sliding, level, pressing
+
+
+def _canal_slopes(row: Row, p: Any, signals: Any) -> Any:
+    viscous, lag, one_way = p[3], p[7], 1.0 * (p[9] > 0.0)
+    loss, normal, coefficient, sliding, level, pressing = signals
+    by_speed, own, by_normal, by_curvature = _rate_slopes(row, normal, coefficient, sliding, level, p)
+    pulled = 1.0 - one_way * (row.command <= 0.0)
+    tension = pulled * row.command
+    taut = 1.0 - one_way * (loss >= tension)
+    pressed = by_normal * np.sign(pressing)
+    by_command = pulled * (pressed + by_normal * np.sign(tension))
+    force = (0.0, -taut * viscous, -taut, -taut * lag, 0.0, pulled * (taut - 1.0), 0.0)
+    return force, (0.0, by_speed - pressed * viscous, own - pressed, 0.0, by_command, by_curvature)
+
+
+def _canal_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    stored, coulomb, viscous, micro = bristle_account(row.speed, row.state, rate, signals[4], p[2], p[3], p[7])
+    return stored, coulomb, viscous, micro, -(signals[0] + force) * row.speed
+
+
+#: The friction of a tendon that other rows pull, along its length or a part of it: it exerts what friction changes of
+#: their tension, which is its input. With ``one_way`` they only pull, and friction never pushes.
+CANAL_FRICTION = Law(
+    name="tendon in its canal (14), (16)",
+    parameters=(*_PARAMETERS, "one_way"),
+    value=_canal,
+    slopes=_canal_slopes,
+    account=_canal_account,
+    signals=("friction", "normal_force", "coefficient", "sliding_coefficient", "level", "pressing"),
+    losses=("coulomb", "viscous", "micro_damping", "slack"),
+    scale=1.0,
+    kink="speed",
+)
+
+
+def _shared(row: Row, p: Any) -> Any:
+    return np.maximum(row.command, 0.0) + p[0] * np.maximum(-row.command, 0.0), 0.0 * row.command
+
+
+def _shared_slopes(row: Row, p: Any, signals: Any) -> Any:
+    by_command = 1.0 * (row.command > 0.0) - p[0] * (row.command < 0.0)
+    return (0.0, 0.0, 0.0, 0.0, 0.0, by_command, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _shared_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    # Without an arm it has no speed, and no power.
+    return 0.0 * force, force * row.speed
+
+
+#: The tension of a cord that turns a joint, by its share of what drives the joint: its input where that pulls it, and
+#: its magnitude where one cord, or what stands for a pair, turns it both ways. It has no arm: the drive itself acts.
+CORD_TENSION = Law(
+    "tension of a cord", ("both_ways",), _shared, _shared_slopes, _shared_account, supplies=("actuators",)
 )

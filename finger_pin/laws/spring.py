@@ -56,3 +56,19 @@ JOINT_SPRING = Law(
     account=_account,
     losses=("damping",),
 )
+
+
+def _constant(row: Row, p: Any) -> Any:
+    return p[0] + 0.0 * row.length, 0.0 * row.length
+
+
+def _constant_slopes(row: Row, p: Any, signals: Any) -> Any:
+    return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _constant_account(row: Row, p: Any, force: Any, rate: Any, signals: Any) -> Any:
+    return (-p[0] * row.length,)
+
+
+#: A force that is the same everywhere, such as a weight that is compensated; it stores what it lets down.
+CONSTANT_FORCE = Law("constant force", ("force",), _constant, _constant_slopes, _constant_account)

@@ -90,14 +90,17 @@ class Finger:
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)
         self.visuals: pin.GeometryModel | None = None
-        of_tree = tree_rows(description, self.paths, parts.width) if self.paths else ()
-        self.further = (*parts.hysteresis_rows(), *of_tree, *rows)
-        drives = parts.drives(rows)
+        of_tree = tree_rows(description, self.paths, parts.width) if self.paths else []
+        # What pulls tendons comes before their friction.
+        before = tuple(table for table in of_tree if table.group != "tendon_dry_friction")
+        drives = parts.drives(description, rows)
         self.pulled = self.tendons.pulled(drives)
-        tables = parts.tables(description, self.paths, drives, self.pulled)
+        tables, canals = parts.tables(description, self.paths, before, drives, self.pulled)
+        last = (*parts.hysteresis_rows(), *(table for table in of_tree if table not in before), *rows)
+        self.further = (*before, *canals.tables, *last)
         mechanism = Mechanism(
             self.rigid_body,
-            [*tables, *(table for table in self.further if not table.pulls)],
+            [*tables, *(table for table in last if not table.pulls)],
             (*self.routing.passive_names, *self.actuators.names),
             np.concatenate([self.tendons.mass, self.actuators.inertia]),
             # Also where a tendon's input goes nowhere: the second one of a spool has none.
@@ -105,12 +108,15 @@ class Finger:
             moved=description.hand is not None and description.hand.palm.path is not None,
         )
         placed = None if self.paths is None else self.paths.placed
-        if objects is None and description.hand is not None and description.hand.fingers_touch:
+        hand, tree = description.hand, description.tree
+        if tree is not None and tree.objects:
+            objects = {**tree.objects, **(objects or {})}
+        if objects is None and (description.touches_itself or (hand is not None and hand.fingers_touch)):
             objects = {}
         around = None if objects is None else Surroundings.of(objects, description, mechanism, placed)
         self.surroundings = around
         self.mechanism = mechanism if around is None else around.around(mechanism)
-        self.layout = Layout.of(self.tendons, self.actuators, self.further, around)
+        self.layout = Layout.of(self.tendons, self.actuators, last, around, before, canals.tables)
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""

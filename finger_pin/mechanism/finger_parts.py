@@ -9,6 +9,7 @@ from finger_pin.description.caching import Remembered
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.mechanism.actuators import Actuators
+from finger_pin.mechanism.canals import Canals
 from finger_pin.mechanism.joint_friction import JointFriction
 from finger_pin.mechanism.joint_springs import JointSprings
 from finger_pin.mechanism.routes import Routes
@@ -39,13 +40,16 @@ class Parts(NamedTuple):
         return cls(
             routing,
             _KNOWN.of(
-                (routing, description.tendon_friction, description.passive_tendon),
+                (routing, description.tree, description.tendon_friction, description.passive_tendon),
                 lambda: Tendons.from_description(description),
             ),
             _KNOWN.of(
                 (routing, *motors, None, *motors.values()), lambda: Actuators.from_description(description, routing)
             ),
-            _KNOWN.of((routing, friction), lambda: JointFriction.from_description(description, routing.loads)),
+            _KNOWN.of(
+                (routing, description.tree, friction),
+                lambda: JointFriction.from_description(description, routing.loads),
+            ),
             _KNOWN.of((limits, *each), lambda: StrokeLimiter.from_description(description)),
             _KNOWN.of(("springs", *each), lambda: JointSprings.from_description(description)),
         )
@@ -59,26 +63,43 @@ class Parts(NamedTuple):
         """Return the tables of the springs' hysteresis."""
         return tuple(_made(self.springs.hysteresis_rows, self.routing.joints, self.width))
 
-    def drives(self, rows: Sequence[Rows]) -> tuple[Rows, ...]:
-        """Return the tables that pull tendons: those of elastic ones, and those among further tables."""
-        return (*_made(self.actuators.tendon_rows, self.width), *(table for table in rows if table.pulls))
+    def drives(self, description: FingerDescription, rows: Sequence[Rows]) -> tuple[Rows, ...]:
+        """Return the tables that pull tendons: elastic ones, sources with an end, and those among further tables."""
+        sources = _KNOWN.of(
+            (self.tendons, self.width, *description.tendons.values()),
+            lambda: self.tendons.sources(description, self.width),
+        )
+        elastic = _made(self.actuators.tendon_rows, self.width)
+        return (*elastic, *sources, *(table for table in rows if table.pulls))
 
     def tables(
-        self, description: FingerDescription, paths: Routes | None, drives: tuple[Rows, ...], pulled: dict[str, Array]
-    ) -> list[Rows]:
-        """Return the tables of rows in the order of evaluation, as wide as there are coordinates."""
+        self,
+        description: FingerDescription,
+        paths: Routes | None,
+        of_tree: tuple[Rows, ...],
+        drives: tuple[Rows, ...],
+        pulled: dict[str, Array],
+    ) -> tuple[list[Rows], Canals]:
+        """Return the tables of rows in the order of evaluation, as wide as there are coordinates, and the canals."""
         joints, actuated, width = self.routing.joints, self.routing.actuated, self.width
         pulling: list[Rows] = _made(self.tendons.rows, drives, len(self.actuators.names))
         if paths:
             pulling = [along_paths(description, paths, table) for table in pulling]
-        friction = self.joint_friction
+        canals = Canals(description, paths, self.tendons, [*of_tree, *pulling], pulled, width)
+        friction, wired = self.joint_friction, tuple(canals.loads)
+        pins = _KNOWN.of(
+            (friction, *drives, width, *wired, *(each.tobytes() for each in canals.loads.values())),
+            lambda: friction.rows(joints, pulled, actuated, width, canals.loads),
+        )
         return [
+            *of_tree,
             *pulling,
-            _KNOWN.of((friction, *drives, width), lambda: friction.rows(joints, pulled, actuated, width)),
+            *canals.tables,
+            pins,
             _made(self.stroke_limiter.rows, joints, width),
             _made(self.springs.rows, joints, width),
             *_made(self.actuators.rotor_rows, width),
-        ]
+        ], canals
 
 
 def _made(make: Any, *given: Any) -> Any:

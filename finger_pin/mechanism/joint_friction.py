@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import FingerDescription
@@ -29,6 +30,7 @@ class JointFriction:
 
     Attributes:
         loads: Shape (n, s), one where a strand loads a joint.
+        bearing: Whether each joint has a pin that rubs, shape (n,).
         kinetic: M^d, shape (n,), m.
         static: M^c, shape (n,), m.
         stiffness: sigma_0, shape (n,), N m/rad.
@@ -40,6 +42,7 @@ class JointFriction:
     """
 
     loads: Array
+    bearing: NDArray[np.bool_]
     kinetic: Array
     static: Array
     stiffness: Array
@@ -53,11 +56,24 @@ class JointFriction:
     def from_description(cls, description: FingerDescription, loads: Array) -> JointFriction:
         """Read one number per joint; ``loads`` comes from the routing."""
         law, size = description.joint_friction, len(description.joints)
+        tree = description.tree
+        bearing = np.array([tree is None or tree.joints[name].bearing for name in description.joints])
         return cls(
-            loads=loads, kinetic=expand(law.coulomb, size), static=expand(law.stiction, size), **bristles(law, size)
+            loads=bearing[:, None] * loads,
+            bearing=bearing,
+            kinetic=expand(law.coulomb, size),
+            static=expand(law.stiction, size),
+            **bristles(law, size),
         )
 
-    def rows(self, names: tuple[str, ...], drives: Mapping[str, Array], actuated: int, width: int) -> Rows:
+    def rows(
+        self,
+        names: tuple[str, ...],
+        drives: Mapping[str, Array],
+        actuated: int,
+        width: int,
+        canals: Mapping[str, Array] | None = None,
+    ) -> Rows:
         """Return the table of the joints' friction.
 
         Args:
@@ -65,11 +81,12 @@ class JointFriction:
             drives: Weights with which further tables pull the strands, as of `Tendons.pulled`; all of it adds up.
             actuated: Number of driven tendons.
             width: Number of coordinates.
+            canals: Weights with which canals of a tree, and what pulls through them, load the pins, shape (n, rows).
         """
         size = len(names)
         # Strands beyond the actuated ones are halves of passive tendons.
         loads = {"driven_tendons": self.loads[:, :actuated], "passive_halves": self.loads[:, actuated:]}
-        loads |= {group: self.loads @ weights for group, weights in drives.items()}
+        loads |= {group: self.loads @ weights for group, weights in drives.items()} | dict(canals or {})
         return Rows(
             group="joint_friction",
             law=PIN_FRICTION,
@@ -77,7 +94,7 @@ class JointFriction:
             parameters=np.array([getattr(self, name) for name in PIN_FRICTION.parameters]),
             arm=np.eye(size, width),
             loads=loads,
-            pins=np.arange(size),
+            pins=np.where(self.bearing, np.arange(size), -1),
             stored=Energy("joint_bristles", "joint bristles"),
             powers=LOSSES,
         )

@@ -25,7 +25,7 @@ class PieceShape(Protocol):
 
     Attributes:
         parameters: Names of its numbers.
-        value: (y, p, out) fills what the points y, six numbers, give; see `spans` and `gaps`.
+        value: (y, p, out) fills what the points y give, six numbers, and three of a side point; see `spans`, `gaps`.
         slopes: (y, p, out) fills its derivatives by y.
         columns: Count of its wrenches: one along a span; normal and two tangents of a gap.
     """
@@ -62,7 +62,7 @@ class Piece:
     Attributes:
         shape: The function.
         parameters: Its numbers.
-        ends: The two points.
+        ends: The two points, and the side point of a wrap that another body carries than the wrap's.
         joint: Of the body that carries the frame, 0 for the base.
         frame: Placement of the frame in that joint's.
         reach: Distance of both points' middle from the frame's origin beyond which a gap is open and not asked, m.
@@ -73,7 +73,7 @@ class Piece:
 
     shape: PieceShape
     parameters: Array
-    ends: tuple[Place, Place]
+    ends: tuple[Place, ...]
     joint: int = 0
     frame: pin.SE3 = field(default_factory=pin.SE3.Identity)
     reach: float = np.inf
@@ -91,6 +91,7 @@ class Leg:
         arm: Weight in the row's arm.
         measure: Weight in the row's length; by default the arm's.
         follows: Whether it begins where the row's leg before it ends: there the path turns.
+        bends: Whether its turn is one of the row's path; behind a pulley each branch has rows of its own.
     """
 
     piece: Piece
@@ -98,6 +99,7 @@ class Leg:
     arm: float = 1.0
     measure: float | None = None
     follows: bool = False
+    bends: bool = True
 
     @property
     def length_weight(self) -> float:
@@ -114,8 +116,8 @@ def moved(paths: Paths, shift: int) -> tuple[tuple[Leg, ...], ...]:
 
     @cache
     def piece_there(piece: Piece) -> Piece:
-        first, second = (replace(end, joint=end.joint and end.joint + shift) for end in piece.ends)
-        return replace(piece, ends=(first, second), joint=piece.joint and piece.joint + shift)
+        ends = tuple(replace(end, joint=end.joint and end.joint + shift) for end in piece.ends)
+        return replace(piece, ends=ends, joint=piece.joint and piece.joint + shift)
 
     return tuple(tuple(replace(leg, piece=piece_there(leg.piece)) for leg in legs) for legs in paths)
 
@@ -161,14 +163,13 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
                 axis = (1, 7, 10)[leg.column]
                 loads = [(rotation @ out[axis : axis + 3], frame.act(out[4:7]))] if out[0] < 0.0 else []
             arm = np.zeros(width)
-            for (force, point), end in zip(loads, piece.ends, strict=False):
+            for (force, point), end in zip(loads, piece.ends[:2], strict=False):
                 wrench = np.concatenate([force, pin.skew(point) @ force])
                 arm += wrench @ (twists[end.joint] - twists[piece.joint])
             found.length[k] += leg.length_weight * length
             found.arm[k, :width] += leg.arm * arm
-            found.turn[k] += turn
-            if leg.follows:
-                found.turn[k] += _angle(before, -loads[0][0])
+            if leg.bends:
+                found.turn[k] += turn + (_angle(before, -loads[0][0]) if leg.follows else 0.0)
             if number == 0 and loads:
                 found.force[k] = loads[0][0]
             before = loads[-1][0] if loads else before
@@ -179,7 +180,7 @@ def _value(piece: Piece, frame: pin.SE3, points: Sequence[Array]) -> Array:
     """Return the value of the shape; out of reach, a gap that is open."""
     y = np.concatenate([frame.actInv(point) for point in points])
     out = np.zeros(16)
-    beyond = np.linalg.norm(0.5 * (y[:3] + y[3:])) - piece.reach
+    beyond = np.linalg.norm(0.5 * (y[:3] + y[3:6])) - piece.reach
     if beyond > 0.0:
         out[0] = beyond
     else:

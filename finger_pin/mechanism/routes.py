@@ -14,6 +14,7 @@ from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.pieces import Leg, Piece, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
+from finger_pin.mechanism.spans.span import ELSEWHERE
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,12 @@ class Route:
     Attributes:
         coefficients: Shape (n,).
         legs: Of its path.
+        branches: Behind each pulley, the divisor and the legs of that part, undivided.
     """
 
     coefficients: Array
     legs: tuple[Leg, ...]
+    branches: tuple[tuple[float, tuple[Leg, ...]], ...] = ()
 
     def times(self, factor: float) -> Route:
         """Return the same with its length multiplied."""
@@ -59,22 +62,26 @@ class Routes:
         body: The rigid body.
         routes: By name.
         placed: Places of the tree's bodies, by name.
+        middles: Of the joints' ranges, by name, rad or m.
     """
 
     body: RigidBody
     routes: Mapping[str, Route]
     placed: Mapping[str | None, Placed]
+    middles: Mapping[str, float]
 
     @classmethod
-    def of(cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed]) -> Routes:
-        """Read the tendons of a tree whose bodies are placed."""
+    def of(
+        cls, tree: Tree, body: RigidBody, placed: Mapping[str | None, Placed], middles: Mapping[str, float]
+    ) -> Routes:
+        """Read the tendons of a tree whose bodies are placed, and whose joints' ranges have some middles."""
         routes, joints = {}, list(tree.joints)
         for name, tendon in tree.tendons.items():
             coefficients = np.zeros(len(joints))
             for joint, coefficient in (tendon.joints or {}).items():
                 coefficients[joints.index(joint)] = coefficient
-            routes[name] = Route(coefficients, _legs(tendon.path or {}, placed))
-        return cls(body, routes, placed)
+            routes[name] = _route(coefficients, tendon.path or {}, placed)
+        return cls(body, routes, placed, middles)
 
     @property
     def fixed(self) -> Array:
@@ -91,7 +98,7 @@ class Routes:
         return self._reached(q)[1]
 
     def turn(self, q: Array) -> Array:
-        """Return the angle by which each path turns at q, shape (..., n), at points and along wraps: (..., t), rad."""
+        """Return the angle by which each path turns at q, shape (..., n), before its first pulley: (..., t), rad."""
         return self._reached(q)[2]
 
     def _reached(self, q: Array) -> tuple[Array, Array, Array]:
@@ -104,24 +111,27 @@ class Routes:
         return found.length + self.fixed @ q, found.arm + self.fixed, found.turn
 
 
-def _legs(path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> tuple[Leg, ...]:
-    """Return the legs between the points of a path."""
-    legs: list[Leg] = []
+def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[str | None, Placed]) -> Route:
+    """Return a tendon's route: only the turn before the first pulley is that of its own canal."""
+    parts: list[tuple[float, list[Leg]]] = [(1.0, [])]
     before: Place | None = None
     wrap: Waypoint | None = None
-    divisor, follows = 1.0, False
     for each in path.values():
         if each.kind == "pulley":
-            divisor, before, follows = each.divisor, None, False
+            parts.append((each.divisor, []))
+            before = None
         elif each.kind == "point":
             here = placed[each.body].place(each.position)
             if before is not None:
-                legs.append(Leg(_piece(before, here, wrap, placed), arm=1.0 / divisor, follows=follows))
-                follows = True
+                legs = parts[-1][1]
+                legs.append(Leg(_piece(before, here, wrap, placed), follows=bool(legs)))
             before, wrap = here, None
         else:
             wrap = each
-    return tuple(legs)
+    (_, trunk), *branches = parts
+    behind = [replace(leg, arm=1.0 / divisor, bends=False) for divisor, legs in branches for leg in legs]
+    divided = tuple((divisor, tuple(legs)) for divisor, legs in branches if legs)
+    return Route(coefficients, (*trunk, *behind), divided)
 
 
 def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[str | None, Placed]) -> Piece:
@@ -129,10 +139,13 @@ def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[s
         return Piece(STRAIGHT, np.zeros(0), (first, second))
     body = placed[wrap.body]
     frame = body.frame * pin.SE3(rotation(wrap.orientation), np.array(wrap.position))
-    side = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side
+    side, elsewhere = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side, wrap.side_point
     inside = wrap.side is not None and float(np.linalg.norm(side)) < wrap.radius
-    numbers = np.array([wrap.radius, *side, wrap.side is not None, inside], dtype=float)
-    return Piece(CYLINDER if wrap.kind == "cylinder" else SPHERE, numbers, (first, second), body.joint, frame)
+    known = ELSEWHERE if elsewhere else float(wrap.side is not None)
+    numbers = np.array([wrap.radius, *side, known, inside], dtype=float)
+    third = (placed[elsewhere.body].place(elsewhere.position),) if elsewhere else ()
+    shape = CYLINDER if wrap.kind == "cylinder" else SPHERE
+    return Piece(shape, numbers, (first, second, *third), body.joint, frame)
 
 
 def rotation(quaternion: tuple[float, float, float, float]) -> Array:

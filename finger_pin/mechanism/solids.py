@@ -137,7 +137,7 @@ def tree_solids(tree: Tree, placed: Mapping[str | None, Placed], body: RigidBody
 def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
     """Return the names of links, or of shapes, of one finger that touch each other: no neighbours among links."""
     if description.tree is not None:
-        return {frozenset(pair) for pair in description.tree.touching}
+        return {frozenset(pair) for pair in description.tree.touching if description.touches_itself}
     hand = description.hand
     fingers = {"": description} if hand is None else {f"{key}.": each.finger for key, each in hand.fingers.items()}
     found = set()

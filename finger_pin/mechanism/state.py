@@ -7,7 +7,8 @@ n joints, f free objects (o is position and quaternion; o' velocity and angular 
 m motors, h tendons on spools and halves of passive ones with hysteresis, these first, c contacts with bristles bent by
 z: 19 numbers for the paper's finger, which has neither motors nor contacts. States of drives of one's own follow what
 tendons hold, those of other rows of one's own follow all. Where objects stand in the world around a palm that moves,
-the six joints of the world that it sees follow o and o'.
+the six joints of the world that it sees follow o and o'. Of a tree, states of its actuators follow z, and F^s of the
+tendons that these pull, and of branches behind pulleys, that of the other tendons.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ class State:
         contact_bend: z of the contacts, two tangents each, shape (..., 2 c), m.
         elastic_stiction: F^s that tendons hold against their stretch, halves of passive ones first, shape (..., h), N.
         drives: States of drives of one's own, shape (..., d); they follow what tendons hold.
+        actuator_state: States of a tree's actuators that have some, shape (..., k).
+        canal_stiction: F^s of a tree's tendons that no drive pulls, and of branches behind pulleys, shape (..., c), N.
     """
 
     position: Array
@@ -74,6 +77,8 @@ class State:
     contact_bend: Array | None = None
     elastic_stiction: Array | None = None
     drives: Array | None = None
+    actuator_state: Array | None = None
+    canal_stiction: Array | None = None
 
     @property
     def q(self) -> Array:
@@ -102,6 +107,8 @@ class Layout:
         contacts: Names of the contacts.
         held: Names of the halves of passive tendons, and then of the tendons on spools, with hysteresis.
         drives: Name and scale of every state of drives of one's own.
+        actuators: Names of a tree's actuators with states.
+        canals: Names of the canals of a tree, with branches.
     """
 
     joints: tuple[str, ...]
@@ -115,10 +122,18 @@ class Layout:
     contacts: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     drives: tuple[tuple[str, float], ...] = ()
+    actuators: tuple[str, ...] = ()
+    canals: tuple[str, ...] = ()
 
     @classmethod
     def of(
-        cls, tendons: Tendons, motors: Actuators, rows: Sequence[Rows] = (), around: Surroundings | None = None
+        cls,
+        tendons: Tendons,
+        motors: Actuators,
+        rows: Sequence[Rows] = (),
+        around: Surroundings | None = None,
+        of_tree: Sequence[Rows] = (),
+        canals: Sequence[Rows] = (),
     ) -> Layout:
         """Return the layout of tendons, motors, further rows, drives among them, and a finger's surroundings."""
         routing = tendons.routing
@@ -138,6 +153,8 @@ class Layout:
             contacts=() if around is None else around.contacts.names,
             held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
             drives=drives,
+            actuators=tuple(name for table in of_tree if table.states for name in table.names),
+            canals=tuple(name for table in canals if table.states for name in table.names),
         )
         # Of the same names and sizes much follows, once for all fingers.
         return _KNOWN.of((found,), lambda: found)
@@ -166,9 +183,11 @@ class Layout:
             "passive_velocity": (passive, 0.1),
             "motor_velocity": (self.motors, 10.0),
             "contact_bend": (bends, 1e-5),
+            "actuator_state": (self.actuators, 1.0),
             "elastic_stiction": (self.held, 1.0),
             "drives": (tuple(name for name, _ in self.drives), 1.0),
             "tendon_stiction": (self.tendons, 1.0),
+            "canal_stiction": (self.canals, 1.0),
             "joint_stiction": (self.joints, 1e-2),
             "gearbox_stiction": (self.motors, 1e-2),
             "further": (tuple(name for name, _ in self.further), 1.0),

@@ -11,6 +11,7 @@ from finger_pin.description.caching import Remembered
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array, Routing
 from finger_pin.description.validation import expand
+from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
 from finger_pin.laws.passive_tendon import TENDON_HALF
 from finger_pin.mechanism.energies import Energy
@@ -26,9 +27,11 @@ LOSSES = (
     Energy("tendon_viscous", "tendons viscous"),
     Energy("tendon_micro_damping", "tendons' micro-damping"),
 )
-_SLACK = Energy("slack", "tensions cut at zero")
-_BRISTLES = Energy("tendon_bristles", "tendon bristles")
+SLACK = Energy("slack", "tensions cut at zero")
+BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _HALVES = ("proximal", "distal")
+# What the law calls otherwise.
+_NAMES = {"ratio": "stiction_ratio"}
 _WIRED: Remembered[list[Rows]] = Remembered()
 _STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
 
@@ -51,6 +54,7 @@ class Tendons:
         half_stiffness: K_h = 2 K_t, shape (p,), N/m.
         hysteresis: h, shape (p,).
         mass: m_5, shape (p,), kg.
+        canals: Numbers of friction of the finger's tendons and of the canals of its tree, shape (f, t + c).
     """
 
     routing: Routing
@@ -66,19 +70,20 @@ class Tendons:
     half_stiffness: Array
     hysteresis: Array
     mass: Array
+    canals: Array
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Tendons:
         """Read friction and passive tendons, one number per tendon."""
         routing = Routing.from_description(description)
         law, passive = description.tendon_friction, description.passive_tendon
-        size = len(routing.tendons)
+        size, among = len(routing.tendons), len(routing.tendons) + len(description.canals)
+        friction = {"surface": expand(law.coulomb, among), "stiction_ratio": expand(law.stiction_ratio, among)}
+        friction |= bristles(law, among) | {"drag": expand(law.drag, among)}
         return cls(
             routing=routing,
-            surface=expand(law.coulomb, size),
-            stiction_ratio=expand(law.stiction_ratio, size),
-            **bristles(law, size),
-            drag=expand(law.drag, size),
+            **{name: each[:size] for name, each in friction.items()},
+            canals=np.array([friction[_NAMES.get(name, name)] for name in PASSIVE_FRICTION.parameters]),
             half_stiffness=2.0 * expand(passive.stiffness, routing.passive),
             hysteresis=expand(passive.hysteresis, routing.passive),
             mass=expand(passive.mass, routing.passive),
@@ -100,6 +105,19 @@ class Tendons:
         """Names of the halves of passive tendons with hysteresis."""
         held = zip(self.routing.passive_names, self.hysteresis, strict=True)
         return tuple(f"{name}.{half}" for name, share in held if share for half in _HALVES)
+
+    def sources(self, description: FingerDescription, width: int) -> list[Rows]:
+        """Return the table of ideal sources whose tension has an end, none without any."""
+        most = {name: each.maximum_tension for name, each in description.tendons.items()}
+        places = np.array([k for k, name in enumerate(self.routing.tendons) if most[name] is not None], dtype=np.int64)
+        if not places.size:
+            return []
+        names = tuple(self.routing.tendons[k] for k in places)
+        ends = np.array([most[name] for name in names], dtype=float)
+        arm, none = np.zeros((len(places), width)), np.zeros(len(places))
+        arm[:, : len(self.routing.joints)] = self.routing.coupling[places]
+        numbers = np.array([none + 1.0, none, none, none, none, ends, none, ends])
+        return [Rows("tension_sources", ACTUATOR, names, numbers, arm, channels=places, powers=(SOURCES,), pulls=names)]
 
     def pulled(self, drives: Sequence[Rows]) -> dict[str, Array]:
         """Return the weights with which drives and halves' hysteresis pull the s strands, by table, shape (s, k)."""
@@ -154,8 +172,7 @@ class Tendons:
     @property
     def _friction(self) -> Array:
         """The numbers of friction in the canals by those of its law, shape (f, t)."""
-        shared = (getattr(self, name) for name in PASSIVE_FRICTION.parameters[2:])
-        return np.array([self.surface, self.stiction_ratio, *shared])
+        return self.canals[:, : len(self.routing.tendons)]
 
     def _rows(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
         routing, joints = self.routing, len(self.routing.joints)
@@ -185,8 +202,8 @@ class Tendons:
                 inputs=wired,
                 bends=bends[:actuated],
                 curvature_offset=routing.curvature_offset[:actuated],
-                stored=_BRISTLES,
-                powers=(SOURCES, *LOSSES, _SLACK),
+                stored=BRISTLES,
+                powers=(SOURCES, *LOSSES, SLACK),
             ),
             Rows(
                 group="passive_tendons",
@@ -197,7 +214,7 @@ class Tendons:
                 loads=loads,
                 bends=bends[actuated:],
                 curvature_offset=routing.curvature_offset[actuated:],
-                stored=_BRISTLES,
+                stored=BRISTLES,
                 powers=LOSSES,
             ),
         ]

@@ -1,26 +1,32 @@
-"""A tree of bodies from its description, and the rows of its tendons, couplings and actuators."""
+"""A tree of bodies from its description, and the rows of its tendons, couplings, loops, weights and actuators."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.polynomial import Polynomial
 
 from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.routing import Array
+from finger_pin.description.tree import Coupling, Loop, Tree, TreeActuator
 from finger_pin.exceptions import InputError
-from finger_pin.laws.actuator import ACTUATOR
+from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
 from finger_pin.laws.bristle import PIN_FRICTION
 from finger_pin.laws.dead_band import DEAD_BAND_SPRING
 from finger_pin.laws.law import Law
 from finger_pin.laws.limiter import STROKE_LIMITER
-from finger_pin.laws.spring import JOINT_SPRING
+from finger_pin.laws.spring import CONSTANT_FORCE, JOINT_SPRING
 from finger_pin.mechanism.energies import Energy
+from finger_pin.mechanism.pieces import Leg, Piece, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.routes import Placed, Route, Routes, rotation
 from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendons import SOURCES
 
 _TIP = "fingertip"
@@ -32,12 +38,17 @@ _STORED = {
     "tendon_spring": Energy("tendon_spring", "tendons' springs"),
     "tendon_limit": Energy("tendon_limit", "tendons' limits"),
     "coupling": Energy("coupling", "couplings"),
+    "loop": Energy("loop", "loops"),
+    "gravity_compensation": Energy("gravity_compensation", "weights compensated"),
+    "actuator_with_state": Energy("joint_springs", "joints' springs"),
     "actuator": Energy("joint_springs", "joints' springs"),
 }
 _EXCHANGED = {
     "tendon_spring": (Energy("tendon_spring_damping", "tendons' dampers"),),
     "tendon_limit": (Energy("tendon_limit_limiter", "tendons' limits"),),
     "coupling": (Energy("coupling_damping", "couplings"),),
+    "loop": (Energy("loop_damping", "loops"),),
+    "actuator_with_state": (SOURCES,),
     "actuator": (SOURCES,),
 }
 
@@ -81,7 +92,8 @@ def build_tree(description: FingerDescription) -> tuple[RigidBody, Routes]:
         if not moment > 0.0:
             raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
     rigid_body = RigidBody(model, _TIP)
-    return rigid_body, Routes.of(tree, rigid_body, placed)
+    middles = {name: 0.5 * sum(each.range) for name, each in description.joints.items()}
+    return rigid_body, Routes.of(tree, rigid_body, placed, middles)
 
 
 def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> Rows:
@@ -102,11 +114,10 @@ def along_paths(description: FingerDescription, routes: Routes, table: Rows) -> 
 
 
 def tree_rows(description: FingerDescription, routes: Routes, width: int) -> list[Rows]:
-    """Return the rows of tendons, couplings and actuators of a tree, as wide as there are coordinates."""
+    """Return the rows of a tree but for friction of loaded tendons, as wide as there are coordinates."""
     tree = description.tree
     assert tree is not None
     joints = {name: Route(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
-    tendons = routes.routes
 
     def table(group: str, law: Law, along: dict[str, Route], numbers: Sequence[Sequence[float]], **more: Any) -> Rows:
         arm = np.zeros((len(along), width))
@@ -115,41 +126,141 @@ def tree_rows(description: FingerDescription, routes: Routes, width: int) -> lis
         booked = {"stored": _STORED.get(group), "powers": _EXCHANGED.get(group, ())}
         return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(booked | more))
 
-    sprung = {name: each for name, each in tree.tendons.items() if each.stiffness or each.damping}
-    limited = {name: each for name, each in tree.tendons.items() if each.range is not None}
-    rubbing = {name: each for name, each in tree.tendons.items() if each.friction}
     tables: list[Rows] = []
-    numbers: list[tuple[float, ...]]
-    if sprung:
-        numbers = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
-        tables.append(table("tendon_spring", DEAD_BAND_SPRING, {name: tendons[name] for name in sprung}, numbers))
-    if limited:
-        numbers = [(*each.range, each.limit_stiffness, each.limit_damping) for each in limited.values() if each.range]
-        tables.append(table("tendon_limit", STROKE_LIMITER, {name: tendons[name] for name in limited}, numbers))
-    if rubbing:
-        # Law (9) whose level is its floor.
-        numbers = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0) for each in rubbing.values()]
-        tables.append(table("tendon_dry_friction", PIN_FRICTION, {name: tendons[name] for name in rubbing}, numbers))
-    if tree.couplings:
-        along = {}
-        for name, each in tree.couplings.items():
-            other = each.ratio * joints[each.other].coefficients if each.other else 0.0
-            along[name] = Route(joints[each.joint].coefficients - other, ())
-        numbers = [(each.stiffness, each.offset, each.damping) for each in tree.couplings.values()]
-        tables.append(table("coupling", JOINT_SPRING, along, numbers))
-    if tree.actuators:
+    for group, law, along, numbers in (
+        *_tendons(tree, routes),
+        _couplings(tree, routes, joints),
+        _loops(tree, routes),
+        _weights(description, routes),
+    ):
+        if along:
+            tables.append(table(group, law, along, numbers))
+    first = len(description.actuated_names)
+    for group, law, stateful in (("actuator", ACTUATOR, False), ("actuator_with_state", ACTUATOR_WITH_STATE, True)):
+        own = {name: each for name, each in tree.actuators.items() if each.has_state == stateful}
         along = {
-            name: (joints[each.joint] if each.joint else tendons[str(each.tendon)]).times(each.gear)
-            for name, each in tree.actuators.items()
+            name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
+            for name, each in own.items()
         }
-        numbers = [
-            (
-                *(each.gain, each.offset, each.by_length, each.by_speed),
-                *(each.input_range or _UNLIMITED),
-                *(each.force_range or _UNLIMITED),
-            )
-            for each in tree.actuators.values()
-        ]
-        channels = len(description.actuated_names) + np.arange(len(tree.actuators))
-        tables.append(table("actuator", ACTUATOR, along, numbers, channels=channels))
+        if own:
+            channels = first + np.array([list(tree.actuators).index(name) for name in own])
+            tables.append(table(group, law, along, [_actuator(each) for each in own.values()], channels=channels))
     return tables
+
+
+_Described = tuple[str, Law, dict[str, Route], Sequence[Sequence[float]]]
+
+
+def _tendons(tree: Tree, routes: Routes) -> list[_Described]:
+    """Return springs, ranges, and the dry friction of tendons that no load presses."""
+    tendons = tree.tendons
+    sprung = {name: each for name, each in tendons.items() if each.stiffness or each.damping}
+    limited = {name: each for name, each in tendons.items() if each.range is not None}
+    rubbing = {name: each for name, each in tendons.items() if each.friction and name not in tree.rubbing}
+
+    def along(names: Iterable[str]) -> dict[str, Route]:
+        return {name: routes.routes[name] for name in names}
+
+    springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
+    limits = [(*each.range, each.limit_stiffness, each.limit_damping) for each in limited.values() if each.range]
+    # Law (9) whose level is its floor.
+    dry = [(0, 0, each.friction / _HOLDS, 0, 1, each.friction, 1, 0) for each in rubbing.values()]
+    return [
+        ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
+        ("tendon_limit", STROKE_LIMITER, along(limited), limits),
+        ("tendon_dry_friction", PIN_FRICTION, along(rubbing), dry),
+    ]
+
+
+def _couplings(tree: Tree, routes: Routes, joints: Mapping[str, Route]) -> _Described:
+    """Return the springs that hold joints to others."""
+    along = {name: coupling_route(tree, routes, each, joints) for name, each in tree.couplings.items()}
+    numbers = [(each.stiffness, each.offset, each.damping) for each in tree.couplings.values()]
+    return "coupling", JOINT_SPRING, along, numbers
+
+
+def coupling_route(tree: Tree, routes: Routes, coupling: Coupling, joints: Mapping[str, Route]) -> Route:
+    """Return what a coupling holds at its offset: q less all else that it is a sum of."""
+    held = joints[coupling.joint].coefficients
+    if coupling.other is None:
+        return Route(held, ())
+    route = Route(held - coupling.ratio * joints[coupling.other].coefficients, ())
+    if not any(coupling.higher):
+        return route
+    # An angle is measured from its range's middle, so that it never comes to half a turn.
+    model, index, middle = (
+        routes.body.model,
+        list(tree.joints).index(coupling.other) + 1,
+        routes.middles[coupling.other],
+    )
+    hinge, axis = tree.joints[coupling.other].kind == "hinge", np.array(tree.joints[coupling.other].axis)
+    upright = _upright(axis)
+    powers = Polynomial([0.0, 0.0, *coupling.higher])(Polynomial([middle, 1.0])).coef
+    numbers = np.array([*powers.tolist(), *np.zeros(len(ANGLE.parameters) - len(powers))])
+    parent = int(model.parents[index])
+    frame = model.jointPlacements[index] * pin.SE3(upright, np.zeros(3))
+    if hinge:
+        moved = Place(index, upright @ np.array([math.cos(middle), -math.sin(middle), 0.0]))
+        piece = Piece(ANGLE, numbers, (moved, Place(parent, np.array(frame.translation))), parent, frame)
+    else:
+        still = Place(parent, np.array(frame.act(np.array([0.0, 0.0, middle]))))
+        piece = Piece(RISE, numbers, (still, Place(index, np.zeros(3))), parent, frame)
+    return replace(route, legs=(Leg(piece, arm=-1.0),))
+
+
+def _loops(tree: Tree, routes: Routes) -> _Described:
+    """Return the springs that hold points of bodies together, one along each axis of the base."""
+    along = {
+        f"{name}.{axis}": _rise(routes.placed[each.body].place(each.position), _other(each, routes), np.eye(3)[k])
+        for name, each in tree.loops.items()
+        for k, axis in enumerate("xyz")
+    }
+    numbers = [(each.stiffness, 0.0, each.damping) for each in tree.loops.values() for _ in "xyz"]
+    return "loop", JOINT_SPRING, along, numbers
+
+
+def _other(loop: Loop, routes: Routes) -> Place:
+    return routes.placed[loop.other].place(loop.other_position)
+
+
+def _weights(description: FingerDescription, routes: Routes) -> _Described:
+    """Return the forces that hold up a part of bodies' weight."""
+    tree, gravity = description.tree, np.array(description.gravity)
+    size = float(np.linalg.norm(gravity))
+    assert tree is not None
+    held = {
+        name: each
+        for name, each in tree.bodies.items()
+        if size and each.gravity_compensation and each.mass and routes.placed[name].joint
+    }
+    base = Place(0, np.zeros(3))
+    along = {name: _rise(base, routes.placed[name].place(each.centre), -gravity / size) for name, each in held.items()}
+    numbers = [(each.gravity_compensation * each.mass * size,) for each in held.values()]
+    return "gravity_compensation", CONSTANT_FORCE, along, numbers
+
+
+def _rise(first: Place, second: Place, axis: Array) -> Route:
+    """Return the height of one point above another along an axis of the base, a unit vector."""
+    numbers = np.eye(len(RISE.parameters))[1]
+    piece = Piece(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))
+    return Route(np.zeros(1), (Leg(piece),))
+
+
+def _upright(axis: Array) -> Array:
+    """Return a rotation whose z axis is a unit vector."""
+    turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix()
+    return turned
+
+
+def _actuator(each: TreeActuator) -> tuple[float, ...]:
+    """Return the numbers of an actuator's law."""
+    bounds = (*(each.input_range or _UNLIMITED), *(each.force_range or _UNLIMITED))
+    if not each.has_state:
+        return each.gain, each.offset, each.by_length, each.by_speed, *bounds
+    if each.integral:
+        law, state = each.gain, (each.integral, 1.0, -1.0, 0.0)
+    else:
+        # What it holds takes the place of its input.
+        rate = 1.0 / each.time_constant if each.time_constant else 0.0
+        law, state = 0.0, (each.gain, rate or 1.0, 0.0, -rate)
+    return law, each.offset, each.by_length, each.by_speed, *bounds, *state, *(each.state_range or _UNLIMITED)

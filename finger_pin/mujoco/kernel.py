@@ -152,7 +152,8 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
             block[WIDTH * SPEED + lanes], block[WIDTH * BEARS + lanes], block[WIDTH * PRESSES + lanes] = found[:3]
             block[WIDTH * MOST + lanes], block[WIDTH * BENDS + lanes] = found[3:5]
             block[WIDTH * REAL + lanes], block[WIDTH * IMAGINARY + lanes] = found[5:]
-            winds = WIDTH if found[6] != 0.0 else winds
+            # Half a turn is a negative number without an imaginary part.
+            winds = WIDTH if found[6] != 0.0 or found[5] < 0.0 else winds
             block[WIDTH * BRISTLE + lanes] = act[z]
             block[WIDTH * ROW + lanes] = 3 * (dofs[row] if types[e + 1] == kinds.of_joint else width + row)
             # `advance` moves the bristles, with the speed that the step ends with.

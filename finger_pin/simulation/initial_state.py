@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.canals import BRANCHES, CANALS
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import State
 from finger_pin.simulation.contact_variables import last_touching
@@ -81,8 +82,28 @@ def packed_state(initial: ArrayLike | xr.Dataset, finger: Finger) -> Array:
             raise InputError("initial", f"has no {name}; give what simulate returned")
         else:
             parts[part] = np.zeros(0)
-    parts |= last_touching(finger, last)
+    parts |= _last_states(finger, last, sizes) | last_touching(finger, last)
     return finite_vector("initial", finger.layout.pack(State(**parts)), finger.layout.size)
+
+
+def _last_states(finger: Finger, last: xr.Dataset, sizes: dict[str, Array]) -> dict[str, Array]:
+    """Return the states of a tree's actuators and canals, and of rows of one's own, from the variables of their tables.
+
+    Raises:
+        InputError: If a result lacks them.
+    """
+    tables = [table for table in finger.further if table.states and not table.pulls]
+    early = ("actuator_with_state",), (CANALS, BRANCHES)
+    others = tuple(table.group for table in tables if table.group not in (*early[0], *early[1]))
+    found = {}
+    for part, groups in (("actuator_state", early[0]), ("canal_stiction", early[1]), ("further", others)):
+        names = [f"{table.group}_state" for table in tables if table.group in groups]
+        for name in names:
+            if name not in last:
+                raise InputError("initial", f"has no {name}; give what simulate returned")
+        if sizes[part].size:
+            found[part] = np.concatenate([np.ravel(last[name].values) for name in names])
+    return found
 
 
 def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

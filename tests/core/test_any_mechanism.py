@@ -32,7 +32,7 @@ def drawn(request):
     return mechanism, command, force, [random_states(mechanism, rng, count) for count in (8, 40)]
 
 
-def assert_same(found, expected, mechanism, tolerance=1e-12):
+def assert_same(found, expected, mechanism, tolerance=4e-12):
     """Compare evaluations at many states: rates by kind, the account, and what every row sees, does and shows."""
     for kind in kinds_of(mechanism):
         assert relative(found.rate[:, kind], expected.rate[:, kind]) < tolerance

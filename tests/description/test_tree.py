@@ -51,7 +51,7 @@ def changed(**entries):
 
 
 def test_the_tree_itself_is_taken():
-    assert changed().tree.crossed("upper") == {"hinge"}
+    assert changed().tree.crossed("upper") == [(1.0, {"hinge"})]
     assert fp.Finger(changed()).mechanism.channels == 2
 
 

@@ -12,6 +12,9 @@ from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.description.exercise import exercise
 from finger_pin.description.loading import read_scenario
 
+# Flags, delays and other kinds of actuators are left out here on purpose.
+pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
+
 
 @pytest.fixture(scope="module")
 def hands():
@@ -31,7 +34,7 @@ def inputs(hand, model, control):
     """Return the inputs of a hand for MuJoCo's: tensions of the tendons that motors pull, then those of actuators."""
     given = {model.actuator(i).name.replace(":", "_"): control[i] for i in range(model.nu)}
     pulled = [np.clip(given[name], 0.0, 20.0) for name in hand.description.tendons]
-    return [*pulled, *(given[name] for name in hand.further[-1].names)]
+    return [*pulled, *(given[name] for name in hand.description.tree.actuators)]
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -50,8 +53,10 @@ def test_lengths_and_arms_are_mujoco_s(hands, name):
 def test_accelerations_are_mujoco_s_without_its_constraints(name):
     """Inertia, gravity, springs, dampers, tendons and actuators at random states, by both evaluators."""
     model, random = MODELS[name](), np.random.default_rng(1)
-    model.tendon_limited[:] = 0
-    smooth = read_scenario(exercise(fp.from_mujoco(model)), SMOOTH)
+    model.tendon_limited[:], model.jnt_margin[:] = 0, 0.0
+    described = fp.from_mujoco(model)
+    described = described.updated(touches_itself=False, tree=described.tree.updated(objects={}))
+    smooth = read_scenario(exercise(described), SMOOTH)
     data, hand = mujoco.MjData(model), fp.Hand(smooth.finger)
     compiled = CompiledFinger(hand)
     for _ in range(50 if name == "routed" else 10):
@@ -180,7 +185,10 @@ def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
 
 
 def test_a_tendon_that_a_motor_pulls_loses_tension_by_the_turn_of_its_path():
-    """The capstan law with mu_e phi, phi from the path's directions at one posture: pulled in, then let out."""
+    """The capstan law with mu_e phi, phi from the path's directions at one posture: pulled in, then let out.
+
+    Behind the pulley each branch has its part of what the tendon's canal has left, and loses by its own turn.
+    """
     model = MODELS["routed"]()
     settings = {"finger.tendon_friction.viscous": 0.0, "finger.tendon_friction.floor": 1e-6}
     described = read_scenario(exercise(fp.from_mujoco(model)), settings).finger
@@ -189,21 +197,30 @@ def test_a_tendon_that_a_motor_pulls_loses_tension_by_the_turn_of_its_path():
     mujoco.mj_forward(model, data)
     first, count = data.ten_wrapadr[1], data.ten_wrapnum[1]
     points, passed = data.wrap_xpos.reshape(-1, 3)[first : first + count], data.wrap_obj.ravel()[first : first + count]
-    turn = 0.0
+    turns = []
     for branch in np.split(points, np.flatnonzero(passed == -2)):
         pieces = np.diff(branch[np.any(branch, axis=1)], axis=0)
         pieces = pieces[np.linalg.norm(pieces, axis=1) > 0.0]
         unit = pieces / np.linalg.norm(pieces, axis=1)[:, None]
-        turn += np.sum(np.arccos(np.clip(np.sum(unit[:-1] * unit[1:], axis=1), -1.0, 1.0)))
-    assert hand.paths.turn(data.qpos)[1] == pytest.approx(turn, abs=1e-6)
+        turns.append(np.sum(np.arccos(np.clip(np.sum(unit[:-1] * unit[1:], axis=1), -1.0, 1.0))))
+    trunk, branch, straight = turns
+    assert branch > 0.4 and straight == 0.0
+    assert hand.paths.turn(data.qpos)[1] == pytest.approx(trunk, abs=1e-6)
     for speed in (1.0, -1.0):
         x = hand.rest_state(data.qpos, [0.0, -speed / hand.paths.arms(data.qpos)[1, 1], 0.0])
-        for _ in range(200):
+        for _ in range(50):
             found = hand.evaluate(x, [5.0, 0.0, 0.0])
-            found.state.tendon_stiction[:] += found.tendons.stiction_rate * 2e-6
+            behind = found.mechanism.rows["tendon_branches"]
+            # Steady sliding: bristles bear what they can, which depends on what they bear.
+            found.state.tendon_stiction[:] = np.sign(found.tendons.velocity) * found.tendons.level
+            found.state.canal_stiction[-2:] = np.sign(behind.row.speed) * behind["level"]
             x = hand.layout.pack(found.state)
         assert found.tendons.velocity[0] == pytest.approx(speed)
-        assert found.tendons.strands[0] == pytest.approx(5.0 * np.exp(-speed * 0.11 * turn), rel=1e-6)
+        left = 5.0 * np.exp(-speed * 0.11 * trunk)
+        assert found.tendons.strands[0] == pytest.approx(left, rel=1e-6)
+        way = np.sign(behind.row.speed[0])
+        assert behind.row.command[0] + behind.force[0] == pytest.approx(left / 2.0 * np.exp(-way * 0.11 * branch))
+        assert behind.row.command[1] + behind.force[1] == pytest.approx(left / 3.0, rel=1e-4)
 
 
 @pytest.mark.parametrize("name", MODELS)

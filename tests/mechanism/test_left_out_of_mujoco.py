@@ -6,26 +6,27 @@ from mujoco_models import FIXED, LINK, ROUTED, model_of
 
 import finger_pin as fp
 
+pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
+
 
 def test_what_is_not_carried_over_is_listed():
     straight = '<spatial name="straight"><site site="s"/><site site="base"/></spatial></tendon>'
-    rest = f"""{FIXED.replace("</tendon>", straight)}<equality><weld body1="w"/><joint joint1="j" polycoef="0 0 1 0 0"/>
-    <connect name="loop" body1="w" anchor="0 0 0"/><tendon name="both" tendon1="t" tendon2="straight"/></equality>
-    <actuator><velocity joint="j" kv="1"/><intvelocity joint="j" kp="1" actrange="-1 1"/>
+    rest = f"""{FIXED.replace("</tendon>", straight)}<equality><tendon name="both" tendon1="t" tendon2="straight"/>
+    <connect name="led" body1="w" body2="hand" anchor="0 0 0"/></equality>
+    <actuator><velocity joint="j" kv="1"/><general joint="j" dyntype="user" actdim="2" actrange="-1 1"/>
     <adhesion body="w" ctrlrange="0 1"/></actuator>"""
-    body = LINK.replace("<body>", '<body name="w" gravcomp="1">')
-    model = model_of(body + '<site name="base"/><body name="thing"><freejoint/><geom size="0.1"/></body>', rest)
+    body = LINK.replace("<body>", '<body name="w">').replace('name="j"', 'name="j" springref="1"')
+    thing = '<body name="thing"><freejoint/><geom size="0.1"/><geom size="0.1"/></body><body name="hand" mocap="true"/>'
+    model = model_of(body + '<site name="base"/>' + thing, rest)
     description = fp.from_mujoco(model)
     assert description.tree.left_out == (
-        "free joint of thing: it stays where it is",
-        "body w: gravity compensation",
         "contacts are disabled in the model: its geoms touch nothing",
+        "mocap bodies: 1",
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
-        "equality equality_0: of kind weld",
-        "equality equality_1: its polynomial is not linear",
-        "equality loop: of kind connect",
         "equality both: of tendons through space",
+        "equality led: to a mocap body, which others lead",
+        "free body thing: an object is one sphere, capsule, cylinder or box",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w"]
@@ -65,9 +66,13 @@ def test_a_wrap_that_a_point_lies_inside_of_is_listed_and_left_out_as_it_never_w
     assert fp.Hand(description).paths.length(data.qpos) == pytest.approx(data.ten_length, rel=1e-14)
 
 
-def test_a_side_point_on_another_body_is_listed_and_moves_with_the_wrap():
-    tendon = '<spatial name="t"><site site="s"/><geom geom="pin" sidesite="s"/><site site="w"/></spatial>'
-    body = '<geom name="pin" type="sphere" size="0.05" pos="0.3 0 0.3"/><site name="w" pos="0 0 1"/>' + LINK
-    description = fp.from_mujoco(model_of(body, f"<tendon>{tendon}</tendon>"))
-    assert "side point s of pin: moves with the wrap's body" in description.tree.left_out
-    assert description.tree.tendons["t"].path["pin"].side == pytest.approx((-0.2, 0.0, -0.3))
+def test_what_moves_or_carries_anything_is_warned_of_once_and_what_does_not_is_only_listed():
+    plain = model_of(LINK, FIXED)
+    assert fp.from_mujoco(plain).tree.left_out
+    driven = (
+        FIXED + '<actuator><velocity name="spin" joint="j" kv="1"/><adhesion name="stick" body="w" ctrlrange="0 1"/>'
+    )
+    model = model_of(LINK.replace("<body>", '<body name="w">'), driven + "</actuator>")
+    with pytest.warns(fp.mechanism.exchange.from_mujoco.LeftOutWarning) as told:
+        fp.from_mujoco(model, "gripper")
+    assert [str(each.message) for each in told] == ["gripper: not carried over: actuator stick: it drives a body"]

@@ -12,6 +12,7 @@ LAYOUTS = {
     "three passive tendons": Layout(("a",), ("T1", "T2", "P1", "P2", "P3"), 3),
     "two motors": Layout(("a", "b"), ("T1", "T2", "P1"), 1, motors=("M1", "M2")),
     "objects": Layout(("a", "b"), ("T1", "P1"), 1, objects=("ball", "box"), contacts=("a-ball", "b-ball", "ball-box")),
+    "a tree": Layout(("a", "b"), ("T1",), 0, actuators=("servo",), canals=("T2", "T2.1")),
     "a world": Layout(("a",), ("T1", "T2"), 0, world=("roll", "pitch", "yaw", "x", "y", "z"), contacts=("a-table",)),
 }
 
@@ -36,12 +37,14 @@ def test_unpacking_inverts_packing_and_keeps_leading_dimensions(layout, lead):
     n, t, p, m = len(layout.joints), len(layout.tendons), layout.passive, len(layout.motors)
     f, w, c = len(layout.objects), len(layout.world), len(layout.contacts)
     sizes = (n, p, n, p, t, n, 0, m, m, m, 7 * f, 6 * f, w, w, 2 * c, len(layout.held), 0)
+    sizes += (len(layout.actuators), len(layout.canals))
     for name, size in zip(State.__annotations__, sizes, strict=True):
         assert getattr(state, name).shape == (*lead, size), name
 
 
 def test_sizes_add_up_to_three_per_joint_and_motor_one_per_tendon_two_per_passive_tendon_and_contact(layout):
     alone = 3 * (len(layout.joints) + len(layout.motors)) + len(layout.tendons) + 2 * layout.passive
+    alone += len(layout.actuators) + len(layout.canals)
     assert layout.size == alone + 13 * len(layout.objects) + 2 * len(layout.world) + 2 * len(layout.contacts)
     assert sum(layout.sizes) == layout.size
 

@@ -88,6 +88,8 @@ def _add_turns(tables: Any, work: Any, linear: Any, index: int) -> None:
     k, gather = paths.rows[index], own.gather
     for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
         e = paths.piece[leg]
+        if not paths.bends[leg]:
+            continue
         for s in range(paths.start[e], paths.start[e + 1]):
             gather[paths.at[s]] += own.turn_slope[s]
         if not paths.follows[leg]:

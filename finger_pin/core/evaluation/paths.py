@@ -38,8 +38,9 @@ def _frame(paths: Any, e: int, work: Any) -> None:
                 rotation[r, c] = 0.0
                 for i in range(3):
                     rotation[r, c] += above[r, i] * paths.rotation[e, i, c]
-    for p in range(2):
-        body = paths.carriers[e, p]
+    # Of a gap there is no side point.
+    for p in range(3 if paths.columns[e] == 1 else 2):
+        body = paths.carriers[e, p + p // 2]
         for r in range(3):
             ends[3 * p + r] = paths.points[e, 3 * p + r]
         if body >= 0:
@@ -167,9 +168,9 @@ def measure_paths(tables: Any, work: Any) -> None:
                 length += paths.weights[leg, 1] * own.out[e, 0]
             if own.active[e] == 0:
                 continue
-            if paths.columns[e] == 1:
+            if paths.bends[leg] and paths.columns[e] == 1:
                 turn += own.out[e, 1]
-            if paths.follows[leg]:
+            if paths.bends[leg] and paths.follows[leg]:
                 before = paths.piece[leg - 1]
                 cosine, sine = angle_between(own.wrench[before, 0, 9:12], own.wrench[e, 0, 3:6])
                 turn += np.arctan2(sine, cosine)

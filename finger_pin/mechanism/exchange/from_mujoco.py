@@ -5,21 +5,25 @@ MuJoCo resolves defaults, classes and includes; what is read here is its compile
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.validation import MOST_ANGLE, validate
-from finger_pin.exceptions import InputError
+from finger_pin.description.validation import validate
+from finger_pin.exceptions import InputError, ScenarioWarning
 from finger_pin.mechanism.exchange.mujoco_actuators import ActuatorReader
 from finger_pin.mechanism.exchange.mujoco_equalities import read_equalities
 from finger_pin.mechanism.exchange.mujoco_flags import obeyed
-from finger_pin.mechanism.exchange.mujoco_names import Names, Table, entry_name, quaternion
+from finger_pin.mechanism.exchange.mujoco_free import FreeBodies
+from finger_pin.mechanism.exchange.mujoco_names import Names, Table, distinct, entry_name, quaternion
 from finger_pin.mechanism.exchange.mujoco_overlay import lay_tendons
 from finger_pin.mechanism.exchange.mujoco_shapes import Shapes
 from finger_pin.mechanism.exchange.mujoco_tendons import STOP, TendonReader
@@ -33,6 +37,10 @@ _LEAST_FRICTION = 1e-7
 _HIDDEN = 3
 
 
+class LeftOutWarning(ScenarioWarning):
+    """Something of a model that moves or carries anything was not carried over."""
+
+
 def from_mujoco(
     model: Any, name: str = "hand", *, tendons: Mapping[str, Mapping[str, Any]] | str | Path | None = None
 ) -> FingerDescription:
@@ -41,8 +49,11 @@ def from_mujoco(
     Motors that can only pull a tendon, through space or around hinges, become tendons of the hand, with friction along
     their path and slack; their tension is their force, N. Other actuators exert what MuJoCo's do. Friction of tendons
     and joints, which MuJoCo has not, gets this package's defaults, but for viscous friction of joints, which is the
-    model's. Ranges are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level
-    of (9). What is not carried over stands in ``tree.left_out``.
+    model's. Other tendons rub alike where springs, ranges, servos or what drives their joint pull them. Ranges, less
+    their margins, are guarded by (2) in place of MuJoCo's soft constraints. Joints' friction loss is the least level of
+    (9). A free body that a tendon passes moves by three slides and three hinges, of which the second must not come to a
+    right angle; others, and geoms of the world, become objects. Names keep letters, digits and underscores: ``a/b`` is
+    ``a_b``. What is not carried over stands in ``tree.left_out``, and is warned of where it moves or carries anything.
 
     Args:
         model: A `mujoco.MjModel`, or the path of an XML file.
@@ -53,6 +64,7 @@ def from_mujoco(
     Raises:
         InputError: If it is neither, MuJoCo refuses the file, or it has muscles, ball joints or nothing that drives it.
     """
+    plugins: list[str] = []
     try:
         import mujoco
     except ImportError:
@@ -60,6 +72,7 @@ def from_mujoco(
     if isinstance(model, str | Path | mujoco.MjSpec):
         try:
             spec = model.copy() if isinstance(model, mujoco.MjSpec) else mujoco.MjSpec.from_file(str(model))
+            plugins = [each.plugin_name for each in spec.plugins]
             if tendons is not None:
                 lay_tendons(spec, tendons)
             model = spec.compile()
@@ -71,17 +84,21 @@ def from_mujoco(
         raise InputError("model", "must be a file or a mujoco.MjSpec to lay tendons over it", type(model).__name__)
     if not isinstance(model, mujoco.MjModel):
         raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
-    return validate(FingerDescription, _Reader(mujoco, model).table(name), ("finger",))
+    reader = _Reader(mujoco, model, plugins)
+    found = validate(FingerDescription, reader.table(name), ("finger",))
+    if moving := reader.rest.moving():
+        warnings.warn(LeftOutWarning(f"{name}: not carried over: {'; '.join(moving)}"), stacklevel=2)
+    return found
 
 
 class _Reader:
     """Reads a model, element by element."""
 
-    def __init__(self, mujoco: Any, model: Any) -> None:
+    def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
         self.mujoco, self.model = mujoco, obeyed(mujoco, model)
         model = self.model
         self.rest = Rest(mujoco, model)
-        self.names = Names.of(model)
+        self.names = Names.of(model, plugins)
         self._read = ElementReader(mujoco, model, self.names, self.rest)
         self.shapes = Shapes(self._read)
         kinds = mujoco.mjtJoint
@@ -91,52 +108,89 @@ class _Reader:
             )
         self.actuators = ActuatorReader(*vars(self._read).values())
         self.kept_joints = [i for i in range(model.njnt) if model.jnt_type[i] != kinds.mjJNT_FREE]
+        self.free = FreeBodies(self._read, self._passed())
 
     def table(self, name: str) -> Table:
         """Return the description as a table."""
         model = self.model
         if not self.kept_joints:
             raise InputError("model", "has no joints that turn or slide")
-        dofs = model.jnt_dofadr[self.kept_joints]
-        sliding = model.jnt_type[self.kept_joints] == self.mujoco.mjtJoint.mjJNT_SLIDE
         reader = TendonReader(*vars(self._read).values())
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self._bodies()
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
-        couplings, differences = read_equalities(self._read)
+        couplings, loops, differences = read_equalities(self._read)
+        joints, moving, loss = self._joints()
+        sliding = [each["kind"] == "slide" for each in moving.values()]
+        pairs, keyframes = self.shapes.pairs(bodies), self._keyframes()
         return {
             "name": entry_name(name),
             "gravity": model.opt.gravity.tolist(),
-            "joints": {self.names.joints[i]: self._joint(i) for i in self.kept_joints},
+            "joints": joints,
             "tendons": pulled,
-            "joint_friction": {
-                "viscous": 0.0,
-                "floor": np.maximum(model.dof_frictionloss[dofs], _LEAST_FRICTION).tolist(),
-            },
+            "joint_friction": {"viscous": 0.0, "floor": np.maximum(loss, _LEAST_FRICTION).tolist()},
             "stroke_limiter": {"stiffness": np.where(sliding, _STOP_SLIDING, STOP).tolist()},
+            "touches_itself": bool(pairs),
             "tree": {
-                "bodies": {self.names.bodies[i]: self._body(i) for i in bodies},
-                "joints": {self.names.joints[i]: self._moving(i) for i in self.kept_joints},
+                "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
+                "joints": moving,
                 "tendons": tendons | {_free(name, tendons): each for name, each in differences.items()},
                 "couplings": couplings,
+                "loops": loops,
                 "actuators": actuators,
+                "keyframes": keyframes,
+                "objects": self.shapes.objects(self.free.loose),
                 "tip": self._tip(),
-                "touching": self.shapes.pairs(bodies),
+                "touching": pairs,
                 "meshes": self._meshes(bodies),
                 "left_out": self.rest.listed(),
             },
         }
 
-    def _bodies(self) -> list[int]:
-        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+    def _passed(self) -> set[int]:
+        """Return the bodies that tendons pass or whose geoms they wrap."""
         model, types = self.model, self.mujoco.mjtWrap
         sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE]
-        wraps = model.wrap_objid[(model.wrap_type == types.mjWRAP_SPHERE) | (model.wrap_type == types.mjWRAP_CYLINDER)]
-        needed = {int(each) for each in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
-        needed |= {self._tip_body()[0]}
+        wraps = model.wrap_objid[self._wraps()]
+        return {int(each) for each in (*model.site_bodyid[sites], *model.geom_bodyid[wraps])}
+
+    def _joints(self) -> tuple[Table, Table, list[float]]:
+        """Return the joints of the finger, those of its tree, and their losses by friction, in the bodies' order."""
+        joints: Table = {}
+        moving: Table = {}
+        loss: list[float] = []
+        for i in range(self.model.njnt):
+            if i in self.kept_joints:
+                name = self.names.joints[i]
+                joints[name], moving[name] = self._joint(i), self._moving(i)
+                loss.append(float(self.model.dof_frictionloss[self.model.jnt_dofadr[i]]))
+            elif i in self.free.kept:
+                for name, joint, moved in self.free.joints(i):
+                    joints[name], moving[name] = joint, moved
+                    loss.append(0.0)
+        return joints, moving, loss
+
+    def _keyframes(self) -> Table:
+        """Return the postures that the model comes with."""
+        model, found = self.model, []
+        for k in range(model.nkey):
+            qpos = model.key_qpos[k]
+            position = {self.names.joints[i]: float(qpos[model.jnt_qposadr[i]]) for i in self.kept_joints}
+            for i in self.free.kept:
+                position |= self.free.position(i, qpos)
+            found.append({"position": position, "inputs": self.actuators.inputs(model.key_ctrl[k])})
+        return dict(zip(distinct("keyframe", [model.key(k).name for k in range(model.nkey)]), found, strict=True))
+
+    def _bodies(self) -> list[int]:
+        """Return the bodies that move, that tendons pass or that carry these, parents first."""
+        model = self.model
+        # What lies around does not carry a tip.
+        needed = self._passed() | {self._tip_body()[0]} | self.shapes.still()
+        sides = [int(each) for each in model.wrap_prm[self._wraps()] if each >= 0]
+        needed |= {int(each) for each in model.site_bodyid[sides]}
         moved: set[int] = set()
         for i in range(1, model.nbody):
-            own = any(model.jnt_bodyid[j] == i for j in self.kept_joints)
+            own = any(model.jnt_bodyid[j] == i for j in (*self.kept_joints, *self.free.kept))
             if own or int(model.body_parentid[i]) in moved:
                 moved.add(i)
         needed |= moved
@@ -144,6 +198,11 @@ class _Reader:
             if i in needed:
                 needed.add(int(model.body_parentid[i]))
         return sorted(needed - {0})
+
+    def _still(self) -> Table:
+        """Return the body that has the shapes of the world; none without any."""
+        shapes = self.shapes.of_body(0)
+        return {self.names.bodies[0]: {"shapes": shapes, "solids": self._solids(0)}} if shapes else {}
 
     def _body(self, i: int) -> Table:
         model = self.model
@@ -154,6 +213,7 @@ class _Reader:
             "position": model.body_pos[i].tolist(),
             "orientation": quaternion(model.body_quat[i]),
             "mass": float(model.body_mass[i]),
+            "gravity_compensation": float(model.body_gravcomp[i]),
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[place]) for place in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
             "solids": self._solids(i),
@@ -201,9 +261,11 @@ class _Reader:
             "rest": float(model.qpos_spring[model.jnt_qposadr[i]]),
             "damping": float(model.dof_damping[dof]),
         }
-        limited = bool(model.jnt_limited[i])
+        limited, hinge = bool(model.jnt_limited[i]), model.jnt_type[i] == self.mujoco.mjtJoint.mjJNT_HINGE
+        margin, reach = float(model.jnt_margin[i]), math.pi if hinge else 1.0
         return {
-            "range": model.jnt_range[i].tolist() if limited else [-MOST_ANGLE, MOST_ANGLE],
+            "range": (model.jnt_range[i] + (margin, -margin)).tolist() if limited else [-reach, reach],
+            "limited": limited,
             **({"spring": spring} if spring["stiffness"] or spring["damping"] else {}),
         }
 
@@ -223,9 +285,24 @@ class _Reader:
         """Return a body and a point of it: the first site called a tip, or the origin of the last body that moves."""
         model = self.model
         for i in range(model.nsite):
-            if "tip" in model.site(i).name.lower() and model.body_weldid[model.site_bodyid[i]]:
+            if "tip" in model.site(i).name.lower() and int(model.site_bodyid[i]) in self._moved_by_joints():
                 return int(model.site_bodyid[i]), model.site_pos[i]
         return int(model.jnt_bodyid[self.kept_joints[-1]]), np.zeros(3)
+
+    def _moved_by_joints(self) -> set[int]:
+        """Return the bodies that joints move which turn or slide."""
+        model, found = self.model, set[int]()
+        for i in range(1, model.nbody):
+            if int(model.body_parentid[i]) in found or any(model.jnt_bodyid[j] == i for j in self.kept_joints):
+                found.add(i)
+        return found
+
+    def _wraps(self) -> NDArray[np.bool_]:
+        """Return a mask of the pieces of tendons' paths that are wraps."""
+        types = self.mujoco.mjtWrap
+        return np.asarray(
+            (self.model.wrap_type == types.mjWRAP_SPHERE) | (self.model.wrap_type == types.mjWRAP_CYLINDER)
+        )
 
     def _tip(self) -> Table:
         body, position = self._tip_body()

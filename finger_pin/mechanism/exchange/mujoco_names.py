@@ -13,7 +13,7 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Names:
-    """Names by index, letters, digits and underscores, all different within a kind."""
+    """Names by index, letters, digits and underscores, all different within a kind; plugins by instance."""
 
     bodies: list[str]
     joints: list[str]
@@ -21,10 +21,11 @@ class Names:
     sites: list[str]
     geoms: list[str]
     meshes: list[str]
+    plugins: list[str]
 
     @classmethod
-    def of(cls, model: Any) -> Names:
-        """Read the names of a model."""
+    def of(cls, model: Any, plugins: list[str]) -> Names:
+        """Read the names of a model; those of instances of plugins only its specification has."""
         return cls(
             bodies=distinct("body", [model.body(i).name for i in range(model.nbody)]),
             joints=distinct("joint", [model.joint(i).name for i in range(model.njnt)]),
@@ -32,6 +33,7 @@ class Names:
             sites=distinct("site", [model.site(i).name for i in range(model.nsite)]),
             geoms=distinct("geom", [model.geom(i).name for i in range(model.ngeom)]),
             meshes=distinct("mesh", [model.mesh(i).name for i in range(model.nmesh)]),
+            plugins=plugins,
         )
 
     def carrier(self, body: int, entry: str) -> Table:

@@ -34,7 +34,8 @@ class TendonReader(ElementReader):
             names = distinct("pulley", [self._piece_name(k) for k in pieces])
             found["path"] = self._without_idle({name: self._piece(k) for name, k in zip(names, pieces, strict=True)})
         if model.tendon_limited[i]:
-            found["range"] = model.tendon_range[i].tolist()
+            margin = float(model.tendon_margin[i])
+            found["range"] = (model.tendon_range[i] + (margin, -margin)).tolist()
         return found
 
     def _without_idle(self, path: Table) -> Table:
@@ -42,7 +43,7 @@ class TendonReader(ElementReader):
         read = {name: Waypoint.model_validate(each) for name, each in path.items()}
         idle = set()
         for point, wrap in points_inside_wraps(read):
-            self.rest.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight")
+            self.rest.add(f"wrap {wrap}: {point} lies inside of it, so that the path goes straight", moves=False)
             idle.add(wrap)
         return {name: each for name, each in path.items() if name not in idle}
 
@@ -70,10 +71,12 @@ class TendonReader(ElementReader):
         }
         side = int(model.wrap_prm[k])
         if side >= 0:
-            if model.site_bodyid[side] != model.geom_bodyid[at]:
-                point, wrapped = self.names.sites[side], self.names.geoms[at]
-                self.rest.add(f"side point {point} of {wrapped}: moves with the wrap's body")
-            wrap["side"] = self._seen_from(at, side).tolist()
+            carrier = int(model.site_bodyid[side])
+            if carrier != model.geom_bodyid[at]:
+                place = {"position": model.site_pos[side].tolist(), **self.names.carrier(carrier, "body")}
+                wrap["side_point"] = place
+            else:
+                wrap["side"] = self._seen_from(at, side).tolist()
         return wrap
 
     def _seen_from(self, geom: int, site: int) -> Array:

@@ -28,42 +28,44 @@ class Rest:
         """
         self.mujoco, self.model = mujoco, model
         self._listed: list[str] = []
+        self._moving: list[str] = []
         self._refuse_muscles()
-        for i in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
-            body = model.body(model.jnt_bodyid[i]).name or f"body_{model.jnt_bodyid[i]}"
-            self.add(f"free joint of {body}: it stays where it is")
-        self._every("body", "body_gravcomp", "gravity compensation")
         self._every("joint", "jnt_stiffnesspoly", "a stiffness that grows with the deflection")
         self._every("joint", "dof_dampingpoly", "damping that grows with the speed", by_dof=True)
         self._every("joint", "jnt_springyield", "a spring that yields")
-        self._every("joint", "jnt_actfrclimited", "a limit on what actuators exert on it together")
         self._every("tendon", "tendon_actfrclimited", "a limit on what actuators exert on it together")
         self._every("tendon", "tendon_armature", "armature")
         self._every("tendon", "tendon_stiffnesspoly", "a stiffness that grows with the stretch")
         self._every("tendon", "tendon_dampingpoly", "damping that grows with the speed")
         self._every("tendon", "tendon_springyield", "a spring that yields")
         if "contact" in disabled(mujoco, model):
-            self.add("contacts are disabled in the model: its geoms touch nothing")
+            self.add("contacts are disabled in the model: its geoms touch nothing", moves=False)
         flags = without_counterpart(mujoco, model)
         if flags:
-            self.add(f"flags about how MuJoCo computes: {', '.join(flags)}")
+            self.add(f"flags about how MuJoCo computes: {', '.join(flags)}", moves=False)
         if model.opt.density or model.opt.viscosity:
             self.add("the medium: nothing is dragged")
         for count, what in (
             (model.nflex, "flexible bodies"),
-            (model.nplugin, "plugins"),
+            (model.nplugin - len(set(model.actuator_plugin[model.actuator_plugin >= 0])), "plugins"),
             (model.nmocap, "mocap bodies"),
         ):
             if count:
-                self.add(f"{what}: {count}")
+                self.add(f"{what}: {count}", moves=what != "mocap bodies")
 
     def listed(self) -> list[str]:
         """Return the elements left out, a line each."""
         return list(dict.fromkeys(self._listed))
 
-    def add(self, line: str) -> None:
-        """List something."""
+    def moving(self) -> list[str]:
+        """Return those among them that move or carry something, a line each."""
+        return list(dict.fromkeys(self._moving))
+
+    def add(self, line: str, moves: bool = True) -> None:
+        """List something, which moves or carries anything or not."""
         self._listed.append(line)
+        if moves:
+            self._moving.append(line)
 
     def _refuse_muscles(self) -> None:
         model, mujoco = self.model, self.mujoco

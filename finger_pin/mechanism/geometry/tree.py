@@ -115,14 +115,15 @@ def _path(legs: tuple[Leg, ...], rotations: Array, places: Array) -> Array:
 
 
 def _stretch(piece: Piece, rotations: Array, places: Array) -> Array:
-    first, second = (rotations[end.joint] @ end.point + places[end.joint] for end in piece.ends)
+    first, second, *side = (rotations[end.joint] @ end.point + places[end.joint] for end in piece.ends)
     if piece.shape is STRAIGHT:
         return np.array([first, second])
     turned = rotations[piece.joint] @ piece.frame.rotation
     origin = rotations[piece.joint] @ piece.frame.translation + places[piece.joint]
     a, b = (first - origin) @ turned, (second - origin) @ turned
     out = np.zeros(8)
-    piece.shape.value(np.concatenate([a, b]), piece.parameters, out)
+    seen = [(each - origin) @ turned for each in side]
+    piece.shape.value(np.concatenate([a, b, *seen]), piece.parameters, out)
     if out[1] == 0.0:
         return np.linspace(first, second, _POINTS)
     start, end = _touch(piece, a, -out[2:5]), _touch(piece, b, out[5:8] * -1.0)

@@ -1,11 +1,12 @@
-"""Pieces of paths through space: straight, or wrapped about a cylinder or a sphere, a kind a file."""
+"""Pieces of paths through space: straight, wrapped about a cylinder or a sphere, or a function of a coordinate."""
 
 from finger_pin.mechanism.spans.cylinder import CYLINDER
+from finger_pin.mechanism.spans.polynomial import ANGLE, RISE
 from finger_pin.mechanism.spans.span import Span
 from finger_pin.mechanism.spans.sphere import SPHERE
 from finger_pin.mechanism.spans.straight import STRAIGHT
 
 #: All kinds.
-SPANS = (STRAIGHT, CYLINDER, SPHERE)
+SPANS = (STRAIGHT, CYLINDER, SPHERE, ANGLE, RISE)
 
-__all__ = ["CYLINDER", "SPANS", "SPHERE", "STRAIGHT", "Span"]
+__all__ = ["ANGLE", "CYLINDER", "RISE", "SPANS", "SPHERE", "STRAIGHT", "Span"]

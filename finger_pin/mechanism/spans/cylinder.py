@@ -10,7 +10,7 @@ from typing import Any
 
 from finger_pin.mechanism.spans.circle import FREE, INSIDE, path, way_of_path
 from finger_pin.mechanism.spans.plane import curvatures, directions, gradient
-from finger_pin.mechanism.spans.span import WRAP, Span
+from finger_pin.mechanism.spans.span import WRAP, Span, side_point
 from finger_pin.mechanism.spans.straight import straight_slopes, straight_value
 
 
@@ -21,9 +21,10 @@ def _plane(y: Any, p: Any) -> Any:
     area = a[0] * b[1] - a[1] * b[0]
     sense = -1.0 if area < 0.0 else 1.0
     angle = math.atan2(abs(area), a[0] * b[0] + a[1] * b[1])
-    along = (p[1] * a[0] + p[2] * a[1]) / max(r0, 1e-300)
-    across = sense * (p[2] * a[0] - p[1] * a[1]) / max(r0, 1e-300)
-    way = way_of_path(r0, r1, angle, p[0], along, across, p[4], p[5])
+    sx, sy, _, inside = side_point(y, p)
+    along = (sx * a[0] + sy * a[1]) / max(r0, 1e-300)
+    across = sense * (sy * a[0] - sx * a[1]) / max(r0, 1e-300)
+    way = way_of_path(r0, r1, angle, p[0], along, across, p[4], inside)
     return way, a, b, r0, r1, angle, (0.0, 0.0, sense)
 
 

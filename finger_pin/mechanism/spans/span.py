@@ -16,8 +16,9 @@ class Span:
     Attributes:
         name: For messages.
         parameters: Names of its numbers; ``p`` holds them in this order.
-        value: (y, p, out) -> None; y are 6 numbers, the two points in the span's frame, m. Into out go the length, m,
-            the angle by which the path turns along the wrap, rad, and 6 numbers pull = d length / d y.
+        value: (y, p, out) -> None; y are 6 numbers, the two points in the span's frame, m, and 3 of a side point.
+            Into out go the length, m, the angle by which the path turns along the wrap, rad, and 6 numbers pull =
+            d length / d y.
         slopes: (y, p, out) -> None; into out go 6 numbers d turn / d y, 1/m, and 36 numbers d pull / d y, 1/m, row by
             row.
     """
@@ -29,5 +30,16 @@ class Span:
     columns: ClassVar[int] = 1
 
 
-#: Numbers of a wrap: its radius, m; the side point, m; whether there is one; whether the path passes inside.
+#: Numbers of a wrap: its radius, m; the side point, m; whether there is one; whether the path passes inside. A side
+#: point that another body carries is a third point in y, and inside if it is nearer than the radius.
 WRAP = ("radius", "side_x", "side_y", "side_z", "has_side", "inside")
+#: What ``has_side`` is for a side point in y.
+ELSEWHERE = 2.0
+
+
+def side_point(y: Any, p: Any) -> Any:
+    """Return the side point, seen from the wrap, and whether the path passes inside."""
+    if p[4] != ELSEWHERE:
+        return p[1], p[2], p[3], p[5]
+    near = y[6] * y[6] + y[7] * y[7] + y[8] * y[8] < p[0] * p[0]
+    return y[6], y[7], y[8], 1.0 if near else 0.0

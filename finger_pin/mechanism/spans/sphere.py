@@ -7,7 +7,7 @@ from typing import Any
 
 from finger_pin.mechanism.spans.circle import FREE, LONG_WAY, path, way_of_path
 from finger_pin.mechanism.spans.plane import crossed, curvatures, directions, gradient
-from finger_pin.mechanism.spans.span import WRAP, Span
+from finger_pin.mechanism.spans.span import WRAP, Span, side_point
 from finger_pin.mechanism.spans.straight import straight_slopes, straight_value
 
 
@@ -25,10 +25,11 @@ def _plane(y: Any, p: Any) -> Any:
         nx, ny, nz = crossed(a, (1.0 * (second or third), 1.0 * (not second), 1.0 * (not third)))
         area = max(math.sqrt(nx**2 + ny**2 + nz**2), 1e-300)
     normal = (nx / area, ny / area, nz / area)
-    along = (p[1] * a[0] + p[2] * a[1] + p[3] * a[2]) / max(r0, 1e-300)
+    sx, sy, sz, inside = side_point(y, p)
+    along = (sx * a[0] + sy * a[1] + sz * a[2]) / max(r0, 1e-300)
     tx, ty, tz = crossed(normal, a)
-    across = (p[1] * tx + p[2] * ty + p[3] * tz) / max(r0, 1e-300)
-    way = way_of_path(r0, r1, angle, p[0], along, across, p[4], p[5])
+    across = (sx * tx + sy * ty + sz * tz) / max(r0, 1e-300)
+    way = way_of_path(r0, r1, angle, p[0], along, across, p[4], inside)
     return way, a, b, r0, r1, angle, normal
 
 

@@ -77,7 +77,7 @@ def _turned(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
     found: set[str] = set()
     for tendon in (finger.tendons[name] for name in tendons):
         if tendon.along is not None and finger.tree is not None:
-            found |= finger.tree.crossed(tendon.along)
+            found |= frozenset().union(*(joints for _, joints in finger.tree.crossed(tendon.along)))
         found |= {joint for joint, crossing in tendon.crossings.items() if crossing.radius != 0.0}
     return found
 
