@@ -286,3 +286,25 @@ def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
     ):
         with pytest.raises(fp.InputError, match=f"^{re.escape(named)}"):
             fp.propose("canal", candidates, **{**given, entry: value}, overrides=overrides)
+
+
+def test_columns_of_a_recording_have_the_unit_of_their_header_and_are_asked_about_degrees_and_milliseconds():
+    pulled, turned = {"tendon_command.T1": "in (gf)"}, {"joint_position.medial": "q [deg]"}
+    entries = {"time": "t (ms)", "inputs": pulled, "outputs": turned}
+    data = {"t (ms)": [0.0, 50e3, 100e3], "in (gf)": [0.0, 100.0, 200.0], "q [deg]": [0.0, 90.0, 180.0]}
+    recording = read_recording("pull", RecordingSettings.model_validate(entries), data)
+    np.testing.assert_allclose(recording.time, [0.0, 50.0, 100.0])
+    np.testing.assert_allclose(recording.inputs["tendon_command.T1"], [0.0, 0.980665, 1.96133])
+    np.testing.assert_allclose(recording.outputs["joint_position.medial"], [0.0, np.pi / 2.0, np.pi])
+    bare = {name.partition(" ")[0]: values for name, values in data.items()}
+    change = {"time": "t", "inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.medial": "q"}}
+    for more, said in [
+        ({}, r'recordings.pull.time = "t": its 3 rows take 100000 s \(is it in milliseconds\?\); write { column = "t"'),
+        (
+            {"time": {"column": "t", "unit": "ms"}},
+            r"medial = 180.0: angles must be at most 12.5 rad \(is it in degrees",
+        ),
+    ]:
+        settings = RecordingSettings.model_validate({**change, **more})
+        with pytest.raises(fp.InputError, match=said):
+            read_recording("pull", settings, bare)
