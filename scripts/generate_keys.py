@@ -82,8 +82,8 @@ _WHOLE = {FingerDescription: "finger", ControllerSettings: "controller", Environ
 _FILE_KEYS = {
     "base": "what this one differs from: the name of one that ships, or the path of a file",
     "extends": "the scenario that this one differs from",
-    "file": "a CSV file beside this one whose columns become samples",
-    "fingertip_force_file": "a CSV file beside this one: columns `time` and some of `x`, `y`, `z`",
+    "file": "a CSV file beside this one whose columns become samples, or a table with `path`, `time` and `columns`",
+    "fingertip_force_file": "a CSV file beside this one: columns `time` and some of `x`, `y`, `z`; or a table likewise",
 }
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.mechanism.finger_like import as_finger, description_of
 from finger_pin.simulation.energy import entries
 from finger_pin.studies.fingerprint import finger_digest
 
@@ -301,3 +302,28 @@ def test_numbers_of_a_hand_are_refused_where_another_one_was_given():
     other = fp.Hand(fp.load_scenario("pinch", {key: 0.3}).finger)
     with pytest.raises(fp.InputError, match="hand"):
         fp.prepare("pinch", [key], finger=other).run([0.2])
+
+
+def test_a_scenario_stands_for_its_finger_as_its_name_does():
+    scenario = fp.load_scenario("fig6", {"finger.tendon_friction.coulomb": 0.3})
+    for finger in (fp.Finger(scenario), fp.Simulator(scenario).finger, as_finger(scenario)):
+        assert finger.description == scenario.finger != fp.load_finger("ub")
+    assert description_of(scenario) == scenario.finger
+    assert description_of(fp.load_scenario("hand")) == fp.load_hand("ub_hand")
+
+
+def test_a_hand_needs_no_name_and_what_is_missing_is_said_in_words(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('[hand.fingers]\nthumb = "ub"\n')
+    scenario = fp.load_scenario(path)
+    assert scenario.hand.name == scenario.finger.name == "hand"
+    assert fp.load_scenario(scenario, {"controller.gain": 2.0}).hand == scenario.hand
+    for text, said in [
+        ('[hand]\nnmae = "mine"\n[hand.fingers]\nthumb = "ub"\n', "did you mean hand.name?"),
+        ('[hand]\nname = "mine"\n', "hand.fingers: is missing: Fingers by name."),
+        ("[hand.fingers.thumb]\nscale = 1.0\n", "thumb.finger: is missing: Name of one that ships, path of a"),
+    ]:
+        path.write_text(text)
+        with pytest.raises(fp.InputError) as refused:
+            fp.load_scenario(path)
+        assert said in str(refused.value) and "Of the hand" not in str(refused.value)

@@ -49,7 +49,7 @@ _Table = TypeVar("_Table", bound=Description)
 class PlacedFinger(Description):
     """A finger and the place of its base frame on the palm."""
 
-    finger: FingerDescription
+    finger: FingerDescription = Field(description="Name of one that ships, path of a .toml file, or a table.")
 
     @field_validator("finger")
     @classmethod
@@ -88,13 +88,13 @@ class HandSettings(Description):
 
     __str__ = __repr__
 
-    name: Name = Field(description="Of the hand.")
+    name: Name = Field("hand", description="Name of the hand.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
         (0.0, 0.0, -9.81), unit="m/s2", source="palm down", doc="In the world's frame."
     )
     palm: Palm = Palm()
-    fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="By name.")
+    fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="Fingers by name.")
     fingers_touch: bool | None = Field(
         None,
         strict=True,

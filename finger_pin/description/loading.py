@@ -40,8 +40,8 @@ _Described = TypeVar("_Described", bound=Description)
 _TEXTS: Remembered[str] = Remembered(4)
 #: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
 ScenarioLike: TypeAlias = Scenario | str | Path
-#: Likewise a finger; a hand is one, too.
-DescriptionLike: TypeAlias = FingerDescription | str | Path
+#: Likewise a finger; a hand is one, too, and a scenario stands for its own.
+DescriptionLike: TypeAlias = FingerDescription | Scenario | str | Path
 
 
 def list_fingers() -> dict[str, str]:
@@ -98,7 +98,7 @@ def load_hand(name: str | Path, overrides: Mapping[str, Any] | None = None) -> F
 
 
 def describe(finger: DescriptionLike) -> FingerDescription:
-    """Return the description of a finger or a hand that is given in any way; of a scenario's name or file, of its own.
+    """Return the description of a finger or a hand that is given in any way; of a scenario, its own.
 
     Raises:
         InputError: Naming the entry that is wrong.
@@ -111,6 +111,8 @@ def describe(finger: DescriptionLike) -> FingerDescription:
             allowed = f"no such finger or hand; there are {', '.join(names)}, or the path of a .toml file"
             raise InputError("finger", allowed + suggestion(finger, names), str(finger))
         return load_hand(finger) if kind == "hand" else load_finger(finger)
+    if isinstance(finger, Scenario):
+        return finger.finger
     if not isinstance(finger, FingerDescription):
         allowed = "must be that of a finger or a hand, as fp.load_finger(name), or the name or path of one"
         raise InputError("description", allowed, type(finger).__name__)

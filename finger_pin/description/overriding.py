@@ -11,13 +11,13 @@ from typing import Any, get_origin
 from finger_pin.description.reading import (
     Table,
     as_table,
-    expand,
     is_other_kind,
     is_path,
     resolve_finger,
     resolve_hand,
     with_motors,
 )
+from finger_pin.description.recordings.columns import expand
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import find_field, nearest, suggestion
 from finger_pin.exceptions import InputError

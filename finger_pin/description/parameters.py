@@ -220,13 +220,13 @@ class FingerDescription(Description):
 
     __str__ = __repr__
 
-    name: Name = Field(description="Also the name of the robot in the URDF.")
+    name: Name = Field(description="Name of the finger, and of the robot in the URDF.")
     title: str = Field("", strict=True, max_length=200, description="One line for listings.")
     gravity: Annotated[tuple[float, float, float], vector(3, -1e3, 1e3)] = quantity(
         (0.0, 0.0, -9.81), unit="m/s2", source="flexion lifts the finger", doc="Base frame; in a hand `hand.gravity`."
     )
-    joints: dict[Name, Joint] = Field(min_length=1, description="By name, from the base to the tip.")
-    tendons: dict[Name, Tendon] = Field(description="By name; at least one, unless there is a tree.")
+    joints: dict[Name, Joint] = Field(min_length=1, description="Joints by name, from the base to the tip.")
+    tendons: dict[Name, Tendon] = Field(description="Tendons by name; at least one, unless there is a tree.")
     tendon_friction: TendonFrictionSettings = TendonFrictionSettings()
     joint_friction: JointFrictionSettings = JointFrictionSettings()
     passive_tendon: PassiveTendon = PassiveTendon()

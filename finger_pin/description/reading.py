@@ -12,21 +12,20 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from finger_pin.description.recordings.columns import read_columns
+from finger_pin.description.recordings.columns import expand, read_signals, read_text
 from finger_pin.description.recordings.series import PACKED
 from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 
 Table = dict[str, Any]
-# Sections that may name a CSV file, the key that does, and where its columns go.
+# Sections that may name a CSV file, the key that does, where its columns go, and their unit.
 _SIGNAL_FILES = (
-    ("reference", "file", "joints"),
-    ("controller", "file", "tensions"),
-    ("environment", "fingertip_force_file", "fingertip_force_signal"),
+    ("reference", "file", "joints", "rad"),
+    ("controller", "file", "tensions", "N"),
+    ("environment", "fingertip_force_file", "fingertip_force_signal", "N"),
 )
 # Kinds whose entries mean nothing to another kind: a table of one replaces, rather than completes, one of another.
 _KINDS_APART = {"step", "ramp", "points", "samples", "tensions"}
-_LARGEST = 100_000_000
 
 
 def shipped(kind: str) -> dict[str, str]:
@@ -57,11 +56,9 @@ def _read(kind: str, name: str, folder: Path, entry: str = "") -> tuple[Table, P
             raise InputError(entry or kind, allowed, name)
         return copy.deepcopy(_shipped_table(f"{kind}s", name)), Path(name)
     what, path = f"{kind} file {name}", folder / expand(name)
-    data = _read_bytes(what, path)
+    text = read_text(what, path)
     try:
-        return tomllib.loads(data.decode("utf-8-sig")), path
-    except UnicodeDecodeError:
-        raise InputError(what, "is not a text file in UTF-8") from None
+        return tomllib.loads(text), path
     except RecursionError:
         raise InputError(what, "is nested too deeply") from None
     except ValueError as error:
@@ -84,27 +81,6 @@ def kind_of(name: str, folder: Path = Path()) -> str:
     except (InputError, RecursionError):
         return "scenario"
     return "hand" if "fingers" in table else "finger" if {"joints", "tendons"} & table.keys() else "scenario"
-
-
-def expand(name: str) -> Path:
-    """Return a path with the home folder in place of ~, if there is such a home."""
-    try:
-        return Path(name).expanduser()
-    except RuntimeError:
-        return Path(name)
-
-
-def _read_bytes(what: str, path: Path) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            data = file.read(_LARGEST + 1)
-    except FileNotFoundError:
-        raise InputError(what, "there is no such file") from None
-    except (OSError, ValueError) as error:
-        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > _LARGEST:
-        raise InputError(what, f"is larger than {_LARGEST} bytes")
-    return data
 
 
 def read_scenario_file(name: str, folder: Path, seen: tuple[Path, ...] = ()) -> tuple[Table, Path]:
@@ -227,21 +203,11 @@ def _named(owner: str) -> Iterator[None]:
 
 def resolve_signals(table: Table, folder: Path) -> None:
     """Replace CSV files by their columns, as samples of signals by name."""
-    for section, key, target in _SIGNAL_FILES:
+    for section, key, target, unit in _SIGNAL_FILES:
         settings = table.get(section)
-        if not isinstance(settings, dict) or key not in settings:
-            continue
-        name = settings.pop(key)
-        entry = f"{section}.{key}"
-        if not isinstance(name, str):
-            raise InputError(entry, "must be the path of a CSV file", name)
-        try:
-            text = _read_bytes(f"{entry} {name}", folder / expand(name)).decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise InputError(f"{entry} {name}", "is not a text file in UTF-8") from None
-        times, *columns = read_columns(f"{entry} {name}", text).items()
-        samples = {name: {"kind": "samples", "times": times[1], "values": values} for name, values in columns}
-        settings[target] = {**as_table(settings.get(target)), **samples}
+        if isinstance(settings, dict) and key in settings:
+            samples = read_signals(f"{section}.{key}", settings.pop(key), folder, unit)
+            settings[target] = {**as_table(settings.get(target)), **samples}
     _share_times(table)
 
 

@@ -293,8 +293,8 @@ class Keyframe(Description):
 class Tree(Description):
     """Bodies with their joints, tendons and actuators. Parents precede children; joints are in the bodies' order."""
 
-    bodies: dict[Name, Body] = Field(min_length=1, description="By name, parents first.")
-    joints: dict[Name, TreeJoint] = Field(min_length=1, description="By name, those of parents first.")
+    bodies: dict[Name, Body] = Field(min_length=1, description="Bodies by name, parents first.")
+    joints: dict[Name, TreeJoint] = Field(min_length=1, description="Joints by name, those of parents first.")
     tendons: dict[Name, TreeTendon] = Field({}, description="By name.")
     couplings: dict[Name, Coupling] = Field({}, description="By name.")
     loops: dict[Name, Loop] = Field({}, description="By name.")

@@ -119,14 +119,19 @@ def test_tensions_that_cannot_be_are_named_in_one_line(table, entry, said):
 
 
 COLUMNS = [
-    ("", "the first line must name the columns"),
-    ("t,medial\n0,1\n1,2\n", "the first line must name the columns"),
+    ("", "must have a header and rows"),
+    ("seconds,medial\n0,1\n1,2\n", 'no column is called time or t; there are seconds, medial; write time = "NAME"'),
     ("time,medial,medial\n0,1,1\n1,2,2\n", "each once"),
-    ("time,medial\n0,1\n", "must have 2 to 1000000 rows of numbers, not 1"),
-    ("time,medial\n0,1\n1,2,3\n", "line 3 has 3 values, the header names 2"),
-    ("time,medial\n0,1\n1,x\n", "line 3, column medial: must be a finite number"),
-    ("time,medial\n0,1\n1,nan\n", "line 3, column medial: must be a finite number"),
-    ("time,medial\n1,1\n\n1,1\n", "line 4: times must increase"),
+    ("time,medial (rad),medial (deg)\n0,1,1\n1,2,2\n", "two columns are of the same signal"),
+    ("time,medial\n0,1\n", "two rows at least"),
+    ("time,medial\n0,1\n1,2,3\n", "row 2 has 3 values, the header names 2"),
+    ("time,medial\n0,1\n1,x\n", "column medial has no number in row 2"),
+    ("time,medial\n0,1\n1,nan\n", "column medial has no number in row 2"),
+    ("time,medial\n0,1\n1,\n", "column medial has no number in row 2"),
+    ("time,medial\n1,1\n\n1,1\n", "times must increase, two rows at least, and do not from row 1 to the next"),
+    ("time,medial (mm)\n0,1\n1,1\n", "is a unit of what is in m, and this is in rad"),
+    ("t,medial\n0,1\n500,1\n1000,1\n", 'write { column = "t", unit = "ms" }, or unit = "s"'),
+    ("t,medial\n0,10\n1,30\n", "rad (is it in degrees?)"),
     ("time,distal\n0,1\n1,1\n", "follows from the passive tendon (20); leave it out"),
     ("time,medail\n0,1\n1,1\n", "did you mean medial?"),
 ]
@@ -166,3 +171,48 @@ def test_many_samples_are_read_alike_at_once_and_row_by_row_and_written_bit_for_
 def test_a_missing_file_of_columns_is_named():
     with pytest.raises(InputError, match=r"reference.file .*nowhere.csv: there is no such file"):
         fp.load_scenario("fig6", {"reference.file": "nowhere.csv"})
+
+
+SPELT = [
+    "time;proximal;medial\n0;0.1;0.1\n0.5;0.3;0.2\n1;0.7;0.4\n",
+    "# a rig\nt\tproximal\tmedial\n0\t0,1\t0,1\n# a break\n0,5\t0,3\t0,2\n1\t0,7\t0,4\n",
+    "Time [ms],proximal,medial (mrad)\n0,0.1,100\n500,0.3,200\n1000,0.7,400\n",
+    '"time_ms";"medial";"proximal_mrad"\n"0";"0,1";100\n"500";"0,2";300\n"1000";"0,4";700\n',
+]
+
+
+@pytest.mark.parametrize("text", SPELT, ids=["semicolons", "decimal commas", "units", "units in names"])
+def test_a_motion_is_read_from_the_files_that_recordings_are_read_from(tmp_path, text):
+    joints = fp.load_scenario("fig6", {"reference.file": str(write(tmp_path, "motion.csv", text))}).reference.joints
+    assert joints["medial"].times == joints["proximal"].times == pytest.approx((0.0, 0.5, 1.0), abs=1e-15)
+    assert joints["proximal"].values == pytest.approx((0.1, 0.3, 0.7), abs=1e-15)
+    assert joints["medial"].values == pytest.approx((0.1, 0.2, 0.4), abs=1e-15)
+
+
+def test_a_table_tells_the_times_names_units_and_delays_of_a_files_columns(tmp_path):
+    write(tmp_path, "rig.csv", "n,clock,q1,q2\n1,0,0,18\n2,500,9,36\n3,1000,18,54\n")
+    path = write(
+        tmp_path,
+        "mine.toml",
+        'extends = "fig6"\n[reference.file]\npath = "rig.csv"\ntime = { column = "clock", unit = "ms" }\n'
+        'columns = { medial = { column = "q2", unit = "deg", delay = 0.1 } }\n',
+    )
+    joints = fp.load_scenario(path).reference.joints
+    assert joints["medial"].values == pytest.approx(np.pi * np.array([0.1, 0.2, 0.3]))
+    assert joints["medial"].times == pytest.approx((-0.1, 0.4, 0.9))
+    assert joints["proximal"] == fp.load_scenario("fig6").reference.joints["proximal"]
+    for change, said in [
+        (("clock", "clack"), 'reference.file.time = "clack": no such column'),
+        (("delay", "dely"), "did you mean reference.file.columns.medial.delay?"),
+        (('"ms"', '"ms", delay = 0.1'), "reference.file.time.delay = 0.1: is for signals"),
+    ]:
+        path.write_text(path.read_text().replace(*change))
+        with pytest.raises(InputError) as caught:
+            fp.load_scenario(path)
+        assert said in str(caught.value) and "\n" not in str(caught.value)
+        path.write_text(path.read_text().replace(*reversed(change)))
+
+
+def test_slow_motions_are_taken_where_the_unit_says_so(tmp_path):
+    motion = write(tmp_path, "motion.csv", "t (s),medial\n0,0.1\n500,0.2\n1000,0.3\n")
+    assert fp.load_scenario("fig6", {"reference.file": str(motion)}).reference.joints["medial"].times[-1] == 1000.0

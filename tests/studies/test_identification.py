@@ -5,9 +5,9 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.commands.application import run
+from finger_pin.description.recordings.columns import read_columns
 from finger_pin.description.recordings.units import in_si
 from finger_pin.studies.identification.ledger import NAME
-from finger_pin.studies.identification.recordings import read_table
 from finger_pin.views.report import summarize_identification, write_report
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"
@@ -148,10 +148,11 @@ GOOD = "in,out\n3,2.1\n6,4.4\n9,6.9\n12,9.3\n"
         ('in,out\n"3,0","2,1"\n"6,0","4,4"\n', '"3,0": column in has no number in row 1'),
         (GOOD.replace("3,", "-3,"), "a tendon only pulls"),
         (GOOD.replace("out", "in"), "must name every column, each once"),
+        (GOOD.replace("out", "out (mm)"), "is a unit of what is in m, and this is in N"),
         (GOOD + "1\n", "row 5 has 1 values, the header names 2"),
         ("", "must have a header"),
         ("in,out\n", "must have a header"),
-        (GOOD.replace("out", "aus°").encode("cp1252"), "cannot be read: no text in UTF-8"),
+        (GOOD.replace("out", "aus°").encode("cp1252"), "is not a text file in UTF-8"),
         (None, "there is no such file"),
     ],
 )
@@ -174,13 +175,14 @@ def test_wrong_files_are_refused_in_one_line_and_nothing_is_written(tmp_path, ca
         GOOD.replace(",", ";"),
         GOOD.replace(",", ";").replace(".", ","),
         GOOD.replace(",", "\t"),
+        "# a rig\n" + GOOD.replace("\n9", "\n# a break\n9"),
     ],
-    ids=["plain", "byte order mark", "quoted, carriage returns", "semicolons", "decimal commas", "tabs"],
+    ids=["plain", "byte order mark", "quoted, carriage returns", "semicolons", "decimal commas", "tabs", "comments"],
 )
 def test_files_are_read_as_spreadsheets_write_them(tmp_path, text):
     path = tmp_path / "mine.csv"
     path.write_bytes(text.encode())
-    table = read_table("file", path)
+    table = read_columns("file", path)
     np.testing.assert_array_equal([table["in"], table["out"]], [[3, 6, 9, 12], [2.1, 4.4, 6.9, 9.3]])
 
 

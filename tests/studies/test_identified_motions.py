@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.family import Family
 from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.studies.identification.identifying import build_problem
+from finger_pin.studies.identification.limits import Limits
 from finger_pin.studies.identification.motions import windows
 from finger_pin.studies.identification.problem import minus_twice_likelihood
 from finger_pin.studies.identification.recordings import read_recording
@@ -42,12 +44,13 @@ def ramp(rng, coulomb, drag, correlation=0.0, rate=100.0):
 # What is seen of fig6, by variable, label and column, and its noise.
 SEEN = [("joint_position", "proximal", 1), ("joint_position", "medial", 2), ("tendon_tension", "T3", 2)]
 NOISE = {"joint_position": 1e-3, "tendon_tension": 0.02}
+TURNED = {"column": "q", "unit": "deg"}
 MOTION = {
     "time": "t",
     "start": "recorded",
     "settle": 0.2,
     "inputs": {"tendon_command.T1": "in"},
-    "outputs": {"tendon_tension.T1": "f", "joint_position.drum": {"column": "q", "unit": "deg"}},
+    "outputs": {"tendon_tension.T1": "f", "joint_position.drum": TURNED},
 }
 
 
@@ -115,9 +118,9 @@ def test_two_recordings_with_gaps_share_the_friction_and_go_on_after_an_interrup
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"start": "recorded", "outputs": {"joint_position.drum": "q"}}, "cannot be reached: drum begins at"),
+        ({"start": "recorded", "outputs": {"joint_position.drum": TURNED}}, "cannot be reached: drum begins at"),
         ({"start": "recorded", "outputs": {"tendon_tension.T1": "f"}}, "needs joint_position among the outputs"),
-        ({"inputs": {"joint_position.drum": "q"}}, "a motion is given tendon_command, joint_reference"),
+        ({"inputs": {"joint_position.drum": TURNED}}, "a motion is given tendon_command, joint_reference"),
         ({"time": "f"}, "times must increase"),
         ({"start": "rest", "outputs": {"joint_position.wheel": "f"}}, "there is no wheel; there are drum"),
         ({"start": "rest", "outputs": {"joint_positon.drum": "f"}}, "did you mean joint_position?"),
@@ -286,3 +289,61 @@ def test_the_motion_that_tells_coulomb_from_drag_is_proposed():
     ):
         with pytest.raises(fp.InputError, match=f"^{re.escape(named)}"):
             fp.propose("canal", candidates, **{**given, entry: value}, overrides=overrides)
+
+
+def test_columns_of_a_recording_have_the_unit_of_their_header_and_are_asked_about_degrees_and_milliseconds():
+    pulled, turned = {"tendon_command.T1": "in (gf)"}, {"joint_position.medial": "q [deg]"}
+    entries = {"time": "t (ms)", "inputs": pulled, "outputs": turned}
+    data = {"t (ms)": [0.0, 50e3, 100e3], "in (gf)": [0.0, 100.0, 200.0], "q [deg]": [0.0, 90.0, 180.0]}
+    recording = read_recording("pull", RecordingSettings.model_validate(entries), data)
+    np.testing.assert_allclose(recording.time, [0.0, 50.0, 100.0])
+    np.testing.assert_allclose(recording.inputs["tendon_command.T1"], [0.0, 0.980665, 1.96133])
+    np.testing.assert_allclose(recording.outputs["joint_position.medial"], [0.0, np.pi / 2.0, np.pi])
+    bare = {name.partition(" ")[0]: values for name, values in data.items()}
+    change = {"time": "t", "inputs": {"tendon_command.T1": "in"}, "outputs": {"joint_position.medial": "q"}}
+    for more, said in [
+        ({}, r'recordings.pull.time = "t": its 3 rows take 100000 s \(is it in milliseconds\?\); write { column = "t"'),
+        (
+            {"time": {"column": "t", "unit": "ms"}},
+            r"medial = 180.0: angles must be at most 12.5 rad \(is it in degrees",
+        ),
+    ]:
+        settings = RecordingSettings.model_validate({**change, **more})
+        with pytest.raises(fp.InputError, match=said):
+            read_recording("pull", settings, bare)
+
+
+JOINT_COULOMB, JOINT_STICTION = "finger.joint_friction.coulomb", "finger.joint_friction.stiction"
+
+
+def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_overlap():
+    base = fp.load_scenario("fig6", {"simulation.duration": 1.0, "simulation.sample_rate": 100.0})
+    truth = {JOINT_COULOMB: 4e-4, JOINT_STICTION: 7e-4}
+    run, rng = fp.simulate(fp.load_scenario(base, truth)), np.random.default_rng(3)
+    data, joints = {"t": run.time.values}, ("proximal", "medial")
+    for joint in joints:
+        data[joint] = run.joint_position.sel(joint=joint).values + rng.normal(0.0, 1e-5, run.time.size)
+    swing = {"time": "t", "outputs": {f"joint_position.{joint}": joint for joint in joints}}
+    # No stiction within its bounds goes with the greatest Coulomb coefficient.
+    bounds = {JOINT_COULOMB: (1e-4, 1.5e-3), JOINT_STICTION: (1e-4, 1.2e-3)}
+    found = fp.identify(base, parameters=bounds, recordings={"swing": swing}, data={"swing": data}, starts=2)
+    true = list(truth.values())
+    assert found.estimate.values == pytest.approx(true, rel=5e-3)
+    assert np.all((found.lower.values <= true) & (true <= found.upper.values)) and found.determined.all()
+    for wrong, said in [
+        ({JOINT_COULOMB: (1e-3, 2e-3), JOINT_STICTION: (1e-4, 5e-4)}, "must be at least the Coulomb coefficient"),
+        ({**bounds, JOINT_COULOMB: (-1e-4, 1e-3)}, r"joint_friction.coulomb = -0.0001: must be"),
+    ]:
+        with pytest.raises(fp.InputError, match=said):
+            fp.identify(base, parameters=wrong, recordings={"swing": swing}, data={"swing": data})
+
+
+def test_values_that_do_not_go_together_are_brought_to_where_they_do_and_those_that_are_held_stay():
+    family = Family(fp.load_scenario("fig6"), (JOINT_COULOMB, JOINT_STICTION))
+    limits = Limits.checked(family, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
+    for given, free, nearest in [
+        ((3e-4, 5e-4), (True, True), (3e-4, 5e-4)),
+        ((9e-4, 5e-4), (True, False), (5e-4, 5e-4)),
+        ((9e-4, 5e-4), (False, True), (9e-4, 9e-4)),
+    ]:
+        np.testing.assert_allclose(limits.nearest(np.array(given), np.array(free)), nearest, atol=1e-11)

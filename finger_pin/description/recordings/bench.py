@@ -13,8 +13,17 @@ from finger_pin.description.validation import Description, Name, choice, problem
 class Column(Description):
     """A column of a recording: SI value = scale times the number in its unit, plus offset; in a file a name will do."""
 
-    column: str = Field(strict=True, min_length=1, max_length=200, description="Its name in the header.")
-    unit: str | None = Field(None, strict=True, description="Such as mm, deg, gf; SI if it is left out.")
+    column: str = Field(
+        strict=True,
+        min_length=1,
+        max_length=200,
+        description="Its name in the header; a unit in brackets may be left out.",
+    )
+    unit: str | None = Field(
+        None,
+        strict=True,
+        description="Such as mm, deg, gf; that in brackets in the header, else SI, if it is left out.",
+    )
     scale: Annotated[float, real(-1e12, 1e12)] = quantity(1.0, unit="1", source="calibration", doc="Factor.")
     offset: Annotated[float, real(-1e12, 1e12)] = quantity(0.0, unit="SI", source="calibration", doc="Added, in SI.")
     delay: Annotated[float, real(-10.0, 10.0)] = quantity(

@@ -1,77 +1,248 @@
-"""Columns of a CSV file: a header with ``time`` first, then rows of numbers."""
+"""Tables of numbers over time or of readings: CSV files as spreadsheets write them, or arrays; their columns in SI."""
 
 from __future__ import annotations
 
 import csv
-import io
 import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
+from finger_pin.description.recordings.bench import Column
 from finger_pin.description.recordings.series import Series
-from finger_pin.description.signals import MOST_POINTS
+from finger_pin.description.recordings.units import UNITS, in_si
+from finger_pin.description.validation import Description, suggestion, validate
 from finger_pin.exceptions import InputError
 
+_LARGEST = 100_000_000
+# What stands in a cell, besides nothing, where nothing was measured.
+_MISSING = ("na", "n/a", "null", "none", "-")
+# A name in a header with its unit: in brackets, or of signals after an underscore as well.
+_BRACKETED = re.compile(r"(.+?)\s*[(\[]\s*(.+?)\s*[)\]]")
+_APPENDED = re.compile(r"(.+)_(s|ms|us|rad|mrad|deg|mN|gf|kgf)")
+_TIMES = ("time", "t")
+# Rows that are so far apart on average, s, over so long a time are asked about.
+_FAR_APART, _LONG = 1.0, 60.0
 
-def read_columns(what: str, text: str) -> dict[str, Series]:
-    """Return the columns of a CSV text by their names, ``time`` first.
 
-    Numbers are read all at once; row by row is for what is not as it should be, or quoted.
+class SignalFile(Description):
+    """A CSV file of signals over time; its path alone will do."""
+
+    path: str = Field(strict=True, description="Relative to the file that names it.")
+    time: Column | None = Field(None, description="The column of times; by default the one called time or t.")
+    columns: dict[str, Column] = Field({}, description="By signal; by default all other columns, by their names.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _path_alone(cls, value: Any) -> Any:
+        return {"path": value} if isinstance(value, str) else value
+
+
+class Table:
+    """Columns of equally many rows, by their names in the header, with or without a unit in brackets."""
+
+    def __init__(self, entry: str, columns: Mapping[str, Any]) -> None:
+        """Take columns of numbers or words; the entry names the table in messages.
+
+        Raises:
+            InputError: If they differ in their number of rows.
+        """
+        self.entry = entry
+        self._columns = {name: _as_array(values) for name, values in columns.items()}
+        if len({values.shape for values in self._columns.values()}) != 1:
+            raise InputError(entry, "all columns must have as many rows")
+        self.rows = len(next(iter(self._columns.values())))
+        split = [(name, *_split(name, _BRACKETED)) for name in self._columns]
+        bare = [each[1] for each in split]
+        self._headers = {short: (name, unit) for name, short, unit in split if bare.count(short) == 1}
+        self._headers |= {name: (name, unit) for name, _, unit in split}
+
+    def column(self, key: str, given: Column, si: str, *, missing: bool = False) -> NDArray[np.float64]:
+        """Return a column in SI, shape (m,).
+
+        Args:
+            key: Where it is asked for, below the table's entry.
+            given: Its name, unit, scale and offset; without a unit that of the header counts, else SI.
+            si: Unit of the result; empty for that of its own unit.
+            missing: Whether cells may be empty; they are not a number.
+
+        Raises:
+            InputError: If there is no such column, a cell is no number, or the unit does not fit.
+        """
+        entry = f"{self.entry}.{key}"
+        if given.column not in self._headers:
+            allowed = f"no such column; there are {', '.join(self._columns)}{suggestion(given.column, self._columns)}"
+            raise InputError(entry, allowed, given.column)
+        name, header_unit = self._headers[given.column]
+        cells = self._columns[name]
+        if cells.dtype == object:
+            row = next(k for k, cell in enumerate(cells) if isinstance(cell, str))
+            raise InputError(entry, f"column {name} has no number in row {row + 1}", cells[row])
+        unit = given.unit or header_unit
+        factor = 1.0 if unit is None else in_si(f"{entry}.unit" if given.unit else entry, unit, si)
+        if given.unit is None and factor != 1.0 and given.scale != 1.0:
+            raise InputError(entry, f"has a scale, and its header a unit; write unit too, such as {unit}", given.scale)
+        wrong = np.flatnonzero(np.isinf(cells) if missing else ~np.isfinite(cells))
+        if len(wrong):
+            raise InputError(entry, f"column {name} has no number in row {wrong[0] + 1}")
+        values: NDArray[np.float64] = given.scale * factor * cells + given.offset
+        return values
+
+    def times(self, key: str, given: Column) -> NDArray[np.float64]:
+        """Return a column of times, s, shape (m,), as `column` does.
+
+        Raises:
+            InputError: Also if they do not increase, or seem to be milliseconds and no unit says that they are not.
+        """
+        entry, times = f"{self.entry}.{key}", self.column(key, given, "s")
+        if given.delay:
+            raise InputError(f"{entry}.delay", "is for signals, not for their times", given.delay)
+        back = np.flatnonzero(np.diff(times) <= 0.0)
+        if len(times) < 2 or len(back):
+            where = f", and do not from row {back[0] + 1} to the next" if len(back) else ""
+            raise InputError(entry, f"times must increase, two rows at least{where}")
+        length, unknown = times[-1] - times[0], (given.unit or self._headers[given.column][1]) is None
+        if unknown and given.scale == 1.0 and length >= max(_FAR_APART * (len(times) - 1), _LONG):
+            told = (
+                f'its {len(times)} rows take {length:g} s (is it in milliseconds?); write {{ column = "{given.column}"'
+            )
+            raise InputError(entry, f'{told}, unit = "ms" }}, or unit = "s" if they do', given.column)
+        return times
+
+    def signals(self, file: SignalFile) -> Iterator[tuple[str, Column]]:
+        """Yield the columns of signals over time, that of the times first, as a file's entries or its header tell.
+
+        Raises:
+            InputError: If no column is named as times are.
+        """
+        found = [(name, *_split(name, _BRACKETED, _APPENDED)) for name in self._columns]
+        named = [(short, Column(column=name, unit=unit)) for name, short, unit in found]
+        time = file.time or next((column for short, column in named if short.casefold() in _TIMES), None)
+        if time is None:
+            allowed = (
+                f'no column is called time or t; there are {", ".join(self._columns)}; write time = "NAME" beside path'
+            )
+            raise InputError(self.entry, allowed)
+        yield "time", time
+        apart = self._headers.get(time.column, (None,))[0]
+        yield from file.columns.items() or [each for each in named if each[1].column != apart]
+
+
+def read_signals(entry: str, given: Any, folder: Path, si: str) -> dict[str, dict[str, Any]]:
+    """Return the columns of a CSV file as samples of signals, by name.
 
     Args:
-        what: Names the file in messages.
-        text: A header and rows, separated by commas.
+        entry: That names the file.
+        given: Its path, or a table of `SignalFile`.
+        folder: That a relative path starts from.
+        si: Unit of the signals.
 
     Raises:
-        InputError: Naming the line and column that is wrong.
+        InputError: If the file cannot be read, or a column is not of numbers, or times do not increase.
     """
-    first, _, rest = text.partition("\n")
-    header = [name.strip() for name in first.split(",")]
-    if '"' not in text and _named(header) and rest.strip():
-        try:
-            table = np.loadtxt(io.StringIO(rest), delimiter=",", comments=None, ndmin=2).T
-        except ValueError:
-            table = np.zeros((0, 0))
-        whole = len(table) == len(header) and 2 <= table.shape[1] <= MOST_POINTS
-        if whole and np.isfinite(table).all() and np.all(np.diff(table[0]) > 0.0):
-            return {name: Series(column) for name, column in zip(header, table, strict=True)}
-    return _read_rows(what, text)
+    if not isinstance(given, str | dict):
+        raise InputError(entry, "must be the path of a CSV file, or a table with path, time and columns", given)
+    file = validate(SignalFile, given, tuple(entry.split(".")))
+    table = Table(entry, read_columns(f"{entry} {file.path}", folder / expand(file.path)))
+    (_, time), *signals = table.signals(file)
+    times = table.times("time", time)
+    shared = Series(times)
+    found: dict[str, dict[str, Any]] = {}
+    for name, column in signals:
+        if name in found:
+            raise InputError(entry, "two columns are of the same signal", name)
+        values = Series(table.column(f"columns.{name}", column, si))
+        # A column that lags behind its quantity is of earlier times.
+        at = Series(times - column.delay) if column.delay else shared
+        found[name] = {"kind": "samples", "times": at, "values": values}
+    return found
 
 
-def _named(header: list[str]) -> bool:
-    return len(header) >= 2 and header[0] == "time" and len(set(header)) == len(header)
+def read_columns(what: str, path: Path) -> dict[str, Any]:
+    """Return the columns of a CSV file with a header, by name; empty cells are not numbers, and words stay words.
 
+    Columns stand apart by commas, semicolons or tabs; where not by commas, decimals may have one. Lines that begin with
+    # are comments. Numbers are read all at once; cell by cell is for what is missing or wrong.
 
-def _read_rows(what: str, text: str) -> dict[str, Series]:
-    """Return the columns read row by row, or raise the error of a wrong one."""
+    Raises:
+        InputError: Naming the row that is wrong.
+    """
+    lines = [line for line in read_text(what, path).splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise InputError(what, "must have a header and rows of numbers")
+    separator = max(",;\t", key=lines[0].count)
+    header = [name.strip() for name in next(csv.reader(lines[:1], delimiter=separator))]
+    if len(set(header)) < len(header) or not all(header):
+        raise InputError(what, "the first line must name every column, each once", lines[0])
+    if separator != ",":
+        lines = [line.replace(",", ".") for line in lines]
     try:
-        rows = [
-            (number, row) for number, row in enumerate(csv.reader(text.splitlines()), 1) if any(map(str.strip, row))
-        ]
+        table = np.loadtxt(lines[1:], delimiter=separator, comments=None, ndmin=2, quotechar='"').T
+    except ValueError:
+        table = np.zeros((0, 0))
+    if len(table) == len(header):
+        return dict(zip(header, table, strict=True))
+    try:
+        rows = list(csv.reader(lines[1:], delimiter=separator))
     except csv.Error as error:
         raise InputError(what, f"is not valid CSV: {error}") from None
-    header = [name.strip() for name in rows[0][1]] if rows else []
-    if not _named(header):
-        allowed = "the first line must name the columns: time, then one for each signal, each once"
-        raise InputError(what, allowed, ",".join(header))
-    if not 2 <= len(rows) - 1 <= MOST_POINTS:
-        raise InputError(what, f"must have 2 to {MOST_POINTS} rows of numbers, not {len(rows) - 1}")
-    columns: dict[str, list[float]] = {name: [] for name in header}
-    for number, row in rows[1:]:
+    for number, row in enumerate(rows, 1):
         if len(row) != len(header):
-            raise InputError(what, f"line {number} has {len(row)} values, the header names {len(header)}")
-        for name, cell in zip(header, row, strict=True):
-            columns[name].append(_number(what, f"line {number}, column {name}", cell))
-        if len(columns["time"]) > 1 and columns["time"][-1] <= columns["time"][-2]:
-            raise InputError(what, f"line {number}: times must increase", columns["time"][-1])
-    return {name: Series(column) for name, column in columns.items()}
+            raise InputError(what, f"row {number} has {len(row)} values, the header names {len(header)}")
+    return {name: [_cell(row[k].strip()) for row in rows] for k, name in enumerate(header)}
 
 
-def _number(what: str, where: str, cell: str) -> float:
+def read_text(what: str, path: Path) -> str:
+    """Return the text of a file in UTF-8.
+
+    Raises:
+        InputError: If it cannot be read, is too large, or is no such text.
+    """
     try:
-        value = float(cell)
+        with open(path, "rb") as file:
+            data = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(what, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(what, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > _LARGEST:
+        raise InputError(what, f"is larger than {_LARGEST} bytes")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(what, "is not a text file in UTF-8") from None
+
+
+def expand(name: str) -> Path:
+    """Return a path with the home folder in place of ~, if there is such a home."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def _split(name: str, *patterns: re.Pattern[str]) -> tuple[str, str | None]:
+    """Return a name without its unit, and the unit, if it has one that is known."""
+    for found in filter(None, (pattern.fullmatch(name) for pattern in patterns)):
+        if any(found[2] in units for units in UNITS.values()):
+            return found[1], found[2]
+    return name, None
+
+
+def _cell(cell: str) -> float | str:
+    """Return the number in a cell, NaN for an empty one; a word as it stands."""
+    try:
+        return float(cell or "nan")
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(what, f"{where}: must be a finite number", cell.strip())
-    return value
+        return math.nan if cell.lower() in _MISSING else cell
+
+
+def _as_array(values: Any) -> NDArray[Any]:
+    """Return a column as an array, of objects if it has words."""
+    words = not isinstance(values, np.ndarray) and any(isinstance(each, str) for each in values)
+    return np.array(list(values), dtype=object) if words else np.asarray(values, dtype=float)

@@ -31,12 +31,12 @@ UNITS: dict[str, dict[str, float]] = {
 
 
 def in_si(entry: str, unit: str, wanted: str) -> float:
-    """Return the factor from a unit to SI.
+    """Return the factor from a unit to SI; of a quantity whose SI unit is not known, any unit will do.
 
     Raises:
         InputError: If it is no unit of that; ``entry`` says where it stands.
     """
-    fitting = UNITS.get(wanted, {wanted: 1.0})
+    fitting = UNITS.get(wanted) or {unit: factor for units in UNITS.values() for unit, factor in units.items()}
     if unit in fitting:
         return fitting[unit]
     near = nearest(unit, fitting)

@@ -84,6 +84,7 @@ def fit(
     z, free = start.copy(), np.ones(len(start), dtype=bool)
     for k, value in (held or {}).items():
         z[k], free[k] = value, False
+    z = problem.feasible(z, free)
     shares = np.ones(len(problem.signals)) if weights is None else weights
     residuals: Sequence[Array] = problem.residuals(z)
     if not all(np.isfinite(e).all() for e in residuals):
@@ -202,6 +203,7 @@ def _step(
             break
         loose &= ~beyond
     move *= min(1.0, _FARTHEST / max(float(np.max(np.abs(move) / width, initial=0.0)), 1e-300))
+    move = problem.feasible(z + move, free) - z
     return move, -float(2.0 * pull @ move + move @ inner @ move)
 
 

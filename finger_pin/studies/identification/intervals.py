@@ -96,6 +96,8 @@ def profile(problem: Problem, found: Fit, k: int, way: int, spread: Array, loss:
 def _crossing(inner: tuple[float, float], outer: tuple[float, float]) -> float:
     """Return the crossing of the rise's root, nearly straight, with the level's, from points on either side."""
     target = math.sqrt(LEVEL)
+    if math.isinf(outer[1]) and math.isfinite(outer[0]):
+        return 0.5 * (inner[0] + outer[0])
     if math.isinf(outer[0]):
         return inner[0] * min(4.0, target / max(inner[1], 1e-3))
     return inner[0] + (target - inner[1]) / (outer[1] - inner[1]) * (outer[0] - inner[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -132,8 +133,10 @@ class RecordedMotion:
                 # Of a motion that hunts, what counts is the mean trend.
                 moved = values.copy()
                 moved[k] += np.sign(changes[k]) * _COARSE * float(sizes[k])
-                found = self._made(*at(moved))[0]
-                slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
+                # At the edge of what goes together there is no such change.
+                with suppress(InputError):
+                    found = self._made(*at(moved))[0]
+                    slopes = [(f - c) / (moved[k] - values[k]) for f, c in zip(found, computed, strict=True)]
             return [np.nan_to_num(each, nan=0.0) for each in slopes]
 
         columns = in_threads(column, range(len(values)))

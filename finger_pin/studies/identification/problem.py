@@ -15,6 +15,7 @@ from finger_pin.description.family import Family
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
+from finger_pin.studies.identification.limits import Limits
 from finger_pin.studies.identification.recordings import RecordedSignal
 
 # Errors of what is computed finely and roughly, of those asked for; means of every output that roughly count.
@@ -123,20 +124,21 @@ class Problem:
 
         self._families = [family(model.scenario) for model in self.models]
         self.logarithmic = self.low > 0.0
-        for k, key in zip(self._numbers, keys, strict=True):
-            alone = Family(self._families[0].scenario, (key,))
-            for bound in (self.low[k], self.high[k]):
-                try:
-                    alone.at([float(bound)])
-                except InputError as error:
-                    allowed = error.allowed if error.entry == key else f"with it {error.entry} {error.allowed}"
-                    raise InputError(f"identify.parameters.{key}", allowed, float(bound)) from None
+        self._limits = Limits.checked(self._families[0], self.low[self._numbers], self.high[self._numbers])
         known = dict(zip(keys, self._families[0].values, strict=True)) | {own.key: own.start for own in further}
         neutral = {"offset": 0.0, "scale": 1.0, "delay": 0.0}
         middle = self.values(0.5 * (self.to_search(self.low) + self.to_search(self.high)))
         own_values = [known.get(key, neutral.get(key.rpartition(".")[2])) for key in self.keys]
         start = [float(v) if isinstance(v, int | float) else m for v, m in zip(own_values, middle, strict=True)]
-        self.start: Array = self.to_search(np.clip(start, self.low, self.high))
+        self.start: Array = self.feasible(self.to_search(np.clip(start, self.low, self.high)))
+
+    def feasible(self, z: Array, free: NDArray[np.bool_] | None = None) -> Array:
+        """Return z, shape (p,), or a place near it whose values go together; only free ones change, all by default."""
+        values, places = self.values(z), self._numbers
+        found = self._limits.nearest(values[places], None if free is None else free[places])
+        changed = found != values[places]
+        values[places] = found
+        return self.to_search(values) if changed.any() else z
 
     @property
     def groups(self) -> NDArray[np.intp]:
@@ -160,14 +162,16 @@ class Problem:
         return self.to_search(self.low), self.to_search(self.high)
 
     def residuals(self, z: Array) -> list[Array]:
-        """Return measured less computed of every signal, shape (m,) each."""
+        """Return measured less computed of every signal, shape (m,) each; infinite where values do not go together."""
         if self.stop():
             raise Stopped
         self.evaluations += 1
         values = self.values(z)
-        computed = [
-            each for model, at in zip(self.models, self._places(), strict=True) for each in model.compute(*at(values))
-        ]
+        try:
+            places = [at(values) for at in self._places()]
+        except InputError:
+            return self._smooth([np.full(len(s.measured), np.inf) for s in self.signals])
+        computed = [each for model, place in zip(self.models, places, strict=True) for each in model.compute(*place)]
         residuals = self._smooth([s.measured - c[s.rows] for s, c in zip(self.signals, computed, strict=True)])
         if not all(np.isfinite(e).all() for e in residuals):
             return [np.full(len(e), np.inf) for e in residuals]

@@ -194,7 +194,7 @@ def starting_points(problem: Problem, count: int, seed: int) -> list[Array]:
     rng = np.random.default_rng(seed)
     further = _TRIED * max(count - 1, 0)
     cells = np.array([rng.permutation(further) for _ in low]).T + rng.uniform(size=(further, len(low)))
-    return [problem.start, *(low + (high - low) * cells / max(further, 1))]
+    return [problem.start, *map(problem.feasible, low + (high - low) * cells / max(further, 1))]
 
 
 def _met(problem: Problem, residuals: Sequence[Array]) -> float:
