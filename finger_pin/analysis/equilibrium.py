@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,8 @@ from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.tree import STATEFUL, STATELESS
 
 # Of an angle, rad, for differences.
 _SHIFT = 1e-7
@@ -45,34 +47,40 @@ class Equilibrium(BriefRepr):
 
 def equilibrium(
     finger: FingerLike,
-    inputs: Sequence[float] | Array,
+    inputs: Mapping[str, float] | Sequence[float] | Array,
     *,
     position: Sequence[float] | Array | None = None,
     fingertip_force: Sequence[float] | Array = (0.0, 0.0, 0.0),
 ) -> Equilibrium:
-    """Return the state at rest under given tensions, that which a finger without friction comes to.
+    """Return the state at rest under given inputs, that which a finger without friction comes to.
 
     With friction there are many states at rest around it; this is the one in which no bristle is bent: tau = G, and
     the state's derivative is zero with friction and without. It lies where the potential energy falls to from a
     posture, in short steps of Newton's method, so that it is stable.
 
     Args:
-        finger: One finger, with ideal sources of tension.
-        inputs: Tensions f^a, shape (a,), N.
+        finger: One finger with ideal sources of tension, or a tree, whose actuators may have a lag.
+        inputs: Tensions f^a, N, then inputs of a tree's actuators, shape (u,), or by name.
         position: theta to begin at, shape (n,), rad; by default the angles of the ranges nearest to zero.
         fingertip_force: F, shape (3,), N, base frame.
 
     Raises:
-        InputError: If a size is wrong, a tension is negative, the finger has servos, objects or rows with states of
-            their own, or it comes to no rest.
+        InputError: If a size is wrong, a tension is negative, the finger has servos, free objects, rows with states of
+            their own or actuators that integrate, or it comes to no rest.
     """
     finger = as_finger(finger)
     layout = finger.layout
-    driven = any(table.pulls for table in finger.mechanism.rows)
-    if finger.description.hand is not None or driven or layout.objects or layout.contacts or layout.further:
-        raise InputError("finger", "must be one finger with ideal sources of tension, without objects")
-    command = np.array(finite_vector("inputs", inputs, finger.routing.actuated))
-    if np.any(command < 0.0):
+    tree = finger.description.tree
+    driven = any(table.pulls and table.group != "tension_sources" for table in finger.mechanism.rows)
+    own = any(table.states and table.group != "tendon_dry_friction" for table in finger.made_of[1])
+    if finger.description.hand is not None or driven or layout.objects or own:
+        raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
+    for name, each in (tree.actuators if tree is not None else {}).items():
+        if each.integrates or each.integral:
+            raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
+    actuated = finger.routing.actuated
+    command = finger.packed_inputs(inputs)
+    if np.any(command[:actuated] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
     pushed = np.array(finite_vector("fingertip_force", fingertip_force, 3))
     joints = len(finger.routing.joints)
@@ -83,6 +91,14 @@ def equilibrium(
         else np.array(finite_vector("position", position, joints))
     )
     rest = finger.rest_state(start)
+    if layout.actuators:
+        # What comes late has come.
+        assert tree is not None
+        numbers = finger.mechanism.rows[[t.group for t in finger.mechanism.rows].index(STATEFUL)].parameters
+        places = actuated + np.array([list(tree.actuators).index(name) for name in layout.actuators])
+        held = layout.unpack(rest).actuator_state
+        assert held is not None
+        held[:] = np.clip(np.clip(command[places], numbers[4], numbers[5]), numbers[-2], numbers[-1])
 
     def placed(places: Array) -> Array:
         x = rest.copy()
@@ -92,9 +108,11 @@ def equilibrium(
 
     def energy(y: Array) -> float:
         theta = (scale * y)[:joints]
-        stored, _ = finger.evaluate(placed(scale * y), command, pushed).mechanism.account()
+        found = finger.evaluate(placed(scale * y), command, pushed)
+        stored, _ = found.mechanism.account()
         raised = finger.motion(theta, np.zeros(joints)).potential_energy
-        given = command @ finger.excursion(theta) + pushed @ finger.rigid_body.tip_position(theta)
+        given = found.tendons.entering[:actuated] @ finger.excursion(theta)
+        given += pushed @ finger.rigid_body.tip_position(theta) + _given_by_actuators(found)
         return float(sum(stored.values()) + raised - given)
 
     def acceleration(y: Array) -> Array:
@@ -118,6 +136,23 @@ def equilibrium(
     x = placed(places)
     torque = finger.evaluate(x, command, pushed).tendon_torque
     return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
+
+
+def _given_by_actuators(found: FingerSignals) -> float:
+    """Return the work of a tree's actuators along their lengths, J: the integral of a force that limits cut."""
+    total = 0.0
+    for group in (STATELESS, STATEFUL):
+        if group not in found.mechanism.rows:
+            continue
+        rows = found.mechanism.rows[group]
+        by_length, least, most = rows.rows.parameters[[2, 6, 7]]
+        wanted = rows["wanted"]
+        cut = np.clip(wanted, least, most)
+        # With F = F_0 + b l the integral is H(F) / b, with H = F^2 / 2 within the limits, and a line beyond them.
+        affine = np.where(wanted == cut, 0.5 * wanted**2, cut * wanted - 0.5 * cut**2)
+        flat = by_length == 0.0
+        total += float(np.sum(np.where(flat, cut * rows.row.length, affine / np.where(flat, 1.0, by_length))))
+    return total
 
 
 def _downhill(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -14,12 +14,17 @@ from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.hand import one_finger
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
+from finger_pin.mechanism.pieces import path_kinematics
 
 # A fingertip this close, m, is there.
 _THERE = 1e-6
 # Weight of a posture near the wanted one against the distance, m/rad: it decides between postures that all reach.
 _NEAR = 1e-9
+# Weight of couplings and loops against the distance, m/rad, and steps that bring the posture found onto them.
+_HELD, _LAST_STEPS = 1e3, 3
 # Shares of the joints' ranges from which a search begins, and most of their combinations.
 _STARTS, _MOST = (0.1, 0.5, 0.9), 27
 
@@ -44,13 +49,33 @@ class TipPosture(BriefRepr):
         return self.distance < _THERE
 
 
+def _held(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
+    """Return a function of theta: by how much couplings and loops are missed, shape (k,), and its slopes, (k, n)."""
+    joints = len(finger.routing.joints)
+    tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
+    if not tables:
+        return lambda theta: (np.zeros(0), np.zeros((0, joints)))
+    arm, paths = (
+        np.concatenate([table.arm[:, :joints] for table in tables]),
+        [p for table in tables for p in table.paths],
+    )
+    rest = np.concatenate([table.parameters[table.law.parameters.index("rest")] for table in tables])
+
+    def missed(theta: Array) -> tuple[Array, Array]:
+        found = path_kinematics(finger.rigid_body, theta, paths, joints)
+        return arm @ theta + found.length - rest, arm + found.arm
+
+    return missed
+
+
 def inverse_kinematics(
     finger: FingerLike, point: Sequence[float] | Array, *, near: Sequence[float] | Array | None = None
 ) -> TipPosture:
     """Return the posture, within the joints' ranges, whose fingertip is nearest to a point.
 
     Joints that passive tendons drive follow the others as (4) has it, H_c theta = 0 in their rows: tendons that carry
-    nothing. Of several postures that reach the point it is one near the wanted posture.
+    nothing. Couplings and loops of a tree are kept to. Of several postures that reach the point it is one near the
+    wanted posture.
 
     Args:
         finger: One finger.
@@ -58,7 +83,8 @@ def inverse_kinematics(
         near: theta that is preferred, shape (n,), rad; by default the angles of the ranges nearest to zero.
 
     Raises:
-        InputError: If the point or the preferred posture has a wrong size, or it is a hand.
+        InputError: If the point or the preferred posture has a wrong size, it is a hand, or no posture keeps to the
+            couplings of a tree.
     """
     finger = as_finger(finger)
     one_finger(finger.description)
@@ -68,18 +94,20 @@ def inverse_kinematics(
     coupling = PassiveCoupling.inextensible(finger.routing)
     free = coupling.free
     followers, moved = list(coupling.followers), coupling.matrix[:, free]
-    body = finger.rigid_body
+    body, held = finger.rigid_body, _held(finger)
 
     def misses(angles: Array) -> Array:
         theta = moved @ angles
         # A driven joint has a range as well: what is beyond it counts as if the tip were as far away, m/rad.
         beyond = np.maximum(0.0, low - theta)[followers] + np.maximum(0.0, theta - high)[followers]
-        return np.concatenate([body.tip_position(theta) - target, beyond, _NEAR * (theta - wanted)])
+        off = _HELD * held(theta)[0]
+        return np.concatenate([body.tip_position(theta) - target, beyond, off, _NEAR * (theta - wanted)])
 
     def slopes(angles: Array) -> Array:
         theta = moved @ angles
         side = (theta > high).astype(float) - (theta < low)
-        return np.concatenate([body.jacobian(theta) @ moved, (side[:, None] * moved)[followers], _NEAR * moved])
+        off = _HELD * held(theta)[1] @ moved
+        return np.concatenate([body.jacobian(theta) @ moved, (side[:, None] * moved)[followers], off, _NEAR * moved])
 
     span = high[free] - low[free]
     starts = [np.clip(wanted[free], low[free], high[free])]
@@ -92,8 +120,15 @@ def inverse_kinematics(
             misses, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
         )
         found.append((float(best.cost), moved @ best.x))
-        if np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE:
+        near_enough = np.linalg.norm(misses(best.x)[: 3 + len(followers)]) < 0.01 * _THERE
+        if near_enough and np.linalg.norm(held(moved @ best.x)[0]) < 0.01 * _THERE:
             break
     theta = min(found, key=lambda each: each[0])[1]
+    for _ in range(_LAST_STEPS):
+        off, by_theta = held(theta)
+        if off.size:
+            theta = np.clip(theta - np.linalg.pinv(by_theta) @ off, low, high)
+    if held(theta)[0].size and np.linalg.norm(held(theta)[0]) > _THERE:
+        raise InputError("finger.tree", "no posture within the joints' ranges keeps to its couplings and loops")
     tip = np.asarray(body.tip_position(theta))
     return TipPosture(theta, tip, float(np.linalg.norm(tip - target)))

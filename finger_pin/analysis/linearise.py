@@ -23,7 +23,6 @@ from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import as_finger
@@ -58,7 +57,8 @@ def linearise(
         finger_or_scenario: The finger or its description; or a scenario with one (and objects), its name, or the path
             of its file.
         state: Packed state x, shape (n,), the state by name, or angles of rest, rad.
-        inputs: u, shape (m,): tensions of the actuated tendons, N; of a motor in position drive its voltage, V.
+        inputs: u, shape (m,): tensions of the actuated tendons, N, of a motor in position drive its voltage, V, then
+            the inputs of a tree's actuators; or by name, where those left out are 0.
         dt: Without it f is differentiated; with it, s, the map x -> x(dt) with the inputs held.
         parameters: Dotted keys of numbers of the scenario.
 
@@ -85,7 +85,7 @@ def linearise(
     if parameters and scenario is None:
         raise InputError("parameters", "are those of a scenario: give one in place of the finger", list(parameters))
     x = finger.packed(state, "state")
-    u = finite_vector("inputs", np.asarray(inputs, dtype=float), finger.mechanism.channels)
+    u = finger.packed_inputs(inputs)
     change = _rate if dt is None else _over(finger, x, u, dt)
     maps: tuple[_Map, _Map] = (change, _outputs)
     # The map is smooth on its steps, but curved where a kink is on the way: there steps are small.

@@ -55,12 +55,7 @@ def exercise(description: FingerDescription, duration: float = 4.0) -> dict[str,
 def _range(description: FingerDescription, actuator: TreeActuator) -> tuple[float, float]:
     """Return middle and half of the swing of an actuator's input."""
     servo = actuator.by_length * actuator.gain < 0.0
-    lower, upper = actuator.input_range or (0.0, 0.0)
-    if actuator.input_range is None and servo and actuator.joint is not None:
-        # Where it rests at both ends of its joint's range.
-        ratio = -actuator.by_length / actuator.gain * actuator.gear
-        ends = [ratio * q for q in description.joints[actuator.joint].range]
-        lower, upper = min(ends), max(ends)
+    lower, upper = actuator.reach(description.joints[actuator.joint].range if actuator.joint else None) or (0.0, 0.0)
     share = _SERVO if servo else _MOTOR
     middle = 0.5 * (lower + upper) if servo else 0.5 * share * (lower + upper)
     return middle, 0.5 * share * (upper - lower)

@@ -258,6 +258,15 @@ class TreeActuator(Description):
                 raise problem(entry, "the lower limit must not be above the upper one", list(given))
         return self
 
+    def reach(self, joint: Pair | None) -> Pair | None:
+        """Return the least and the largest input: its range, or what holds a joint at the ends of its own; or None."""
+        if self.input_range is not None:
+            return self.input_range
+        if joint is None or not self.by_length * self.gain < 0.0 or self.integrates:
+            return None
+        ends = [-self.by_length / self.gain * self.gear * each - self.offset / self.gain for each in joint]
+        return min(ends), max(ends)
+
     @property
     def has_state(self) -> bool:
         """Whether its force depends on more than input and motion of the moment."""

@@ -36,6 +36,7 @@ class Action(LoopController):
         given: The last action, shape (k,).
         held: Present inputs, shape (u,), N; zero before the first action, and for motors in position drive.
         channels: Inputs that are voltages of motors in position drive.
+        names: Of the numbers of an action.
     """
 
     def __init__(self, kind: str, finger: Finger, duration: float, nominal: Finger, coupling: PassiveCoupling) -> None:
@@ -58,8 +59,8 @@ class Action(LoopController):
             if holds.any():
                 names = [name for name, held in zip(finger.actuators.names, holds, strict=True) if held]
                 raise InputError("action", f'"tension" is not for motors in position drive: {", ".join(names)}')
-            width = finger.mechanism.channels
-            self.low, self.high = np.zeros(width), np.full(width, _STRONGEST)
+            self.low, self.high = _inputs(finger)
+            self.names = finger.input_names
             self._goals: Callable[[Array], Array] = np.array
         else:
             if len(finger.actuators.positioned) != finger.mechanism.channels:
@@ -69,7 +70,9 @@ class Action(LoopController):
                 free = np.delete(np.arange(len(finger.routing.joints)), coupling.followers)
                 limiter, self._goals = nominal.stroke_limiter, partial(_spools, nominal, coupling, free)
                 self.low, self.high = limiter.lower[free], limiter.upper[free]
+                self.names = tuple(finger.routing.joints[k] for k in free)
             else:
+                self.names = finger.actuators.names
                 scale = radius if kind == "tendon_length" else np.ones(len(radius))
                 self._goals = partial(_over, scale)
                 self.low, self.high = (each * scale for each in _reach(finger))
@@ -176,6 +179,27 @@ class Action(LoopController):
         if self._drives is None and (low[pulling] < 0.0).any():
             raise InputError("limits", "tensions must not be negative: a tendon cannot push", low.tolist())
         return low, high
+
+
+def _inputs(finger: Finger) -> tuple[Array, Array]:
+    """Return least and largest inputs: tensions, and what the actuators of a tree take.
+
+    Raises:
+        InputError: If an actuator's input has no range, and it holds no joint whose range would say.
+    """
+    description = finger.description
+    ends = [
+        (0.0, each.maximum_tension or _STRONGEST) for each in description.tendons.values() if each.kind == "actuated"
+    ]
+    for name, each in (description.tree.actuators if description.tree is not None else {}).items():
+        reach = each.reach(description.joints[each.joint].range if each.joint else None)
+        if reach is None:
+            raise InputError(
+                f"finger.tree.actuators.{name}.input_range", "is missing: actions need a least and a largest"
+            )
+        ends.append(reach)
+    low, high = np.array(ends, dtype=float).reshape(-1, 2).T
+    return low, high
 
 
 def _over(scale: Array, action: Array) -> Array:

@@ -51,11 +51,13 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 reward: A function of the signals, which returns one number per world: a mapping of the variables that
                     are observed or privileged, of what ``draw`` returned, and of ``action``, each with the worlds in
                     front, shape (worlds, ...). One of a single world's signals is given to `per_world` first.
-                action: ``"tension"``, N; ``"motor_position"``, the goal of motors in position drive, rad; or
+                action: ``"tension"``, N, and of an imported hand the inputs of its actuators, each within its range;
+                    ``"motor_position"``, the goal of motors in position drive, rad; or
                     ``"tendon_length"``, the length that their spools have drawn in, m; or ``"joint_position"``, goals
                     of the joints that no passive tendon drives, rad, for which drives turn the spools as the scenario's
                     own finger needs it, whatever numbers are drawn.
-                limits: Least and largest action; by default 0 to 20 N, or what the joints' ranges need.
+                limits: Least and largest action; by default 0 to 20 N or a source's most, what inputs' ranges allow,
+                    or what the joints' ranges need.
                 observation: Names of variables of the result; or for each a `Sensor`, and under names of their own
                     functions, such as the reward is, of what sensors show and ``draw`` returned.
                 privileged: Variables that the policy does not see, for rewards, critics and logs.
@@ -107,6 +109,11 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if self.task.privileged:
             info["privileged"] = {name: signals[name][0] for name in self.task.privileged}
         return observations[0], float(reward[0]), bool(done[0]), world.over, info
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the numbers of an action: tendons and actuators, motors, or joints."""
+        return self._worlds.each[0].action.names
 
     def render(self) -> NDArray[Any] | None:
         """Return a picture of the present posture, shape (height, width, 3), of bytes."""

@@ -14,6 +14,7 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
+from finger_pin.description.validation import finite_vector, suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Evaluation
 from finger_pin.mechanism.exchange.foreign_model import on_model
@@ -221,6 +222,30 @@ class Finger:
             allowed = f"must be {size} finite numbers, a packed state, or {joints}, angles of rest"
             raise InputError(name, allowed, told)
         return found if found.shape == (size,) else self.rest_state(found)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs u: the actuated tendons, then the actuators of a tree."""
+        tree = self.description.tree
+        return (*self.routing.tendons[: self.routing.actuated], *(tree.actuators if tree is not None else ()))
+
+    def packed_inputs(self, given: Mapping[str, float] | ArrayLike, name: str = "inputs") -> Array:
+        """Return inputs u, shape (u,), from numbers in order, or by name, where those left out are 0.
+
+        Raises:
+            InputError: If there is no such input, or the numbers are not as many as inputs and finite; ``name`` names
+                the argument.
+        """
+        if not isinstance(given, Mapping):
+            return np.array(finite_vector(name, np.asarray(given, dtype=float), self.mechanism.channels))
+        for each in given:
+            if each not in self.input_names:
+                hint = suggestion(each, self.input_names)
+                allowed = f"no such input; there are {', '.join(self.input_names)}{hint}"
+                raise InputError(f"{name}.{each}", allowed)
+        values = np.zeros(self.mechanism.channels)
+        values[: len(self.input_names)] = [given.get(each, 0.0) for each in self.input_names]
+        return np.array(finite_vector(name, values, len(values)))
 
     def evaluate(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None

@@ -29,6 +29,8 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendons import SOURCES
 
+#: The tables of actuators without and with a state.
+STATELESS, STATEFUL = "actuator", "actuator_with_state"
 _TIP = "fingertip"
 # Dry friction of a tendon holds until it has slid so far, m.
 _HOLDS = 1e-4
@@ -136,7 +138,7 @@ def tree_rows(description: FingerDescription, routes: Routes, width: int) -> lis
         if along:
             tables.append(table(group, law, along, numbers))
     first = len(description.actuated_names)
-    for group, law, stateful in (("actuator", ACTUATOR, False), ("actuator_with_state", ACTUATOR_WITH_STATE, True)):
+    for group, law, stateful in ((STATELESS, ACTUATOR, False), (STATEFUL, ACTUATOR_WITH_STATE, True)):
         own = {name: each for name, each in tree.actuators.items() if each.has_state == stateful}
         along = {
             name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
