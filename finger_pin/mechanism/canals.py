@@ -167,7 +167,8 @@ class Canals:
             arm[k, : len(self._joints)] = route.coefficients
             bends[k, : each.bends.size] = each.bends
         numbers = tendons.canals[:, [each.tendon for each in canals]]
-        numbers[-1] = np.maximum(numbers[-1], [each.drag for each in canals])
+        # Drag is that of the whole tendon.
+        numbers[-1] = np.maximum(numbers[-1], [each.drag for each in canals]) * (group == CANALS)
         one_way = np.array([each.one_way for each in canals], dtype=float)
         return Rows(
             group=group,

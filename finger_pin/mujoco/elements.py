@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.mechanism.exchange.mujoco_friction import (
+    BRANCH,
     DRAG,
     FLOOR,
     HEAD,
@@ -30,7 +31,15 @@ def tendon(
     """Return speed, tension, normal force, largest friction and turn of a tendon: (14). See `vectorised_law`."""
     p, objects = numbers(m, at.tuple_objprm, e), integers(m, at.tuple_objid, e)
     tendon, row = objects[0], objects[1]
+    first = HEAD
     pull = along[tendon] + spring(m, d, at, of, tendon)
+    if int(p[KIND]) == BRANCH:
+        # A part of what its tendon's friction has left, which ``held`` is here.
+        first, trunk = HEAD + 1, objects[HEAD]
+        pull = along[trunk] + spring(m, d, at, of, trunk)
+        way = 1.0 if pull > 0.0 else -1.0
+        lost = way * (held + p[VISCOUS] * number_in(d, of.ten_velocity, trunk))
+        pull, held = way * p[HEAD] * max(abs(pull) - lost, 0.0), 0.0
     if int(p[KIND]) == LINK:
         drive = about[integer_in(m, at.jnt_dofadr, row)] * (abs(p[SHARE]) if p[RATIO] > 0.0 else -abs(p[SHARE]))
         pull += drive if p[SHARE] > 0.0 else min(drive, 0.0)
@@ -43,7 +52,7 @@ def tendon(
     bend, real, imaginary, pressing = 0.0, 1.0, 0.0, tension + delivered
     if pressing > 0.0:
         bend, real, imaginary = _turn(m, d, at, of, kinds, e, tendon)
-    for k in range(HEAD, int(p[LENGTH])):
+    for k in range(first, int(p[LENGTH])):
         reactions[integers(m, at.jnt_dofadr)[objects[k]]] += delivered
     # What holds the tendon back takes no more than there is.
     most = tension + p[DRAG] + p[FLOOR] if loss > 0.0 else np.inf

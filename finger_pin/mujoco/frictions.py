@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange.mujoco_friction import LINK, PIN, TENDON, PluginFriction
+from finger_pin.mechanism.exchange.mujoco_friction import BRANCH, LINK, PIN, TENDON, PluginFriction
 
 # Kinds of joints that have one coordinate.
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
@@ -19,12 +20,15 @@ _PARALLEL = 1e-9
 
 
 def frictions(
-    model: Any, tendons: dict[str, tuple[Any, bool]], joints: dict[str, tuple[Any, bool]]
+    model: Any,
+    tendons: dict[str, tuple[Any, bool]],
+    joints: dict[str, tuple[Any, bool]],
+    branches: dict[str, list[tuple[str, float]]],
 ) -> list[PluginFriction]:
     """Return the frictions that users have asked for, folded into as few rows as hold them.
 
     A fixed tendon over one joint acts in that joint's row, and fixed tendons that are multiples of each other share
-    one.
+    one. Each branch behind a pulley, a tendon that `add_branches` has made, follows the friction of its tendon.
 
     Raises:
         InputError: If nothing pulls a tendon that was named, or a named joint neither turns nor slides.
@@ -46,6 +50,12 @@ def frictions(
         crossed = tuple(each for each in _crossed(model, name, law) if each[2] or each[1] in joints)
         held = _limited_or_coupled(model, model.tendon(name).id)
         found.append(PluginFriction(kind, name, row, of_joint, ratio, numbers, crossed, share / abs(ratio), held))
+        # Drag and what the model does not show count once.
+        behind = (*numbers[:8], 0.0, 0.0)
+        for number, (branch, part) in enumerate(branches.get(name, []), start=1):
+            crossed = tuple(each for each in _crossed(model, branch, law) if each[1] in joints)
+            more = ((False, name, part), *crossed)
+            found.append(PluginFriction(BRANCH, branch, branch, False, 1.0, behind, more, float(number)))
     for name, (law, named) in joints.items():
         if int(model.joint(name).type[0]) in _SINGLE:
             loss = float(model.dof_frictionloss[model.jnt_dofadr[model.joint(name).id]])
@@ -55,6 +65,30 @@ def frictions(
         elif named:
             raise InputError(f"joints.{name}", "must be a joint that turns or slides about one axis")
     return _with_loss(model, found)
+
+
+def add_branches(spec: Any, model: Any, names: Iterable[str]) -> dict[str, list[tuple[str, float]]]:
+    """Add a tendon along each branch behind a pulley of some tendons, by which it rubs; it exerts nothing else.
+
+    Returns:
+        By tendon, the names of its branches, each with one over its divisor.
+    """
+    kinds, found = mujoco.mjtWrap, dict[str, list[tuple[str, float]]]()
+    for name in names:
+        branch, made = None, list[tuple[str, float]]()
+        for k in _pieces(model, model.tendon(name).id):
+            kind, at = model.wrap_type[k], int(model.wrap_objid[k])
+            if kind == kinds.mjWRAP_PULLEY:
+                made.append((f"{name}_branch_{len(made) + 1}", 1.0 / float(model.wrap_prm[k])))
+                branch = spec.add_tendon(name=made[-1][0], rgba=(0.0, 0.0, 0.0, 0.0))
+            elif branch is not None and kind == kinds.mjWRAP_SITE:
+                branch.wrap_site(model.site(at).name)
+            elif branch is not None:
+                side = int(model.wrap_prm[k])
+                branch.wrap_geom(model.geom(at).name, model.site(side).name if side >= 0 else "")
+        if made:
+            found[name] = made
+    return found
 
 
 def _with_loss(model: Any, found: list[PluginFriction]) -> list[PluginFriction]:
@@ -68,6 +102,11 @@ def _with_loss(model: Any, found: list[PluginFriction]) -> list[PluginFriction]:
             each = replace(each, law=(*each.law[:8], each.law[8] + loss, *each.law[9:]))
         kept.append(each)
     return kept
+
+
+def pulled(model: Any, names: Iterable[str]) -> list[str]:
+    """Return the tendons among some that an actuator, a spring, a limit or an equality pulls."""
+    return [name for name in names if _held(model, model.tendon(name).id)]
 
 
 def _held(model: Any, tendon: int) -> bool:
@@ -137,14 +176,14 @@ def _tendon_law(model: Any, name: str, law: Any) -> tuple[float, ...]:
 
 
 def _crossed(model: Any, name: str, law: Any) -> tuple[tuple[bool, str, float], ...]:
-    """Return the joints that a tendon crosses, whose pins it loads; of a fixed one with 1 for those that bend it."""
+    """Return the joints that a tendon crosses before its first pulley, with 1 for those that bend a fixed one."""
     tendon, movers = model.tendon(name).id, None
     found = dict.fromkeys(np.flatnonzero(_coefficients(model, tendon)), 1.0)
     for k in _pieces(model, tendon):
         kind, at = model.wrap_type[k], model.wrap_objid[k]
         if kind == mujoco.mjtWrap.mjWRAP_PULLEY:
-            movers = None
-        elif kind != mujoco.mjtWrap.mjWRAP_JOINT:
+            break
+        if kind != mujoco.mjtWrap.mjWRAP_JOINT:
             body = model.site_bodyid[at] if kind == mujoco.mjtWrap.mjWRAP_SITE else model.geom_bodyid[at]
             before, movers = movers, _movers(model, int(body))
             found |= dict.fromkeys(sorted(movers ^ before) if before is not None else (), 0.0)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from finger_pin.mechanism.exchange.mujoco_friction import (
+    BRANCH,
     DRAG,
     FORCE,
     KIND,
@@ -24,6 +25,7 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     MASS,
     PIN,
     RATIO,
+    SHARE,
     SIGNALS,
     STIFFNESS,
     TURN,
@@ -146,6 +148,8 @@ def compute(m: Any, d: Any, instance: Any, at: Any, of: Any, kinds: Any) -> None
                 found = mass(m, d, at, of, kinds, e, reactions)
             else:
                 held = act[x] if loads > 0 else 0.0
+                if kind == BRANCH:
+                    held = act[z - int(values[e + SHARE])]
                 found = tendon(m, d, at, of, kinds, e, act[z], held, along, about, reactions)
             for field in range(RATIO, DRAG + 1):
                 block[WIDTH * field + lanes] = values[e + field]

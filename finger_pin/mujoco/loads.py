@@ -47,12 +47,13 @@ def driven(m: Any, d: Any, at: Any, of: Any, kinds: Any, along: Any, about: Any)
 
 @compiled
 def spring(m: Any, d: Any, at: Any, of: Any, tendon: Any) -> Any:
-    """Return the force of a tendon's own spring along it, N, negative in tension."""
-    stiffness = number_in(m, at.tendon_stiffness, tendon)
+    """Return the force of a tendon's own spring and damper along it, N, negative in tension."""
+    stiffness, damping = number_in(m, at.tendon_stiffness, tendon), number_in(m, at.tendon_damping, tendon)
+    damped = -damping * number_in(d, of.ten_velocity, tendon) if damping != 0.0 else 0.0
     if stiffness == 0.0:
-        return 0.0
+        return damped
     length, rest = number_in(d, of.ten_length, tendon), numbers(m, at.tendon_lengthspring)
-    return stiffness * (max(rest[2 * tendon] - length, 0.0) + min(rest[2 * tendon + 1] - length, 0.0))
+    return damped + stiffness * (max(rest[2 * tendon] - length, 0.0) + min(rest[2 * tendon + 1] - length, 0.0))
 
 
 @compiled
@@ -69,18 +70,17 @@ def between(points: Any, first: Any, second: Any) -> Any:
 def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     """Return half turns, rad, and the complex number whose angle is the rest by which a spatial tendon's path turns.
 
-    Of a wrap both tangent points are in the path. The chord between them makes half the arc's angle with either
-    tangent. Angles add up as the complex numbers dot + i |cross| multiply, half turns being counted.
-    With about the square of the later length out, products stay about as large as the first length over the last.
+    That is up to its first pulley: each branch behind it is a tendon of its own. Of a wrap both tangent points are in
+    the path. The chord between them makes half the arc's angle with either tangent. Angles add up as the complex
+    numbers dot + i |cross| multiply, half turns being counted. With about the square of the later length out, products
+    stay about as large as the first length over the last.
     """
     first, count = integer_in(d, of.ten_wrapadr, tendon), integer_in(d, of.ten_wrapnum, tendon)
     point, of_wrap, halves = numbers(d, of.wrap_xpos), integers(d, of.wrap_obj), 0.0
     x0, y0, z0, known, real, imaginary = 0.0, 0.0, 0.0, False, 1.0, 0.0
     for k in range(first + 1, first + count):
         if of_wrap[k] == -2 or of_wrap[k - 1] == -2:
-            # To a pulley, and from there to what comes after it.
-            known = False
-            continue
+            break
         x, y, z = between(point, k - 1, k)
         square = x * x + y * y + z * z
         if square < 1e-24:

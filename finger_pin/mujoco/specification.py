@@ -19,7 +19,7 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     PLUGIN,
     PluginFriction,
 )
-from finger_pin.mujoco.frictions import frictions
+from finger_pin.mujoco.frictions import add_branches, frictions, pulled
 from finger_pin.mujoco.registration import register
 from finger_pin.mujoco.selection import JOINT, TENDON_KEYS, choose
 
@@ -69,11 +69,12 @@ def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = N
         model = spec.compile()
     except ValueError as error:
         raise InputError("spec", " ".join(str(error).split())) from None
-    found = frictions(
-        model,
-        choose(tendons, [model.tendon(i).name for i in range(model.ntendon)], "tendons", TENDON_KEYS),
-        choose(joints, [model.joint(i).name for i in range(model.njnt)], "joints", JOINT),
-    )
+    rubbing = choose(tendons, [model.tendon(i).name for i in range(model.ntendon)], "tendons", TENDON_KEYS)
+    turning = choose(joints, [model.joint(i).name for i in range(model.njnt)], "joints", JOINT)
+    branches = add_branches(spec, model, pulled(model, rubbing))
+    if branches:
+        model = spec.compile()
+    found = frictions(model, rubbing, turning, branches)
     if not found:
         raise InputError("spec", "nothing pulls the tendons, and no joints are named: there is no friction to add")
     stiff = sorted({each.row for each in found if _damping(model, each) > _STIFF})
@@ -108,8 +109,9 @@ def _damping_rate(model: Any, of_joint: bool, name: str) -> float:
 
 
 def _name_all(spec: Any) -> None:
-    """Give tendons and joints without names some, by which the table knows them."""
-    for what, elements in (("tendon", spec.tendons), ("joint", spec.joints)):
+    """Give what has no name one, by which the table and branches know it."""
+    named = {"tendon": spec.tendons, "joint": spec.joints, "site": spec.sites, "geom": spec.geoms}
+    for what, elements in named.items():
         for index, each in enumerate(elements):
             each.name = each.name or f"{what}_{index}"
 

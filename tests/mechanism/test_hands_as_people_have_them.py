@@ -25,8 +25,8 @@ def chain(rest, option="", near="", far="", far_joint=""):
     inner, outer = HINGE.format(name="mcp", more=""), HINGE.format(name="pip", more=far_joint)
     text = f"""<mujoco>{HEAD.format(option=option)}<worldbody>
     <body name="near" {near}>{inner}{PHALANX.format(length=0.05, mass=0.06)}
-    <body name="far" pos="0.05 0 0" {far}>{outer}{PHALANX.format(length=0.04, mass=0.04)}<site name="tip" pos="0.04 0 0"/>
-    </body></body></worldbody>{rest}</mujoco>"""
+    <body name="far" pos="0.05 0 0" {far}>{outer}{PHALANX.format(length=0.04, mass=0.04)}
+    <site name="tip" pos="0.04 0 0"/></body></body></worldbody>{rest}</mujoco>"""
     return mujoco.MjModel.from_xml_string(text)
 
 
@@ -35,7 +35,7 @@ SERVOS = """<actuator><position name="mcp" joint="mcp" kp="0.6" ctrlrange="-0.5 
 
 
 def test_bodies_whose_weight_is_compensated_in_part_rest_where_the_rest_of_it_leaves_them():
-    """k (u - q) = sum of (1 - c) m g times the lever, joint by joint."""
+    """Servos bear what is not compensated: k (u - q) = sum of (1 - c) m g times the lever, joint by joint."""
     random = np.random.default_rng(3)
     for _ in range(3):
         one, two = random.uniform(0.0, 1.2, 2)
@@ -116,7 +116,7 @@ def test_a_four_bar_finger_turns_as_its_links_say(crank, rod, base):
 
     def gap(q):
         turned = np.array([pin[0] * math.cos(q) - pin[1] * math.sin(q), pin[0] * math.sin(q) + pin[1] * math.cos(q)])
-        return np.linalg.norm(turned + (base, 0.0) - end) - rod
+        return np.linalg.norm(turned + np.array([base, 0.0]) - end) - rod
 
     expected = brentq(gap, 0.1, 1.2)
     found = equilibrium(fp.from_mujoco(model), {"crank": goal}, position=[0.4, -0.4, 0.4])
@@ -182,8 +182,9 @@ def test_servos_that_lag_integrate_or_have_an_integral_part_move_as_in_mujoco(re
 def test_a_rope_on_a_turning_drum_is_as_long_as_in_mujoco_wherever_its_side_point_is():
     for kind, size in (("cylinder", "0.03 0.01"), ("sphere", "0.03")):
         model = mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>
-        <geom name="drum" type="{kind}" size="{size}" euler="90 0 0" mass="0.05"/><site name="hook" pos="-0.06 0 0.028"/>
-        </body><site name="side" pos="0 0 0.06"/><body name="led" pos="0.032 0 -0.12"><joint name="led" axis="0 1 0"/>
+        <geom name="drum" type="{kind}" size="{size}" euler="90 0 0" mass="0.05"/>
+        <site name="hook" pos="-0.06 0 0.028"/></body>
+        <site name="side" pos="0 0 0.06"/><body name="led" pos="0.032 0 -0.12"><joint name="led" axis="0 1 0"/>
         <geom size="0.006" mass="0.02" pos="0 0 0.02"/><site name="eye" pos="0 0.001 0.006"/></body></worldbody>
         <tendon><spatial name="rope"><site site="eye"/><geom geom="drum" sidesite="side"/><site site="hook"/></spatial>
         </tendon></mujoco>""")
@@ -195,9 +196,10 @@ def test_a_rope_on_a_turning_drum_is_as_long_as_in_mujoco_wherever_its_side_poin
 
 
 def test_a_load_on_a_cable_pulls_with_its_weight_and_is_no_anchor():
-    """2 (u - q) = (m_boom a / 2 + m_load a) g cos q for a boom of length a, the load hanging below its end."""
-    model = mujoco.MjModel.from_xml_string(f"""<mujoco>{HEAD.format(option="")}<worldbody><body name="boom" pos="0 0 0.2">
-    <joint name="boom" axis="0 -1 0" range="-0.5 1"/>{PHALANX.format(length=0.1, mass=0.03)}<site name="end" pos="0.1 0 0"/>
+    """The boom bears it: 2 (u - q) = (m_boom a / 2 + m_load a) g cos q for a boom of length a."""
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>{HEAD.format(option="")}<worldbody>
+    <body name="boom" pos="0 0 0.2"><joint name="boom" axis="0 -1 0" range="-0.5 1"/>{PHALANX.format(length=0.1, mass=0.03)}
+    <site name="end" pos="0.1 0 0"/>
     </body><body name="load" pos="0.1 0 0.1"><freejoint/><geom size="0.01" mass="0.05"/><site name="ring" pos="0 0 0.01"/>
     </body></worldbody><tendon><spatial name="line" limited="true" range="0 0.09"><site site="end"/><site site="ring"/>
     </spatial></tendon><actuator><position name="boom" joint="boom" kp="2" ctrlrange="-0.5 1"/></actuator></mujoco>""")

@@ -84,11 +84,12 @@ def test_a_batch_of_simulations_on_threads_moves_as_one_does_to_the_last_bit(mod
 
 def test_xml_keeps_the_friction_and_the_number_of_controls(model):
     again = mujoco.MjModel.from_xml_string(spec().to_xml())
-    assert (again.nu, again.na) == (model.nu, model.na) == (3, 6 + 3 * 3)
+    assert (again.nu, again.na) == (model.nu, model.na) == (3, 8 + 3 * 3)
     np.testing.assert_allclose(motion(again, steps=50), motion(model, steps=50), atol=1e-4)
     data = mujoco.MjData(again)
     motion(again, data, steps=50)
-    assert fp.mujoco.friction(again, data).level.min() > 5e-4
+    signals = fp.mujoco.friction(again, data)
+    assert all(signals.level[signals.index(name)] > 5e-4 for name in ("top", "branched", "sum", "j1", "j2", "slider"))
 
 
 @pytest.mark.filterwarnings("ignore:Attach conflict")
@@ -134,11 +135,15 @@ def test_signals_are_mujoco_s_own_memory(model):
     data = mujoco.MjData(model)
     signals = fp.mujoco.friction(model, data)
     motion(model, data, steps=30)
-    assert signals.names == ("top", "branched", "sum", "j1", "j2", "slider")
+    branches = ("branched_branch_1", "branched_branch_2")
+    assert signals.names == ("top", "branched", *branches, "sum", "j1", "j2", "slider")
     assert signals.tension[signals.index("branched")] == pytest.approx(data.ctrl[1], rel=0.1)
-    np.testing.assert_array_equal(signals.bristle, data.act[:6])
+    np.testing.assert_array_equal(signals.bristle, data.act[:8])
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON
-    np.testing.assert_array_equal(signals.friction[:3], -data.efc_force[: data.nefc][rows])
+    # The solver's rows are in the order of the model's tendons.
+    names = [model.tendon(i).name for i in range(model.ntendon)]
+    order = [signals.index(name) for name in names if name in signals.names]
+    np.testing.assert_array_equal(signals.friction[order], -data.efc_force[: data.nefc][rows])
 
 
 def test_a_process_that_has_not_imported_us_is_told_what_is_missing_by_the_xml():

@@ -21,8 +21,8 @@ NO_INPUT, GROUP = 16, 30
 #: The solver makes a row of what has a friction loss: at least this, which XML keeps.
 LEAST_LOSS = 1e-6
 #: Kinds of friction: of a tendon that is pulled, of a joint's pin (17), of a slide that is a passive tendon's mass
-#: (14c), and of a fixed tendon over one joint that is pulled by what drives the joint.
-TENDON, PIN, MASS, LINK = range(4)
+#: (14c), of a fixed tendon over one joint that is pulled by what drives the joint, and of a branch behind a pulley.
+TENDON, PIN, MASS, LINK, BRANCH = range(5)
 #: What elements of a friction carry, in order.
 LENGTH, RATIO, KIND, COULOMB, STATIC, STIFFNESS, VISCOUS, STRIBECK = range(8)
 FLOOR, EXPONENT, MICRO, DRAG, OFFSET, SHARE, LOADS, HEAD = range(8, 16)
@@ -35,7 +35,7 @@ class PluginFriction:
     """A friction.
 
     Attributes:
-        kind: `TENDON`, `PIN` or `MASS`.
+        kind: `TENDON`, `PIN`, `MASS`, `LINK` or `BRANCH`.
         name: Of the tendon or joint.
         row: Name of the tendon or joint in whose row it acts.
         row_of_joint: Whether that is a joint.
@@ -44,7 +44,9 @@ class PluginFriction:
             curvature_offset.
         more: Elements that bend or load it: whether it is a joint, its name, and a number.
         share: Of a `LINK`, tension over the joint's drive: one over the arm and the number of tendons that pull the
-            same way; negative where another one pulls the other way, so that it is slack while that is driven.
+            same way; negative where another one pulls the other way, so that it is slack while that is driven. Of a
+            `BRANCH`, how many frictions before it that of its tendon stands, which is the first of ``more``, with one
+            over the pulley's divisor.
         held: Whether a tendon has a limit or an equality, which pull it too.
     """
 
@@ -61,7 +63,7 @@ class PluginFriction:
     @property
     def of_joint(self) -> bool:
         """Whether it is a joint's."""
-        return self.kind not in (TENDON, LINK)
+        return self.kind not in (TENDON, LINK, BRANCH)
 
     @property
     def least(self) -> float:
