@@ -198,8 +198,8 @@ def test_a_rope_on_a_turning_drum_is_as_long_as_in_mujoco_wherever_its_side_poin
 def test_a_load_on_a_cable_pulls_with_its_weight_and_is_no_anchor():
     """The boom bears it: 2 (u - q) = (m_boom a / 2 + m_load a) g cos q for a boom of length a."""
     model = mujoco.MjModel.from_xml_string(f"""<mujoco>{HEAD.format(option="")}<worldbody>
-    <body name="boom" pos="0 0 0.2"><joint name="boom" axis="0 -1 0" range="-0.5 1"/>{PHALANX.format(length=0.1, mass=0.03)}
-    <site name="end" pos="0.1 0 0"/>
+    <body name="boom" pos="0 0 0.2"><joint name="boom" axis="0 -1 0" range="-0.5 1"/>
+    {PHALANX.format(length=0.1, mass=0.03)}<site name="end" pos="0.1 0 0"/>
     </body><body name="load" pos="0.1 0 0.1"><freejoint/><geom size="0.01" mass="0.05"/><site name="ring" pos="0 0 0.01"/>
     </body></worldbody><tendon><spatial name="line" limited="true" range="0 0.09"><site site="end"/><site site="ring"/>
     </spatial></tendon><actuator><position name="boom" joint="boom" kp="2" ctrlrange="-0.5 1"/></actuator></mujoco>""")
