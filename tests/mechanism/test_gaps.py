@@ -169,7 +169,7 @@ def test_the_normal_of_a_rim_turns_by_degrees_as_it_sinks_past_an_edge_of_a_core
     p = np.array([[9e-4, 8e-3, 0.0, *prism_parameters(shape, size, 1e-3)]])
     share = np.linspace(0.0, 1.0, 10_001)[:, None]
     centre = (1.0 - share) * [0.026, 0.004, 0.016] + share * [0.009, 0.002, 0.009]
-    y = np.hstack([centre, centre + [0.012, 0.003, 0.009]])
+    y = np.hstack([centre, centre + np.array([0.012, 0.003, 0.009])])
     found = gaps(y, np.repeat(p, len(y), axis=0))[0]
     turned = np.linalg.norm(np.diff(found[:, 1:4], axis=0), axis=1)
     travelled = np.linalg.norm(np.diff(centre, axis=0), axis=1)

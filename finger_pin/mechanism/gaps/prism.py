@@ -1,8 +1,9 @@
 """One shape for all: a rounded prism, of which half-space, sphere, box, cylinder and capsule are special cases.
 
 Its core is a rectangle, widened by a rim, times an interval of z; a rounding is added all around. The core is convex.
-Everything follows from a point's offset w from the nearest point of the core: the distance |w|, its gradient
-n = w / |w|, and, with the slope D = dw/dx (symmetric, D n = n), its Hessian (D - n n^T) / |w|.
+Everything follows from a point's offset w from the nearest point of the core, or of one that is shrunk on all sides:
+the distance |w|, its gradient n = w / |w|, and, with the slope D = dw/dx (symmetric, D n = n), its Hessian
+(D - n n^T) / |w|.
 """
 
 from __future__ import annotations
