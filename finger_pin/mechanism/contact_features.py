@@ -7,7 +7,8 @@ corners of either body on the other and the edges of both; edge on edge, the pai
 cylinder, the lowest points of its rims.
 
 Corners and edges of boxes and rims of cylinders are rounded by `fillet` where they meet boxes and cylinders; against
-all else they are sharp. So there is one way out of a shallow contact even where two edges lie on each other.
+all else they are sharp. So there is one way out of a contact even where two edges lie on each other. `gaps.distance`
+says how roundings grow with the depth.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ class Touching:
     Attributes:
         force: On the second body of the pair, N.
         point: Midway between the surfaces, m.
-        normal: Unit vector from the second body towards the first.
+        normal: Gradient of the gap, from the second body towards the first: a unit vector but deep in an edge.
     """
 
     force: Array

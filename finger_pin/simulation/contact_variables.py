@@ -42,7 +42,7 @@ def contact_variables(finger: Finger) -> Variables:
         "contact_friction": (_CONTACT, "N", "friction force"),
         "contact_level": (_CONTACT, "N", "most friction, mu times the normal force"),
         "contact_point": (_SPACE, "m", "midway between the surfaces; zero where they are open"),
-        "contact_normal": (_SPACE, "1", "normal of the second body; zero where they are open"),
+        "contact_normal": (_SPACE, "1", "normal of the second body, shorter deep in an edge; zero where they are open"),
         "contact_bend": (("time", "contact", "tangent"), "m", "bend of the bristles along two tangents"),
     }
     if around.free:

@@ -1,4 +1,4 @@
-"""Random flights, spins and sweeps of bodies towards each other, whose motion is known until they touch."""
+"""Random flights, spins and sweeps of bodies towards each other, whose motion is known until they touch; and falls."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from finger_pin.description.objects import Object
 from finger_pin.description.palm import PathSignal
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.solids import object_solid
 
 G = 9.81
 #: Touches that are not as deep, m, and misses that are as near, are left out: they are within the tolerances.
@@ -227,6 +228,49 @@ def sweeping_link(rng: np.random.Generator) -> Flight:
         return np.hstack([speed * t[:, None], pose(np.tile(place, (len(t), 1)))])
 
     return Flight({"ball": ball}, 2.0 * np.pi / abs(speed), gap, exact, speed=speed)
+
+
+_THIN, _TABLE, _GROUND = 5e-3, 0.2, Object(shape="half_space")
+FALLING, FALLEN_ON = ("sphere", "box", "cylinder", "capsule"), ("half_space", "sphere", "box", "cylinder", "capsule")
+
+
+def _sizes(rng: np.random.Generator, shape: str) -> dict[str, object]:
+    if shape == "box":
+        return {"sides": tuple(rng.uniform(0.015, 0.05, 3))}
+    length = {"length": rng.uniform(0.01, 0.06)} if shape in ("cylinder", "capsule") else {}
+    return {"radius": rng.uniform(0.006, 0.02), **length} if shape != "half_space" else {}
+
+
+def falls(rng: np.random.Generator, shape: str, onto: str) -> tuple[Flight, Flight]:
+    """Let a body of 50 g fall 0.1 to 0.4 m onto a fixed one; and the same onto a half-space.
+
+    Half of what it falls on stands upright, and half of those boxes are tables, from 5 mm thick.
+    """
+    size, turn, drop = _sizes(rng, shape), tuple(rng.normal(size=4)), float(rng.uniform(0.1, 0.4))
+    base, upright = _sizes(rng, onto), onto == "half_space" or rng.random() < 0.5
+    if onto == "box" and upright and rng.random() < 0.5:
+        base["sides"] = (_TABLE, _TABLE, rng.uniform(_THIN, 0.04))
+    fixed = Object(shape=onto, **base, orientation=(0.0, 0.0, 0.0, 1.0) if upright else tuple(rng.normal(size=4)))
+    aside = rng.uniform(-0.01, 0.01, 2)
+
+    def onto_one(floor: Object) -> Flight:
+        reach = sum(_reach(each) for each in (floor, Object(shape=shape, **size)))
+        body = Object(
+            shape=shape,
+            **size,
+            mass=0.05,
+            position=(*aside, reach + 1e-3),
+            orientation=turn,
+            velocity=(0.0, 0.0, -np.sqrt(2.0 * G * drop)),
+        )
+        start = np.append(body.position, body.quaternion)
+        return Flight({"floor": floor, "body": body}, 0.3, lambda q: q[:, 2], lambda t: np.tile(start, (len(t), 1)), G)
+
+    return onto_one(fixed), onto_one(_GROUND)
+
+
+def _reach(body: Object) -> float:
+    return 0.0 if body.shape == "half_space" else object_solid("", body, 0).reach
 
 
 #: Each makes a flight of a generator of random numbers.

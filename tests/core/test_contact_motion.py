@@ -37,15 +37,20 @@ def scene(gravity, **objects):
     return mechanism, start
 
 
-def motion(mechanism, start, times, method="Rodas5P", tolerance=1e-8):
-    """Return states at times, shape (m, size)."""
+def trajectory_of(mechanism, start, duration, method="Rodas5P", tolerance=1e-8):
+    """Return a trajectory that has not failed."""
     q, v, z = mechanism.split(np.zeros(mechanism.size))
     atol = tolerance * np.concatenate([0.0 * q + 1e-2, 0.0 * v + 1.0, 0.0 * z + 1e-5])
     control = held_control(mechanism.channels, mechanism.coordinates)
     stepper = Stepper(mechanism, control, start, TABLEAUS[method](), tolerance, atol)
-    trajectory = integrate_compiled(stepper, float(times[-1]), tuple(map(str, range(mechanism.size))))
+    trajectory = integrate_compiled(stepper, duration, tuple(map(str, range(mechanism.size))))
     assert not trajectory.failure
-    return trajectory.interpolate(np.asarray(times))
+    return trajectory
+
+
+def motion(mechanism, start, times, method="Rodas5P", tolerance=1e-8):
+    """Return states at times, shape (m, size)."""
+    return trajectory_of(mechanism, start, float(times[-1]), method, tolerance).interpolate(np.asarray(times))
 
 
 def plane(**surface):
@@ -169,3 +174,59 @@ def test_the_methods_keep_their_order_while_a_contact_stays_closed_and_slides(me
         assert stepper.parts[0].memory[rosenbrock.ACCEPTED] == count
         errors.append(np.abs(stepper.x - exact)[:7].max())
     assert np.log(errors[0] / errors[1]) / np.log(4.0) == pytest.approx(order, abs=0.6)
+
+
+#: Cans that sink into an edge of what they fall on by more than all roundings, or pierce it: floor, can and duration.
+DEEP = {
+    "upright": ((0.2, 0.2, 0.02), (0.009, 0.04), (-0.16, 0.64, 2.34, 2.15), (0.0, 0.0, -2.2), (0.0, 0.0, 0.0), 0.3),
+    "slanting": ((0.2, 0.2, 0.02), (0.018, 0.04), (0.35, 0.82, 0.33, -1.3), (0.0, 0.0, -2.6), (0.0, 0.0, 0.0), 0.3),
+    "off the edge": ((0.03, 0.03, 0.04), (0.009, 0.04), (0.9, 0.3, 0.2, 1.0), (0.0, 0.0, -2.5), (0.0, 0.0, 0.0), 0.3),
+    "thin": (
+        (0.15, 0.15, 0.0016),
+        (0.0098, 0.0102),
+        (1.0, 0.2, 0.1, 1.0),
+        (2.0, 1.5, -5.5),
+        (100.0, 200.0, 80.0),
+        0.03,
+    ),
+}
+
+
+def falling(case, on_box, **surface):
+    """Return a scene with a can that falls onto a box, or onto a half-space, the can, and how long it is followed."""
+    sides, (radius, length), turn, velocity, spin, duration = DEEP[case]
+    floor = Object(shape="half_space", surface=surface)
+    if on_box:
+        floor = Object(shape="box", sides=sides, position=(0.0, 0.0, -0.5 * sides[2]), surface=surface)
+    can = Object(
+        shape="cylinder",
+        radius=radius,
+        length=length,
+        mass=0.05,
+        position=(0.012, 0.004, np.hypot(radius, 0.5 * length) + 1e-3),
+        orientation=turn,
+        velocity=velocity,
+        angular_velocity=spin,
+        surface=surface,
+    )
+    return scene((0.0, 0.0, -G), floor=floor, can=can), can, duration
+
+
+@pytest.mark.parametrize("case", DEEP)
+def test_a_can_that_sinks_into_an_edge_takes_no_more_than_thrice_the_steps_of_one_on_a_half_space(case):
+    steps = []
+    for on_box in (True, False):
+        (mechanism, start), _, duration = falling(case, on_box, damping=0.3)
+        steps.append(trajectory_of(mechanism, start, duration, tolerance=1e-6).statistics.steps)
+    assert 50 < steps[0] < 3 * steps[1]
+
+
+@pytest.mark.parametrize("case", DEEP)
+def test_a_can_without_friction_and_damping_leaves_an_edge_with_the_energy_it_came_with(case):
+    (mechanism, start), can, _ = falling(case, True, damping=0.0, friction=0.0)
+    times = np.linspace(0.0, 0.03, 301)
+    x = motion(mechanism, start, times)
+    velocity, spin = x[:, 7:10], x[:, 10:13]
+    energy = 0.5 * 0.05 * np.sum(velocity**2, axis=1) + 0.5 * spin**2 @ np.array(can.inertia) + 0.05 * G * x[:, 2]
+    # It gives some to the springs and has all of it back.
+    assert energy.min() < 0.98 * energy[0] and energy[-1] == pytest.approx(energy[0], rel=1e-5)

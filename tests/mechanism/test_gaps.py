@@ -6,6 +6,8 @@ import pytest
 from gap_cases import EPSILON, PARTS, coal_distance, coal_shape, gaps, random_pairs, twists
 from scipy.optimize import minimize_scalar
 
+from finger_pin.mechanism.gaps import prism_parameters
+
 SHAPES = ("half_space", "sphere", "box", "cylinder", "capsule")
 #: coal's distances of these are iterated to about 1e-6 m.
 ITERATED = ("box", "cylinder")
@@ -22,9 +24,17 @@ def lowest(y, p):
     return EPSILON * (p[:, 2] * np.linalg.norm(y[:, 3:] - y[:, :3], axis=1) + 2.0 * p[:, 1])
 
 
+def half_rounding(p):
+    """Return the depth down to which gaps are the distances of what is rounded."""
+    return 0.5 * (p[:, 0] + p[:, 8])
+
+
 @pytest.mark.parametrize(("shape", "part"), PAIRS)
 def test_distances_are_those_of_coal_on_ten_thousand_random_pairs(shape, part):
-    """550 of each kind; of what reaches into the other body's core but for points, coal alone knows how deep it is."""
+    """550 of each kind; of what reaches into the other body's core but for points, coal alone knows how deep it is.
+
+    Below half of both roundings a gap may be less deep, never deeper.
+    """
     rng = np.random.default_rng(3)
     fillet = 5e-4 if shape in ITERATED and part in ("disc", "cylinder") else 0.0
     y, p, sizes = random_pairs(rng, shape, part, 550, fillet)
@@ -35,7 +45,8 @@ def test_distances_are_those_of_coal_on_ten_thousand_random_pairs(shape, part):
         outside = expected + p[:, 0] + fillet > 1e-6
         y, p, found, expected = y[outside], p[outside], found[outside], expected[outside]
     tolerance = 1e-12 if part == "point" and shape != "cylinder" else 2e-6 if shape in ITERATED else 2e-9
-    assert np.all(found < expected + tolerance) and np.all(found > expected - lowest(y, p) - tolerance)
+    assert np.all(found > expected - lowest(y, p) - tolerance)
+    assert np.all(found < np.maximum(expected, -half_rounding(p)) + tolerance)
     assert np.count_nonzero(found < 0.0) > 7 and np.count_nonzero(found > 0.0) > 100
 
 
@@ -55,17 +66,21 @@ def test_where_coal_iterates_a_capsule_is_as_far_as_the_nearest_of_its_spheres(s
         # The distance falls, then rises along the segment; a parabola through three points is exact enough at 1e-7.
         inner = minimize_scalar(far, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-8}).fun
         least = min(inner, far(0.0), far(1.0))
-        if least > 1e-6:
+        if least > 0.5 * numbers[0] + 1e-6:
             assert least - low - 1e-9 < distance + numbers[0] < least + 1e-9
 
 
-def test_a_centre_in_a_cylinder_is_as_deep_as_its_nearest_face():
+def test_a_centre_in_a_cylinder_is_as_deep_as_its_nearest_face_unless_the_next_one_is_near():
+    """The core shrinks by r / 2 + 2 depth: beside a face that is farther than this no edge has grown round."""
     rng = np.random.default_rng(7)
-    y, p, sizes = random_pairs(rng, "cylinder", "point", 4000)
-    depth = np.minimum(sizes[:, 0] - np.hypot(y[:, 0], y[:, 1]), sizes[:, 1] / 2.0 - np.abs(y[:, 2]))
-    inside = depth > 0.0
-    assert gaps(y, p)[0][inside, 0] == pytest.approx(-depth[inside] - p[inside, 0], abs=1e-15)
-    assert inside.sum() > 50
+    y, p, sizes = random_pairs(rng, "cylinder", "point", 8000)
+    faces = np.column_stack([sizes[:, 0] - np.hypot(y[:, 0], y[:, 1]), sizes[:, 1] / 2.0 - np.abs(y[:, 2])])
+    depth, next_, shrunk = faces.min(axis=1), faces.max(axis=1), 0.5 * p[:, 0] + 2.0 * faces.min(axis=1)
+    inside = (depth > 0.0) & (shrunk < np.minimum(sizes[:, 0], sizes[:, 1] / 2.0))
+    flat, found = inside & (shrunk < next_), gaps(y, p)[0][:, 0] + p[:, 0]
+    assert found[flat] == pytest.approx(-depth[flat], abs=1e-15)
+    assert np.all(found[inside] > -depth[inside] - 1e-15) and np.all(found[inside] < 0.5 * p[inside, 0])
+    assert flat.sum() > 50 and (inside & ~flat).sum() > 50
 
 
 @pytest.mark.parametrize(("shape", "part"), PAIRS)
@@ -74,7 +89,7 @@ def test_the_normal_is_the_way_out_and_the_point_lies_midway_between_the_surface
     rng = np.random.default_rng(5)
     y, p, _ = random_pairs(rng, shape, part, 1000)
     found = gaps(y, p)[0]
-    outside = found[:, 0] + p[:, 0] > 1e-4
+    outside = found[:, 0] > 1e-4 - half_rounding(p)
     y, p, found = y[outside], p[outside], found[outside]
     distance, normal, point = found[:, 0], found[:, 1:4], found[:, 4:7]
     assert np.linalg.norm(normal, axis=1) == pytest.approx(1.0, abs=1e-12)
@@ -95,9 +110,9 @@ def test_slopes_are_differences_wherever_these_agree_on_both_sides(shape, part):
     rng = np.random.default_rng(6)
     y, p, _ = random_pairs(rng, shape, part, 1000)
     found, slopes, by_distance = gaps(y, p)
-    if part != "point":
-        outside = found[:, 0] + p[:, 0] > 1e-4
-        y, p, found, slopes, by_distance = (each[outside] for each in (y, p, found, slopes, by_distance))
+    # Where a disc pierces what is left of a core, its point is known less well than differences need.
+    known = np.linalg.norm(found[:, 1:4], axis=1) > 1e-3
+    y, p, found, slopes, by_distance = (each[known] for each in (y, p, found, slopes, by_distance))
     slopes = np.concatenate([by_distance[:, None], slopes], axis=1)
     step, rate = 1e-8, twists(rng, y)
     ahead, behind = gaps(y + step * rate, p)[0], gaps(y - step * rate, p)[0]
@@ -124,6 +139,42 @@ def test_a_gap_changes_by_no_more_than_the_fastest_point_of_a_part_moves():
         moved = gaps(y + step * rate, p)[0][:, 0] - gaps(y, p)[0][:, 0]
         outside = gaps(y, p)[0][:, 0] > 0.0
         assert np.all(np.abs(moved)[outside] < step * farthest[outside] * (1.0 + 1e-3) + 1e-9)
+
+
+@pytest.mark.parametrize(("shape", "part"), PAIRS)
+def test_a_gap_closes_as_the_material_at_its_point_moves_along_the_normal_however_deep(shape, part):
+    """So a force along the normal does the work that the gap stores, and nothing else."""
+    rng = np.random.default_rng(9)
+    y, p, _ = random_pairs(rng, shape, part, 1000, 0.0 if part in ("point", "segment") else 5e-4)
+    found, _, by_distance = gaps(y, p)
+    turn, speed = 50.0 * rng.normal(size=(len(y), 3)), rng.normal(size=(len(y), 3))
+    rate = np.hstack([speed + np.cross(turn, y[:, :3]), speed + np.cross(turn, y[:, 3:])])
+    at_point = speed + np.cross(turn, found[:, 4:7])
+    if part in ("disc", "cylinder"):
+        # A turn about the axis moves no end.
+        axis = y[:, 3:] - y[:, :3]
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        spin = np.sum(turn * axis, axis=1, keepdims=True) * axis
+        at_point -= np.cross(spin, found[:, 4:7] - y[:, :3])
+    closing = np.sum(found[:, 1:4] * at_point, axis=1)
+    assert np.sum(by_distance * rate, axis=1) == pytest.approx(closing, abs=2e-4)
+    assert np.linalg.norm(found[:, 1:4], axis=1).max() < 1.0 + 1e-12
+    assert np.count_nonzero(found[:, 0] < -half_rounding(p)) > (-1 if shape == "half_space" else 10)
+
+
+@pytest.mark.parametrize("shape", ITERATED)
+def test_the_normal_of_a_rim_turns_by_degrees_as_it_sinks_past_an_edge_of_a_core(shape):
+    """5 mm deep; by micrometres on a rounding that is never sharper than three quarters of half of both."""
+    size = (0.03, 0.04, 0.02) if shape == "box" else (0.02, 0.02)
+    p = np.array([[9e-4, 8e-3, 0.0, *prism_parameters(shape, size, 1e-3)]])
+    share = np.linspace(0.0, 1.0, 10_001)[:, None]
+    centre = (1.0 - share) * [0.026, 0.004, 0.016] + share * [0.009, 0.002, 0.009]
+    y = np.hstack([centre, centre + np.array([0.012, 0.003, 0.009])])
+    found = gaps(y, np.repeat(p, len(y), axis=0))[0]
+    turned = np.linalg.norm(np.diff(found[:, 1:4], axis=0), axis=1)
+    travelled = np.linalg.norm(np.diff(centre, axis=0), axis=1)
+    assert found[:, 0].max() > 0.0 and found[:, 0].min() < -4.5e-3
+    assert np.ptp(found[:, 1:4], axis=0).max() > 0.1 and turned.max() < 3.0 * travelled.max() / (0.75 * 9.5e-4)
 
 
 def test_slopes_hold_at_the_poles_where_an_offset_has_zero_components():

@@ -1,5 +1,7 @@
 """Geoms of MuJoCo models as shapes: which pairs touch, where, and an imported hand that grasps."""
 
+import itertools
+
 import mujoco
 import numpy as np
 import pytest
@@ -85,24 +87,26 @@ def test_the_shadow_hand_closes_on_a_bar_and_holds_it_when_it_is_turned_over():
 
 
 def test_the_shapes_of_a_tree_are_where_mujoco_has_them():
-    """A small sphere at the place of each geom: the deepest of the gaps to that geom's shape is minus its radius."""
+    """A small fixed sphere where each axis of a geom leaves it is as deep in that geom's shape as its radius."""
     model = MODELS["shadow"]()
     data, description = mujoco.MjData(model), fp.from_mujoco(model)
     data.qpos[:] = np.random.default_rng(0).uniform(0.0, 0.3, model.nq)
     mujoco.mj_forward(model, data)
-    names = [name for body in description.tree.bodies.values() for name in body.shapes]
-    geoms = {name.replace(":", "_"): data.geom(name).xpos for name in (model.geom(i).name for i in range(model.ngeom))}
-    probes = {
-        f"at_{name}": Object(shape="sphere", radius=1e-4, mass=1e-3, position=tuple(geoms[name])) for name in names
-    }
+    shapes = {name: shape for body in description.tree.bodies.values() for name, shape in body.shapes.items()}
+    geoms = {name.replace(":", "_"): data.geom(name) for name in (model.geom(i).name for i in range(model.ngeom))}
+    probes = {}
+    for name, shape in shapes.items():
+        radius, length = (*shape.sizes, 0.0)[:2]
+        end = 0.5 * length + (0.0 if shape.shape == "cylinder" else radius)
+        out = 0.5 * np.array(shape.sizes) if shape.shape == "box" else np.array([radius, radius, end])
+        for axis in range(3):
+            place = geoms[name].xpos + geoms[name].xmat.reshape(3, 3)[:, axis] * out[axis]
+            probes[f"at_{name}_{axis}"] = Object(shape="sphere", radius=1e-4, position=tuple(place))
     hand = fp.Hand(description, objects=probes)
     around = hand.surroundings
-    q = np.concatenate([data.qpos, around.start()[0]])
-    gaps = path_kinematics(around.body, q, around.contacts.paths, hand.mechanism.coordinates).length[::3]
+    gaps = path_kinematics(around.body, data.qpos, around.contacts.paths, hand.mechanism.coordinates).length[::3]
     found = dict(zip(around.contacts.names, gaps, strict=True))
-    sizes = {name: shape.sizes for body in description.tree.bodies.values() for name, shape in body.shapes.items()}
-    for name in names:
-        box = next(each for body in description.tree.bodies.values() for n, each in body.shapes.items() if n == name)
-        deep = min(sizes[name]) / 2.0 if box.shape == "box" else sizes[name][0]
-        own = [gap for pair, gap in found.items() if pair.split(".")[0] in (f"{name}-at_{name}", f"at_{name}-{name}")]
-        assert abs(min(own) + deep + 1e-4) < 1e-6 + 2e-7
+    for name, axis in itertools.product(shapes, range(3)):
+        probe = f"at_{name}_{axis}"
+        own = [gap for pair, gap in found.items() if pair.split(".")[0] in (f"{name}-{probe}", f"{probe}-{name}")]
+        assert abs(min(own) + 1e-4) < 1e-6 + 2e-7

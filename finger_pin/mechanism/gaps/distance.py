@@ -3,9 +3,19 @@
 A part is a point, a segment, a disc or a cylinder, with a rounding of its own; see `nearest`. The other body is a
 rounded prism. By the implicit function theorem the nearest point moves so that it stays the minimum.
 
-Distances are exact, to within what `nearest` takes off, as long as the part is outside of the prism's core, and for
-points everywhere. A segment or a disc that reaches into the core counts with a point there that is near to its middle:
-less deep than the bodies are. Normals of what is inside jump where the nearest face changes.
+Distances are exact, to within what `nearest` takes off, down to a level l, the part's core from the prism's, of half of
+both roundings, l_0. Deeper, the prism's core shrinks on all sides as the part sinks in, and its rounding grows:
+
+    |w| = l + c(u),    u = l_0 - l,    with w the offset from the core shrunk by c.
+
+So the part stays outside of the core, faces are as deep as they are, and edges grow round with the depth: dc/du rises
+from 0 to 2 over l_0, and falls to 0 again before all of the least half-width is taken. Levels are convex, and the
+gradient of l is continuous: n / (1 + (S - 1) dc/du), where S = d|w|/dc is |n_x| + |n_y| + |n_z| for a box. Its length
+is 1 over a face, and less beside an edge. Tangents are as long, so that friction keeps within its cone, and the work of
+the force is the change of what the law stores.
+
+Nearer to what is left of the core than half of the rounding there, |w| counts as (|w|^2 / b + b) / 2: the force goes to
+zero where the way out turns round, as through the middle of a plate.
 """
 
 from __future__ import annotations
@@ -15,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from finger_pin.mechanism.gaps.gap import Gap
-from finger_pin.mechanism.gaps.nearest import ALONG, DISC, EPSILON, RADIUS, lowered, nearest
-from finger_pin.mechanism.gaps.prism import NUMBERS, ROUNDING, offset, surface
+from finger_pin.mechanism.gaps.nearest import ALONG, DISC, EPSILON, INSIDE, RADIUS, lowered, nearest
+from finger_pin.mechanism.gaps.prism import NUMBERS, RIM, ROUNDING, deepest, offset, surface
 
 # Tangents are turned from those of one direction, (2, 3, 6) / 7, to those of the normal, the short way. They jump only
 # for its opposite, which is no normal of a face and lies on no plane of symmetry of a shape.
@@ -24,6 +34,74 @@ _POLE_X, _POLE_Y, _POLE_Z = 2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0
 _FIRST_X, _FIRST_Y, _FIRST_Z = 3.0 / 7.0, -6.0 / 7.0, 2.0 / 7.0
 _SECOND_X, _SECOND_Y, _SECOND_Z = 6.0 / 7.0, 2.0 / 7.0, -3.0 / 7.0
 _LEAST = 1e-12
+# The level is iterated to this, m, in so many steps at most.
+_CLOSE, _MOST_STEPS = 1e-15, 40
+
+
+def _sinking(w: Any, p: Any) -> Any:
+    """Return dw/dc, by the shrinking of the core, and its product with w / |w|."""
+    a, b, c = np.sign(w[0]), np.sign(w[1]), np.sign(w[2])
+    if p[RIM] > 0.0:
+        across = np.sqrt(w[0] * w[0] + w[1] * w[1])
+        a, b = (w[0] / across, w[1] / across) if across > 0.0 else (0.0, 0.0)
+    far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    return a, b, c, ((a * w[0] + b * w[1] + c * w[2]) / far if far > 0.0 else 1.0)
+
+
+def _nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
+    """Return the part's distance from the shrunk core, blunted, its slopes by |w| and by c, and s and r."""
+    s, x, y_, z = nearest(y, p, sunk, blunt)
+    w = offset(y[0] + s * (y[3] - y[0]) + x, y[1] + s * (y[4] - y[1]) + y_, y[2] + s * (y[5] - y[2]) + z, p, sunk)
+    square = (x * x + y_ * y_ + z * z) / (p[DISC] * p[DISC]) if p[DISC] > 0.0 else 1.0
+    far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    size, far = (1.0, far) if far >= blunt else (far / blunt, 0.5 * (far * far / blunt + blunt))
+    return far + lowered(y, p, s, square), size, _sinking(w, p)[3], s, x, y_, z
+
+
+def _ramps(start: float, most: float) -> Any:
+    """Return how long dc/du rises and falls, its most, and where it is zero again."""
+    rise = min(start, np.sqrt(0.5 * most * start))
+    peak, fall = 2.0 * rise / start, max(rise, 0.5 * most)
+    return rise, fall, peak, most / peak + 0.5 * (rise + fall)
+
+
+def _shrunk(u: float, start: float, most: float) -> Any:
+    """Return c, dc/du and d2c/du2."""
+    rise, fall, peak, end = _ramps(start, most)
+    if u >= end:
+        return most, 0.0, 0.0
+    if u < rise:
+        return u * u / start, 2.0 * u / start, 2.0 / start
+    if u < end - fall:
+        return peak * (u - 0.5 * rise), peak, 0.0
+    return most - 0.5 * peak * (end - u) * (end - u) / fall, peak * (end - u) / fall, -peak / fall
+
+
+def _level(y: Any, p: Any) -> Any:
+    """Return the level l; its slope by |w|; c; dc/du and d2c/du2; that slope's own where l is flat, else 0; s and r."""
+    start, most = 0.5 * (p[RADIUS] + p[ROUNDING]), deepest(p)
+    blunt = max((0.5 if most == 0.0 else 0.25) * start, INSIDE)
+    far, size, spread, s, x, y_, z = _nearest(y, p, 0.0, blunt)
+    if far >= start or most == 0.0 or start == 0.0:
+        return far, size, 0.0, 0.0, 0.0, (1.0 / blunt if size < 1.0 else 0.0), s, x, y_, z
+    end = _ramps(start, most)[3]
+    # What is asked for is the root of a function of u that rises; where the core is reached, only its far end is known.
+    low, high, u, sunk, rate, bend = 0.0, np.inf, start - far if size == 1.0 else end, 0.0, 0.0, 0.0
+    for _ in range(_MOST_STEPS):
+        u = min(u, end)
+        sunk, rate, bend = _shrunk(u, start, most)
+        least = max(0.5 * (start - end + most), INSIDE) if u == end else blunt
+        far, size, spread, s, x, y_, z = _nearest(y, p, sunk, least)
+        excess = far - sunk - start + u
+        if u == end and excess <= 0.0:
+            return far - most, size, most, 0.0, 0.0, (1.0 / least if size < 1.0 else 0.0), s, x, y_, z
+        step = excess / (1.0 + (spread - 1.0) * rate)
+        if abs(step) < _CLOSE:
+            break
+        low, high = (low, u) if excess > 0.0 else (u, high)
+        # By Newton, or by halves where that leaves what is known of the root.
+        u = u - step if size == 1.0 and low < u - step < high else min(0.5 * (low + high), end)
+    return start - u, 1.0 / (1.0 + (spread - 1.0) * rate), sunk, rate, bend, 0.0, s, x, y_, z
 
 
 def _tangent(u: float, v: float, w: float, a: float, b: float, c: float, out: Any, at: int) -> None:
@@ -34,27 +112,29 @@ def _tangent(u: float, v: float, w: float, a: float, b: float, c: float, out: An
     out[at + 2] = c - share * (w + _POLE_Z)
 
 
-def _tangent_slope(n: Any, u: float, v: float, w: float, a: float, b: float, c: float, out: Any, at: int) -> None:
-    """Write the motion of a turned tangent under a motion (u, v, w) of the normal n into a column of ``out``."""
+def _tangent_slope(n: Any, moved: Any, growing: float, a: float, b: float, c: float, out: Any, at: int) -> None:
+    """Write the motion of a turned tangent that grows, under a motion of the normal n, into a column of ``out``."""
     whole = max(1.0 + _POLE_X * n[0] + _POLE_Y * n[1] + _POLE_Z * n[2], _LEAST)
     share = (a * n[0] + b * n[1] + c * n[2]) / whole
-    change = (a * u + b * v + c * w - share * (_POLE_X * u + _POLE_Y * v + _POLE_Z * w)) / whole
-    out[at] = -change * (n[0] + _POLE_X) - share * u
-    out[at + 6] = -change * (n[1] + _POLE_Y) - share * v
-    out[at + 12] = -change * (n[2] + _POLE_Z) - share * w
+    change = (a * moved[0] + b * moved[1] + c * moved[2]) / whole + growing * share
+    change -= share * (_POLE_X * moved[0] + _POLE_Y * moved[1] + _POLE_Z * moved[2]) / whole
+    out[at] = growing * a - change * (n[0] + _POLE_X) - share * moved[0]
+    out[at + 6] = growing * b - change * (n[1] + _POLE_Y) - share * moved[1]
+    out[at + 12] = growing * c - change * (n[2] + _POLE_Z) - share * moved[2]
 
 
 def _value(y: Any, p: Any, out: Any) -> None:
-    s, r_x, r_y, r_z = nearest(y, p)
+    level, size, sunk, _, _, _, s, r_x, r_y, r_z = _level(y, p)
     x_, y_, z_ = y[0] + s * (y[3] - y[0]) + r_x, y[1] + s * (y[4] - y[1]) + r_y, y[2] + s * (y[5] - y[2]) + r_z
-    far, u, v, w, _, _, _, _, _, _ = surface(x_, y_, z_, p)
-    square = (r_x * r_x + r_y * r_y + r_z * r_z) / (p[DISC] * p[DISC]) if p[DISC] > 0.0 else 1.0
-    out[0] = far + lowered(y, p, s, square) - p[ROUNDING] - p[RADIUS]
-    out[1], out[2], out[3] = u, v, w
-    back = p[RADIUS] + 0.5 * out[0]
-    out[4], out[5], out[6] = x_ - back * u, y_ - back * v, z_ - back * w
+    _, u, v, w, _, _, _, _, _, _ = surface(x_, y_, z_, p, sunk)
+    out[0] = level - p[ROUNDING] - p[RADIUS]
     _tangent(u, v, w, _FIRST_X, _FIRST_Y, _FIRST_Z, out, 7)
     _tangent(u, v, w, _SECOND_X, _SECOND_Y, _SECOND_Z, out, 10)
+    for i in range(7, 13):
+        out[i] *= size
+    out[1], out[2], out[3] = size * u, size * v, size * w
+    back = p[RADIUS] + 0.5 * out[0]
+    out[4], out[5], out[6] = x_ - back * out[1], y_ - back * out[2], z_ - back * out[3]
 
 
 def _turned(h: Any, x: float, y: float, z: float) -> Any:
@@ -120,21 +200,26 @@ def _moving(y: Any, p: Any, s: float, r: Any, n: Any, h: Any) -> Any:
 
 
 def _slopes(y: Any, p: Any, out: Any) -> None:
-    s, r_x, r_y, r_z = nearest(y, p)
+    level, size, sunk, rate, bend, flat, s, r_x, r_y, r_z = _level(y, p)
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     x_, y_, z_ = y[0] + s * a + r_x, y[1] + s * b + r_y, y[2] + s * c + r_z
-    w = offset(x_, y_, z_, p)
-    far, u, v, w_, xx, xy, xz, yy, yz, zz = surface(x_, y_, z_, p)
-    n, h, r = (u, v, w_), (xx, xy, xz, yy, yz, zz), (r_x, r_y, r_z)
-    square = _dot(r, r) / (p[DISC] * p[DISC]) if p[DISC] > 0.0 else 1.0
-    back = p[RADIUS] + 0.5 * (far + lowered(y, p, s, square) - p[ROUNDING] - p[RADIUS])
+    far, u, v, w, xx, xy, xz, yy, yz, zz = surface(x_, y_, z_, p, sunk)
+    unit, n, h, r = (u, v, w), (u, v, w), (xx, xy, xz, yy, yz, zz), (r_x, r_y, r_z)
+    if flat > 0.0:
+        # What the point minimises goes as |w|^2.
+        u_, v_, w_, xx, xy, yy, zz = offset(x_, y_, z_, p, sunk)
+        n, h = (flat * u_, flat * v_, flat * w_), (flat * xx, flat * xy, 0.0, flat * yy, 0.0, flat * zz)
+    back = p[RADIUS] + 0.5 * (level - p[ROUNDING] - p[RADIUS])
     length = np.sqrt(a * a + b * b + c * c)
     shorter = 1.0 / length if length > 0.0 else 0.0
     axis = (a * shorter, b * shorter, c * shorter)
     along, radial, across, inverse = _moving(y, p, s, r, n, h)
-    # Inside the core the nearest point stays where it is.
-    moves = w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0
     leaning = _dot(axis, n) * shorter
+    # The motion of the normal at one place, by c.
+    sinking, turning, spread = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
+    if rate > 0.0:
+        f, g, k, spread = _sinking(offset(x_, y_, z_, p, sunk), p)
+        sinking, turning = (f, g, k), ((f - spread * u) / far, (g - spread * v) / far, (k - spread * w) / far)
     for j in range(6):
         k, share, sign = (j, 1.0 - s, -1.0) if j < 3 else (j - 3, s, 1.0)
         # By the one component that moves, at constant s, and r turned with the axis.
@@ -142,27 +227,37 @@ def _slopes(y: Any, p: Any, out: Any) -> None:
         dx = share * (k == 0) + tilt * axis[0]
         dy = share * (k == 1) + tilt * axis[1]
         dz = share * (k == 2) + tilt * axis[2]
-        if moves:
-            d = _turned(h, dx, dy, dz)
-            of_along = -_dot(along, d) - (sign * n[k] if along[0] != 0.0 or along[1] != 0.0 or along[2] != 0.0 else 0.0)
-            of_radial = -_dot(radial, d) + sign * leaning * radial[k]
-            of_across = -_dot(across, d) + sign * leaning * across[k]
-            by_radial = inverse[0] * of_radial + inverse[1] * of_across + inverse[2] * of_along
-            by_across = inverse[1] * of_radial + inverse[3] * of_across + inverse[4] * of_along
-            by_along = inverse[2] * of_radial + inverse[4] * of_across + inverse[5] * of_along
-            dx += by_radial * radial[0] + by_across * across[0] + by_along * along[0]
-            dy += by_radial * radial[1] + by_across * across[1] + by_along * along[1]
-            dz += by_radial * radial[2] + by_across * across[2] + by_along * along[2]
-        du, dv, dw = _turned(h, dx, dy, dz)
         # The distance changes as the nearest point does at constant s and r: they minimise it.
         change = share * n[k] - sign * r[k] * leaning
-        out[72 + j] = change
+        shrinks = -rate * size * change
+        d = _turned(h, dx, dy, dz)
+        d = (d[0] + shrinks * turning[0], d[1] + shrinks * turning[1], d[2] + shrinks * turning[2])
+        of_along = -_dot(along, d) - (sign * n[k] if along[0] != 0.0 or along[1] != 0.0 or along[2] != 0.0 else 0.0)
+        of_radial = -_dot(radial, d) + sign * leaning * radial[k]
+        of_across = -_dot(across, d) + sign * leaning * across[k]
+        by_radial = inverse[0] * of_radial + inverse[1] * of_across + inverse[2] * of_along
+        by_across = inverse[1] * of_radial + inverse[3] * of_across + inverse[4] * of_along
+        by_along = inverse[2] * of_radial + inverse[4] * of_across + inverse[5] * of_along
+        dx += by_radial * radial[0] + by_across * across[0] + by_along * along[0]
+        dy += by_radial * radial[1] + by_across * across[1] + by_along * along[1]
+        dz += by_radial * radial[2] + by_across * across[2] + by_along * along[2]
+        du, dv, dw = _turned(h, dx, dy, dz)
+        moved = (du + shrinks * turning[0], dv + shrinks * turning[1], dw + shrinks * turning[2])
+        if flat > 0.0:
+            slope, growing = change, _dot(unit, moved)
+            moved = (moved[0] - growing * u, moved[1] - growing * v, moved[2] - growing * w)
+        else:
+            slope = size * change
+            growing = size * size * ((spread - 1.0) * bend * slope - rate * _dot(sinking, moved))
+            moved = (size * moved[0], size * moved[1], size * moved[2])
+        du, dv, dw = moved[0] + growing * u, moved[1] + growing * v, moved[2] + growing * w
+        out[72 + j] = slope
         out[j], out[6 + j], out[12 + j] = du, dv, dw
-        out[18 + j] = dx - back * du - 0.5 * change * u
-        out[24 + j] = dy - back * dv - 0.5 * change * v
-        out[30 + j] = dz - back * dw - 0.5 * change * w_
-        _tangent_slope(n, du, dv, dw, _FIRST_X, _FIRST_Y, _FIRST_Z, out, 36 + j)
-        _tangent_slope(n, du, dv, dw, _SECOND_X, _SECOND_Y, _SECOND_Z, out, 54 + j)
+        out[18 + j] = dx - back * du - 0.5 * slope * size * u
+        out[24 + j] = dy - back * dv - 0.5 * slope * size * v
+        out[30 + j] = dz - back * dw - 0.5 * slope * size * w
+        _tangent_slope(unit, moved, growing, _FIRST_X, _FIRST_Y, _FIRST_Z, out, 36 + j)
+        _tangent_slope(unit, moved, growing, _SECOND_X, _SECOND_Y, _SECOND_Z, out, 54 + j)
 
 
 #: The gap between a part of a body and a rounded prism; sizes of the latter from `prism_parameters`.

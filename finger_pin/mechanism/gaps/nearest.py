@@ -25,8 +25,8 @@ from finger_pin.mechanism.gaps.prism import offset
 RADIUS, DISC, ALONG = range(3)
 # Radians within which a part lies along a face.
 EPSILON = 1e-5
-# Keeps a segment's point unique where it is inside the core, m.
-_INSIDE = 1e-9
+#: Nearer to the core than this at least |w| is flattened, m.
+INSIDE = 1e-9
 _MOST_STEPS = 60
 # By so much a step along a line lessens the slope of F.
 _ENOUGH = 0.1
@@ -40,7 +40,7 @@ def lowered(y: Any, p: Any, s: float, square: float) -> Any:
     return p[ALONG] * along * ((s - 0.5) * (s - 0.5) - 0.25) + 0.5 * EPSILON * p[DISC] * (square - 1.0)
 
 
-def _on_segment(y: Any, p: Any) -> Any:
+def _on_segment(y: Any, p: Any, sunk: float, blunt: float) -> Any:
     """Return s of the nearest point of a segment: the root of a function that rises with s, or an end."""
     a, b, c = y[3] - y[0], y[4] - y[1], y[5] - y[2]
     pull = 2.0 * EPSILON * np.sqrt(a * a + b * b + c * c)
@@ -48,8 +48,8 @@ def _on_segment(y: Any, p: Any) -> Any:
         return 0.0
     s, low, high, first = 0.0, 0.0, 1.0, 0.0
     for k in range(_MOST_STEPS):
-        u, v, w, xx, xy, yy, zz = offset(y[0] + s * a, y[1] + s * b, y[2] + s * c, p)
-        far = np.sqrt(u * u + v * v + w * w) + _INSIDE
+        u, v, w, xx, xy, yy, zz = offset(y[0] + s * a, y[1] + s * b, y[2] + s * c, p, sunk)
+        far = max(np.sqrt(u * u + v * v + w * w), blunt)
         closing = a * u + b * v + c * w
         rise = closing + pull * far * (s - 0.5)
         if k == 0:
@@ -68,7 +68,7 @@ def _on_segment(y: Any, p: Any) -> Any:
             low = s
         slope = a * a * xx + 2.0 * a * b * xy + b * b * yy + c * c * zz
         slope += pull * (far + (s - 0.5) * closing / far)
-        new = s - rise / max(slope, pull * _INSIDE)
+        new = s - rise / max(slope, pull * INSIDE)
         if abs(new - s) < 1e-15:
             return s
         s = new if low < new < high else 0.5 * (low + high)
@@ -141,13 +141,13 @@ def _place(y: Any, frame: Any, u: float, v: float, s: float) -> Any:
     )
 
 
-def _expanded(y: Any, p: Any, frame: Any, pulls: Any, u: float, v: float, s: float) -> Any:
+def _expanded(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, u: float, v: float, s: float) -> Any:
     """Return F |w| about a point of a part as a quadratic function: its second slopes, then its first ones at 0."""
     f, g, e = frame
     x, y_, z = _place(y, frame, u, v, s)
-    w = offset(x, y_, z, p)
+    w = offset(x, y_, z, p, sunk)
     d = (w[3], w[4], w[5], w[6])
-    far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) + _INSIDE
+    far = max(np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), blunt)
     fd, gd, ed = _through(f, f, d), _through(g, g, d), _through(e, e, d)
     fg, fe, ge = _through(f, g, d), _through(f, e, d), _through(g, e, d)
     return (
@@ -163,7 +163,7 @@ def _expanded(y: Any, p: Any, frame: Any, pulls: Any, u: float, v: float, s: flo
     )
 
 
-def _along(y: Any, p: Any, frame: Any, pulls: Any, start: Any, step: Any) -> Any:
+def _along(y: Any, p: Any, sunk: float, blunt: float, frame: Any, pulls: Any, start: Any, step: Any) -> Any:
     """Return the share of a step of about the least F: of a small slope, which rises, or the whole step."""
     f, g, e = frame
     x, y_, z = (
@@ -175,8 +175,8 @@ def _along(y: Any, p: Any, frame: Any, pulls: Any, start: Any, step: Any) -> Any
     for k in range(_MOST_STEPS):
         u, v, s = start[0] + share * step[0], start[1] + share * step[1], start[2] + share * step[2]
         a, b, c = _place(y, frame, u, v, s)
-        w = offset(a, b, c, p)
-        far = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) + _INSIDE
+        w = offset(a, b, c, p, sunk)
+        far = max(np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), blunt)
         rise = (x * w[0] + y_ * w[1] + z * w[2]) / far
         rise += pulls[1] * (u * step[0] + v * step[1]) + pulls[0] * (s - 0.5) * step[2]
         if k == 0:
@@ -201,10 +201,13 @@ def _along(y: Any, p: Any, frame: Any, pulls: Any, start: Any, step: Any) -> Any
     return share
 
 
-def nearest(y: Any, p: Any) -> Any:
-    """Return s and r of the nearest point of a part whose ends P_0 and P_1 are y, shape (6,)."""
+def nearest(y: Any, p: Any, sunk: float, blunt: float) -> Any:
+    """Return s and r of the point nearest to the shrunk core of a part whose ends P_0 and P_1 are y, shape (6,).
+
+    Up to a distance ``blunt``, m, |w| counts as (|w|^2 / blunt + blunt) / 2, so that the point is unique inside too.
+    """
     if p[DISC] == 0.0:
-        return _on_segment(y, p), 0.0, 0.0, 0.0
+        return _on_segment(y, p, sunk, blunt), 0.0, 0.0, 0.0
     e = (y[3] - y[0], y[4] - y[1], y[5] - y[2])
     length = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
     a, b, c = e[0] / length, e[1] / length, e[2] / length
@@ -217,12 +220,12 @@ def nearest(y: Any, p: Any) -> Any:
     along, pulls = p[ALONG], (2.0 * EPSILON * length, EPSILON * big)
     u, v, s, size = 0.0, 0.0, 0.5 * along, 1.0
     for _ in range(_MOST_STEPS):
-        d_u, d_v, d_s = _minimum(_expanded(y, p, (f, g, e), pulls, u, v, s), along)
+        d_u, d_v, d_s = _minimum(_expanded(y, p, sunk, blunt, (f, g, e), pulls, u, v, s), along)
         d_u, d_v, d_s = d_u - u, d_v - v, d_s - s
         before, size = size, abs(d_u) + abs(d_v) + abs(d_s)
         # Steps that no longer shrink are those of rounding.
         if size < 1e-14 or (size < _ROUNDING and size > 0.5 * before):
             break
-        share = _along(y, p, (f, g, e), pulls, (u, v, s), (d_u, d_v, d_s))
+        share = _along(y, p, sunk, blunt, (f, g, e), pulls, (u, v, s), (d_u, d_v, d_s))
         u, v, s = u + share * d_u, v + share * d_v, s + share * d_s
     return s, u * f[0] + v * g[0], u * f[1] + v * g[1], u * f[2] + v * g[2]

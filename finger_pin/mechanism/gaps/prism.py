@@ -1,8 +1,9 @@
 """One shape for all: a rounded prism, of which half-space, sphere, box, cylinder and capsule are special cases.
 
 Its core is a rectangle, widened by a rim, times an interval of z; a rounding is added all around. The core is convex.
-Everything follows from a point's offset w from the nearest point of the core: the distance |w|, its gradient
-n = w / |w|, and, with the slope D = dw/dx (symmetric, D n = n), its Hessian (D - n n^T) / |w|.
+Everything follows from a point's offset w from the nearest point of the core, or of one that is shrunk on all sides:
+the distance |w|, its gradient n = w / |w|, and, with the slope D = dw/dx (symmetric, D n = n), its Hessian
+(D - n n^T) / |w|.
 """
 
 from __future__ import annotations
@@ -41,49 +42,46 @@ def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float
     return 0.0, 0.0, radius - fillet, fillet - length / 2.0, length / 2.0 - fillet, fillet
 
 
-def offset(x: float, y: float, z: float, p: Any) -> Any:
-    """Return w of a point, and D as xx, xy, yy, zz."""
-    u, v = x - min(max(x, -p[HALF_X]), p[HALF_X]), y - min(max(y, -p[HALF_Y]), p[HALF_Y])
-    w = z - min(max(z, p[LOW]), p[HIGH])
+def deepest(p: Any) -> Any:
+    """Return by how much a core can shrink alike on all sides, m; 0 for one without a thickness or an end."""
+    side = p[RIM] if p[RIM] > 0.0 else min(p[HALF_X], p[HALF_Y])
+    least = min(side, 0.5 * (p[HIGH] - p[LOW]))
+    return least if least < np.inf else 0.0
+
+
+def offset(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
+    """Return w of a point from the core, shrunk by ``sunk`` on all sides, and D as xx, xy, yy, zz."""
+    round_, half_x, half_y, low, high = p[RIM] > 0.0, p[HALF_X], p[HALF_Y], p[LOW] + sunk, p[HIGH] - sunk
+    if not round_:
+        half_x, half_y = half_x - sunk, half_y - sunk
+    u, v = x - min(max(x, -half_x), half_x), y - min(max(y, -half_y), half_y)
+    w = z - min(max(z, low), high)
     # Where the core has no extent, the offset follows the point even if it is zero.
-    along_x, along_y = 1.0 * (u != 0.0 or p[HALF_X] == 0.0), 1.0 * (v != 0.0 or p[HALF_Y] == 0.0)
-    along_z = 1.0 * (w != 0.0 or p[LOW] == p[HIGH])
-    if p[RIM] == 0.0:
+    along_x, along_y = 1.0 * (u != 0.0 or half_x == 0.0), 1.0 * (v != 0.0 or half_y == 0.0)
+    along_z = 1.0 * (w != 0.0 or low == high)
+    if not round_:
         return u, v, w, along_x, 0.0, along_y, along_z
-    radius = np.sqrt(u * u + v * v)
-    if radius <= p[RIM]:
+    rim, radius = p[RIM] - sunk, np.sqrt(u * u + v * v)
+    if radius <= rim:
         return 0.0, 0.0, w, 0.0, 0.0, 0.0, along_z
-    share, u_, v_ = 1.0 - p[RIM] / radius, u / radius, v / radius
+    if radius == 0.0:
+        return u, v, w, along_x, 0.0, along_y, along_z
+    share, u_, v_ = 1.0 - rim / radius, u / radius, v / radius
     across = (1.0 - share) * u_ * v_
     xx, yy = share * along_x + (1.0 - share) * u_ * u_, share * along_y + (1.0 - share) * v_ * v_
     return share * u, share * v, w, xx, across, yy, along_z
 
 
-def _inside(x: float, y: float, z: float, p: Any) -> Any:
-    """Return a core point's signed distance from the core's surface, its gradient, and its Hessian as xx, xy, yy."""
-    top, bottom = z - p[HIGH], p[LOW] - z
-    u, v = x - min(max(x, -p[HALF_X]), p[HALF_X]), y - min(max(y, -p[HALF_Y]), p[HALF_Y])
-    radius = np.sqrt(u * u + v * v)
-    side_x, side_y = abs(x) - p[HALF_X], abs(y) - p[HALF_Y]
-    side = (radius if radius > 0.0 else max(side_x, side_y)) - p[RIM]
-    if side < max(top, bottom):
-        return (top, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0) if top >= bottom else (bottom, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
-    if radius > 0.0:
-        u_, v_ = u / radius, v / radius
-        along_x, along_y = 1.0 * (u != 0.0 or p[HALF_X] == 0.0), 1.0 * (v != 0.0 or p[HALF_Y] == 0.0)
-        return side, u_, v_, 0.0, (along_x - u_ * u_) / radius, -u_ * v_ / radius, (along_y - v_ * v_) / radius
-    if side_x >= side_y:
-        return side, (1.0 if x >= 0.0 else -1.0), 0.0, 0.0, 0.0, 0.0, 0.0
-    return side, 0.0, (1.0 if y >= 0.0 else -1.0), 0.0, 0.0, 0.0, 0.0
+def surface(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
+    """Return a point's distance from the shrunk core, its gradient, and its Hessian as xx, xy, xz, yy, yz, zz.
 
-
-def surface(x: float, y: float, z: float, p: Any) -> Any:
-    """Return a point's distance from the core, its gradient, and its Hessian as xx, xy, xz, yy, yz, zz."""
-    u, v, w, xx, xy, yy, zz = offset(x, y, z, p)
+    Inside the core the gradient is a direction across it.
+    """
+    u, v, w, xx, xy, yy, zz = offset(x, y, z, p, sunk)
     far = np.sqrt(u * u + v * v + w * w)
     if far == 0.0:
-        far, u, v, w, xx, xy, yy = _inside(x, y, z, p)
-        return far, u, v, w, xx, xy, 0.0, yy, 0.0, 0.0
+        flat = p[RIM] > sunk or (p[RIM] == 0.0 and p[HALF_X] > sunk)
+        return (0.0, (0.0 if flat else 1.0), 0.0, (1.0 if flat else 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     u, v, w = u / far, v / far, w / far
     return (
         far,
