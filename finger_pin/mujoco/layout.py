@@ -36,9 +36,9 @@ Model = namedtuple(
     "nv ntendon nactuator ntuple timestep integrator jacobian solver noslip_iterations jnt_type jnt_dofadr jnt_qposadr "
     "jnt_bodyid jnt_actfrclimited jnt_actfrcrange body_parentid body_jntadr body_jntnum geom_bodyid tendon_stiffness "
     "tendon_damping tendon_lengthspring tendon_actfrclimited tendon_actfrcrange actuator_trntype actuator_trnid "
-    "actuator_gear actuator_forcelimited actuator_forcerange actuator_outadr actuator_plugin actuator_actadr eq_type eq_obj1id "
-    "eq_obj2id tuple_adr tuple_size tuple_objtype tuple_objid tuple_objprm names name_actuatoradr name_tupleadr "
-    "plugin_stateadr plugin_attr plugin_attradr ten_J_rownnz ten_J_rowadr ten_J_colind",
+    "actuator_gear actuator_forcelimited actuator_forcerange actuator_outadr actuator_plugin actuator_actadr eq_type "
+    "eq_obj1id eq_obj2id tuple_adr tuple_size tuple_objtype tuple_objid tuple_objprm names name_actuatoradr "
+    "name_tupleadr plugin_stateadr plugin_attr plugin_attradr ten_J_rownnz ten_J_rowadr ten_J_colind",
 )
 #: Fields of mjData.
 Data = namedtuple(

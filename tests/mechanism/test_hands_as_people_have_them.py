@@ -200,9 +200,9 @@ def test_a_load_on_a_cable_pulls_with_its_weight_and_is_no_anchor():
     model = mujoco.MjModel.from_xml_string(f"""<mujoco>{HEAD.format(option="")}<worldbody>
     <body name="boom" pos="0 0 0.2"><joint name="boom" axis="0 -1 0" range="-0.5 1"/>
     {PHALANX.format(length=0.1, mass=0.03)}<site name="end" pos="0.1 0 0"/>
-    </body><body name="load" pos="0.1 0 0.1"><freejoint/><geom size="0.01" mass="0.05"/><site name="ring" pos="0 0 0.01"/>
-    </body></worldbody><tendon><spatial name="line" limited="true" range="0 0.09"><site site="end"/><site site="ring"/>
-    </spatial></tendon><actuator><position name="boom" joint="boom" kp="2" ctrlrange="-0.5 1"/></actuator></mujoco>""")
+    </body><body name="load" pos="0.1 0 0.1"><freejoint/><geom size="0.01" mass="0.05"/>
+    <site name="ring" pos="0 0 0.01"/></body></worldbody><tendon><spatial name="line" limited="true" range="0 0.09">
+    <site site="end"/><site site="ring"/>    </spatial></tendon><actuator><position name="boom" joint="boom" kp="2" ctrlrange="-0.5 1"/></actuator></mujoco>""")
     description = fp.from_mujoco(model)
     description = description.updated(touches_itself=False)
     found = equilibrium(description, {"boom": 0.3})
@@ -248,7 +248,7 @@ def test_limits_of_motors_and_joints_hold_what_they_exert():
 
 
 def test_cords_wound_by_servos_load_pins_and_rub_by_their_turn():
-    """Two antagonists about a joint: only that which the servo winds is taut, with the drive's torque over its radius."""
+    """Two antagonists about a joint: only that which the servo winds is taut, by torque over radius."""
     rest = (
         """<tendon><fixed name="flexor"><joint joint="pip" coef="-0.01"/></fixed>
     <fixed name="extensor"><joint joint="pip" coef="0.008"/></fixed></tendon>"""
