@@ -10,7 +10,9 @@ import xarray as xr
 
 from finger_pin.description.embedded import described
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.canals import BRANCHES, CANALS
 from finger_pin.mechanism.energies import LOST, STORED, SUPPLIED
+from finger_pin.mechanism.tree import STATEFUL, STATELESS
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.recording import is_tracking
 
@@ -101,11 +103,20 @@ def _joints(result: xr.Dataset) -> list[str]:
 
 
 def _actuators(result: xr.Dataset) -> list[list[str]]:
-    if "actuator_force" not in result:
-        return []
-    force = result["actuator_force"]
-    rows = [_range(str(name), np.asarray(force.sel(actuator=name))) for name in result["actuator"].values]
-    return [["Forces of the actuators, N or N m", *table(("", "least", "greatest"), rows)]]
+    found = []
+    for groups, signal, head in (
+        ((STATELESS, STATEFUL), "force", "Forces of the actuators, N or N m"),
+        ((CANALS, BRANCHES), "friction", "Friction of tendons that they and springs pull, N"),
+    ):
+        kinds = [each for each in groups if f"{each}_{signal}" in result]
+        rows = [
+            _range(str(name), np.asarray(result[f"{each}_{signal}"].sel({each: name})))
+            for each in kinds
+            for name in result[each].values
+        ]
+        if rows:
+            found.append([head, *table(("", "least", "greatest"), rows)])
+    return found
 
 
 def _tension(result: xr.Dataset) -> list[str]:

@@ -202,7 +202,8 @@ def test_a_load_on_a_cable_pulls_with_its_weight_and_is_no_anchor():
     {PHALANX.format(length=0.1, mass=0.03)}<site name="end" pos="0.1 0 0"/>
     </body><body name="load" pos="0.1 0 0.1"><freejoint/><geom size="0.01" mass="0.05"/>
     <site name="ring" pos="0 0 0.01"/></body></worldbody><tendon><spatial name="line" limited="true" range="0 0.09">
-    <site site="end"/><site site="ring"/>    </spatial></tendon><actuator><position name="boom" joint="boom" kp="2" ctrlrange="-0.5 1"/></actuator></mujoco>""")
+    <site site="end"/><site site="ring"/></spatial></tendon>
+    <actuator><position name="boom" joint="boom" kp="2" ctrlrange="-0.5 1"/></actuator></mujoco>""")
     description = fp.from_mujoco(model)
     description = description.updated(touches_itself=False)
     found = equilibrium(description, {"boom": 0.3})

@@ -6,6 +6,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from finger_pin.description.routing import Array
+from finger_pin.mechanism.tree import STATEFUL, STATELESS
 from finger_pin.views.plots.lines import names, series, trace
 from finger_pin.views.plots.panels import sheet, stack, title
 from finger_pin.views.plots.style import Width, styled
@@ -25,8 +26,9 @@ def plot_hand_motion(result: xr.Dataset, *, width: Width = None, titles: bool = 
     """
     moved = _panels(names(result, "joint"), result["joint_position"].transpose("time", "joint").values)
     driven = _panels(names(result, "tendon"), result["tendon_tension"].transpose("time", "tendon").values)
-    if "actuator_force" in result:
-        driven += _panels(names(result, "actuator"), result["actuator_force"].transpose("time", "actuator").values)
+    for group in (STATELESS, STATEFUL):
+        if f"{group}_force" in result:
+            driven += _panels(names(result, group), result[f"{group}_force"].transpose("time", group).values)
     columns = ((moved, "position", "(a) joints, rad or m"), (driven, "force", "(b) tendons and actuators, N or N m"))
     sizes = [(5.5, 1.0 + 1.5 * max(len(panels), 1)) for panels, _, _ in columns]
     figure, parts = sheet(sizes, width, titles)
