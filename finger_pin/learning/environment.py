@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import copy
+from typing import TYPE_CHECKING, Any, Self
 
 import gymnasium
 import numpy as np
@@ -107,6 +108,10 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if self.task.privileged:
             info["privileged"] = {name: signals[name][0] for name in self.task.privileged}
         return observations[0], float(reward[0]), bool(done[0]), world.over, info
+
+    def __copy__(self) -> Self:
+        """Return an independent environment: two that share their worlds would step each other."""
+        return copy.deepcopy(self)
 
     def render(self) -> NDArray[Any] | None:
         """Return a picture of the present posture, shape (height, width, 3), of bytes."""

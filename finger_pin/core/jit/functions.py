@@ -63,7 +63,11 @@ class Unit:
     def __init__(self, function: Callable[[int, float], int]) -> None:
         """Compile nothing yet."""
         assert isinstance(function, FunctionType)
-        self._function = function
+        self._function, self.__module__ = function, function.__module__
+
+    def __reduce__(self) -> str:
+        """Return its name: another process has an address of its own."""
+        return self._function.__qualname__
 
     @cached_property
     def address(self) -> int:
