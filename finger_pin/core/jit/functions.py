@@ -95,6 +95,9 @@ class Unit:
 
 # Two threads may ask for the same.
 _lock = threading.RLock()
+if hasattr(os, "register_at_fork"):
+    # No compilation is under way then, and none of numba's own locks is held.
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
 _living: list[Any] = []
 
 
