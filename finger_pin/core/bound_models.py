@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,7 +103,7 @@ class BoundModel:
         self._block = bound(self.model, MODEL)
         # Of tables what changes in place is copied wherever it is handed over.
         self._filled: Tables | None = None
-        self.address = int(self._block.ctypes.data)
+        self.address = self._block.address
 
     def renew(self, tables: Tables, control: Control) -> None:
         """Take the numbers of other tables and another control, which fit, into the arrays that are bound."""
@@ -113,14 +113,6 @@ class BoundModel:
         self._filled = tables
         renew_work(own.work, tables)
         renew_linear(own.linear, tables)
-
-    def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled: a copy's address would be that of this one.
-
-        Raises:
-            TypeError: Always.
-        """
-        raise TypeError("a bound model holds addresses: what owns it is copied, and binds another")
 
 
 class Models:

@@ -6,13 +6,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.core.bound_models import FEW, Models, Room, fill, path_motions, rows_of
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.evaluation.law_code import COMMAND, CURVATURE, FORCE, LENGTH, LOAD, RATE, SIGNALS, SPEED, STATE
 from finger_pin.core.evaluation.signals import MOTIONS, Motions, motion_many
-from finger_pin.core.jit import alike, bound, fits
+from finger_pin.core.jit import Block, alike, bound, fits
 from finger_pin.core.tables import build_tables
 from finger_pin.description.routing import Array
 from finger_pin.laws.contact import CONTACT
@@ -23,7 +22,7 @@ from finger_pin.mechanism.kinematics import Motion
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import RowSignals
 
-_Asked = tuple[Motions, Array, NDArray[np.uint8], int]
+_Asked = tuple[Motions, Array, Block]
 
 
 class CompiledMechanism:
@@ -176,17 +175,17 @@ class CompiledMechanism:
         # A few postures after the other are asked for in loops: what is bound once serves them all.
         kept = count < FEW and base is None
         found = self._motions.get(count) if kept else None
-        motions, tips, block, address = found or self._bound_motions(count, base)
+        motions, tips, block = found or self._bound_motions(count, base)
         if kept:
-            self._motions[count] = motions, tips, block, address
+            self._motions[count] = motions, tips, block
         motions.positions[:], motions.velocities[:] = position, velocity
-        motion_many(address)
+        motion_many(block.address)
         if alone:
             return Motion(tips[0].copy(), motions.kinetic[0].copy(), motions.potential[0].copy())
         return Motion(tips.copy(), motions.kinetic.copy(), motions.potential.copy())
 
     def _bound_motions(self, count: int, base: Array | None) -> _Asked:
-        """Return room for postures, its tips, the block that compiled code finds it by, and its address."""
+        """Return room for postures, its tips, and the block by which compiled code finds it."""
         tables = self.tables
         shape = (count, len(tables.parents))
         filled = np.zeros((count, len(tables.tip_body), 3)), np.zeros(count), np.zeros(count)
@@ -195,7 +194,7 @@ class CompiledMechanism:
         )
         block, tips = bound(motions, MOTIONS), motions.tips
         # Of one tip there is no axis.
-        return motions, tips if tips.shape[1] != 1 else tips[:, 0], block, int(block.ctypes.data)
+        return motions, tips if tips.shape[1] != 1 else tips[:, 0], block
 
 
 class CompiledFinger:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger_pin.core.compiled_finger import CompiledFinger
 from finger_pin.core.evaluation.signals import STATES, evaluate_many
-from finger_pin.core.jit import bound
+from finger_pin.core.jit import Block, bound
 from finger_pin.description.routing import Array
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.kinematics import Motion
@@ -32,7 +33,7 @@ class CompiledFingers:
             fingers: Of the same rows and states.
             accelerated: Whether accelerations are wanted, which take most of the time; they are NaN else.
         """
-        self._fingers, self._first = list(fingers), fingers[0]
+        self._fingers, self._first, self._accelerated = list(fingers), fingers[0], accelerated
         # Says where tips are as long as bodies are the same, whoever is the first: that it binds once.
         self._mover = fingers[0]
         mechanism, count = self._first.mechanism, len(fingers)
@@ -45,9 +46,13 @@ class CompiledFingers:
         self._guided = int(tables.guided.max(initial=-1)) + 1
         self._bases = np.zeros((count, 15 + self._guided))
         # By whether there are forces at the tips, and whether the base moves.
-        self._blocks: dict[tuple[bool, bool], list[tuple[NDArray[np.uint8], int]]] = {}
+        self._blocks: dict[tuple[bool, bool], list[Block]] = {}
         # Whether tendons have other arms than the first one's, and whether tips are elsewhere than the mover's.
         self._differs = np.array([self._differences(each) for each in fingers])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the fingers."""
+        return partial(CompiledFingers, accelerated=self._accelerated), (self._fingers,)
 
     def replace(self, index: int, finger: CompiledFinger) -> None:
         """Put another finger in the place of one, or the same with other numbers."""
@@ -72,13 +77,12 @@ class CompiledFingers:
             at_home = all(map(np.array_equal, *bodies))
         return not alike or any(table.routed for table in rows[0]), not at_home
 
-    def _bound(self, index: int, loaded: bool, moved: bool) -> tuple[NDArray[np.uint8], int]:
-        """Return a block with a finger, its state, and the arrays of its signals, and its address."""
+    def _bound(self, index: int, loaded: bool, moved: bool) -> Block:
+        """Return a block with a finger, its state, and the arrays of its signals."""
         model = self._fingers[index].mechanism.models.model(loaded)
         bases = self._bases if moved else self._bases[:0]
         given = (self._states, self._commands, self._forces, bases, self._attitudes)
-        block = bound(self._room.states(slice(index, index + 1), model.address, *given), STATES)
-        return block, int(block.ctypes.data)
+        return bound(self._room.states(slice(index, index + 1), model.address, *given), STATES)
 
     def evaluate(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -97,8 +101,8 @@ class CompiledFingers:
         kind = loaded, base is not None
         if kind not in self._blocks:
             self._blocks[kind] = [self._bound(index, *kind) for index in range(len(self._fingers))]
-        for _, address in self._blocks[kind]:
-            evaluate_many(address)
+        for block in self._blocks[kind]:
+            evaluate_many(block.address)
         found = mechanism.found(self._room)
         signals = self._first.finger.signals(x, command, fingertip_force, found)
         if not self._differs[:, 0].any():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains
 from finger_pin.core.collision.motion_bounds import Carrying, levers
 from finger_pin.core.evaluation.shape_code import OUT, SLOPES, shape_addresses
-from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
+from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.mechanism.pieces import Leg, Piece, Place
 
 # Most wrenches of a piece; numbers of a wrench on the first body, then on the second: (moment, force) each.
@@ -76,6 +76,10 @@ class Paths(NamedTuple):
     follows: Annotated[Indices, along("leg")]
     weights: Annotated[Matrix, along("leg", "x")]
     bends: Annotated[Indices, along("leg")]
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse: addresses of shapes are those of one process."""
+        refuse_copy(self)
 
 
 class PathWork(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, NoReturn
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger_pin.core.axes import along
 from finger_pin.core.chains import Chains, read_chains, tree_arrays, weighed
 from finger_pin.core.evaluation.law_code import addresses, kink_column
-from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector
+from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.caching import Remembered
 from finger_pin.description.routing import Array
@@ -121,6 +121,10 @@ class Tables(NamedTuple):
     bend: Annotated[Vector, along("bend")]
     curvature_offset: Annotated[Vector, along("row")]
     paths: Paths
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse: addresses of laws are those of one process."""
+        refuse_copy(self)
 
 
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()

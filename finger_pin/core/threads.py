@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from functools import cache
+from functools import cache, cached_property
 from math import ceil, inf
 from pathlib import Path
 from typing import TypeVar
@@ -73,6 +75,15 @@ def pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(usable_cores(), "finger_pin")
 
 
+def _renew() -> None:
+    """Make anew what a forked process lacks: threads, and the locks that those of its parent may have held."""
+    pool.cache_clear()
+    if sys.version_info < (3, 12):
+        # One lock for all objects, held while a property is computed; later versions have none.
+        for each in gc.get_objects():
+            if type(each) is cached_property:
+                vars(each)["lock"] = threading.RLock()
+
+
 if hasattr(os, "register_at_fork"):
-    # A process that is forked has none of them.
-    os.register_at_fork(after_in_child=pool.cache_clear)
+    os.register_at_fork(after_in_child=_renew)

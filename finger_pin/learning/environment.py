@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import copy
+from typing import TYPE_CHECKING, Any, Self
 
 import gymnasium
 import numpy as np
@@ -114,6 +115,10 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def action_names(self) -> tuple[str, ...]:
         """Names of the numbers of an action: tendons and actuators, motors, or joints."""
         return self._worlds.each[0].action.names
+
+    def __copy__(self) -> Self:
+        """Return an independent environment: two that share their worlds would step each other."""
+        return copy.deepcopy(self)
 
     def render(self) -> NDArray[Any] | None:
         """Return a picture of the present posture, shape (height, width, 3), of bytes."""

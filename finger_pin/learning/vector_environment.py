@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import copy
+from typing import Any, Self
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -121,6 +122,10 @@ class VectorEnvironment(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             if worlds.each[i].reason:
                 info = self._add_info(info, {"reason": worlds.each[i].reason}, i)
         return self._seen.copy(), rewards, done, over, info
+
+    def __copy__(self) -> Self:
+        """Return an independent environment: two that share their worlds would step each other."""
+        return copy.deepcopy(self)
 
     def render(self) -> tuple[NDArray[Any], ...] | None:
         """Return a picture of every world, shape (height, width, 3) each, of bytes."""

@@ -202,7 +202,7 @@ def test_a_failure_of_one_finger_names_its_own_state(fingers):
     part.atol[:] = 1.0
     part.atol[2] = 1e-60
     part._bound = part._bound._replace(rtol=0.0)
-    part._block[:] = bound(part._bound, rosenbrock.INTEGRATION)
+    part._block._words[:] = bound(part._bound, rosenbrock.INTEGRATION)._words
     trajectory = integrate_compiled(stepper, TIMES[-1], names_of(fingers.mechanism))
     place = fingers.parts[0].body.model.nv + 2
     assert trajectory.failure.endswith(f"the error is largest in x{place}")

@@ -55,11 +55,11 @@ def outer():
 
 def test_compiled_code_reads_and_changes_the_very_arrays_that_were_bound(outer):
     block = bound(outer, KIND)
-    total = weigh(block.ctypes.data)
+    total = weigh(block.address)
     table = sum((3 * i + 7 * j) * outer.inner.table[i, j] for i in range(2) for j in range(3))
     assert 0.5 * total == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + (1 + 2) * 4
     outer.inner.table[1, 2] += 1.0
-    total = weigh(block.ctypes.data)
+    total = weigh(block.address)
     assert 0.5 * total == 0.5 * 3 + 100.0 + 1e3 * (4 + 2 * 5) + table + 3 + 14 + (1 + 2) * 4
     np.testing.assert_array_equal(outer.vector, [2.0, 2.0])
 

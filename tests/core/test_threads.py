@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import threading
+from functools import cached_property
 
 import pytest
 
@@ -58,3 +59,33 @@ def test_a_forked_process_has_threads_of_its_own(two_cores):
     assert _squares(3) == [0, 1, 4]
     with multiprocessing.get_context("fork").Pool(1) as processes:
         assert processes.apply_async(_squares, (5,)).get(timeout=20.0) == [0, 1, 4, 9, 16]
+
+
+class _Slow:
+    """Computed by a thread that waits for an event."""
+
+    computing, end = threading.Event(), threading.Event()
+
+    @cached_property
+    def number(self):
+        self.computing.set()
+        return 7 if threading.current_thread() is threading.main_thread() else self.end.wait(20.0)
+
+
+def _number():
+    return _Slow().number
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+def test_a_process_forked_while_a_thread_computes_waits_for_no_lock_of_that_thread():
+    """Before Python 3.12 a property that is computed is locked for all objects meanwhile."""
+    other = threading.Thread(target=_number)
+    other.start()
+    assert _Slow.computing.wait(10.0)
+    try:
+        with multiprocessing.get_context("fork").Pool(1) as processes:
+            assert processes.apply_async(_number).get(timeout=10.0) == 7
+    finally:
+        _Slow.end.set()
+        other.join()

@@ -1,7 +1,5 @@
 """Environments: what a policy does and sees, against the simulator and what was asked for."""
 
-import copy
-import pickle
 import time
 from itertools import pairwise
 
@@ -65,16 +63,6 @@ def test_an_action_arrives_after_its_delay():
         sim.step(before, 0.005)
         state = sim.step(pull, 0.015)
     np.testing.assert_allclose(observation[:4], state.position, atol=1e-6)
-
-
-def test_a_copy_goes_on_alike_and_leaves_the_original_alone():
-    environment = Environment(FIG6, reward=nothing, delay=0.005)
-    environment.reset(seed=0)
-    environment.step(PULLS[0])
-    twins = [copy.deepcopy(environment), pickle.loads(pickle.dumps(environment))]
-    moved = [twin.step(PULLS[1])[0] for twin in twins]
-    expected = environment.step(PULLS[1])[0]
-    np.testing.assert_array_equal(moved, [expected] * 2)
 
 
 def test_seeds_alone_decide_what_happens(monkeypatch):

@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import copy
-import gc
-import json
-import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -147,39 +142,6 @@ def test_where_the_integrator_cannot_go_on_it_names_time_and_state(finger: fp.Fi
         simulator.step(TENSION, 1e-3)
     assert caught.value.time == pytest.approx(1e-3)
     assert any(name in caught.value.reason for name in finger.layout.names)
-
-
-@pytest.mark.parametrize("name", ["servo", "press"])
-def test_a_deep_copy_and_a_pickle_go_on_bit_by_bit_alike_and_leave_the_original_alone(name: str) -> None:
-    scenario = fp.load_scenario(name)
-    finger = fp.Finger(scenario.finger, objects=scenario.environment.objects)
-    start = finger.layout.unpack(fp.prepare(scenario).start).position
-    simulator = fp.Simulator(finger, start, rtol=1e-4, atol_scale=1e-4)
-    command = np.full(finger.mechanism.channels, 2.0)
-    for _ in range(3):
-        simulator.step(command, 1e-3)
-    twins = [copy.copy(simulator), copy.deepcopy(simulator), pickle.loads(pickle.dumps(simulator))]
-    begin = simulator.x
-    moved = [twin.step(command + 1.0, 1e-3).position for twin in twins]
-    np.testing.assert_array_equal(simulator.x, begin)
-    expected = simulator.step(command + 1.0, 1e-3).position
-    signals, result = simulator.signals().acceleration, simulator.result().joint_position.values
-    del simulator
-    gc.collect()
-    for twin, position in zip(twins, moved, strict=True):
-        np.testing.assert_array_equal(position, expected)
-        np.testing.assert_array_equal(twin.signals().acceleration, signals)
-        np.testing.assert_array_equal(twin.result().joint_position, result)
-
-
-def test_a_pickle_goes_on_in_another_process(finger: fp.Finger) -> None:
-    simulator = fp.Simulator(finger, START)
-    simulator.step(TENSION, 1e-3)
-    text = "import pickle, sys; s = pickle.load(sys.stdin.buffer); s.step(%r, 1e-3); print(s.x.tolist())"
-    call = [sys.executable, "-c", text % TENSION.tolist()]
-    found = subprocess.run(call, input=pickle.dumps(simulator), capture_output=True, check=True).stdout
-    simulator.step(TENSION, 1e-3)
-    assert json.loads(found) == simulator.x.tolist()
 
 
 def test_what_holds_addresses_refuses_to_be_copied_alone(finger: fp.Finger) -> None:

@@ -20,9 +20,23 @@ from finger_pin.core.jit.calls import (
 )
 from finger_pin.core.jit.functions import Unit, address_of, cache_place, compiled, compiled_loosely, compiled_within
 from finger_pin.core.jit.kinds import IndexTable, Indices, Kind, Layers, Matrix, Vector
-from finger_pin.core.jit.tables import alike, bound, bound_at, call, copied, fits, indices, numbered, refill, taken
+from finger_pin.core.jit.tables import (
+    Block,
+    alike,
+    bound,
+    bound_at,
+    call,
+    copied,
+    fits,
+    indices,
+    numbered,
+    refill,
+    refuse_copy,
+    taken,
+)
 
 __all__ = [
+    "Block",
     "IndexTable",
     "Indices",
     "Kind",
@@ -55,5 +69,6 @@ __all__ = [
     "put",
     "put_at",
     "refill",
+    "refuse_copy",
     "taken",
 ]

@@ -63,7 +63,11 @@ class Unit:
     def __init__(self, function: Callable[[int, float], int]) -> None:
         """Compile nothing yet."""
         assert isinstance(function, FunctionType)
-        self._function = function
+        self._function, self.__module__ = function, function.__module__
+
+    def __reduce__(self) -> str:
+        """Return its name: another process has an address of its own."""
+        return self._function.__qualname__
 
     @cached_property
     def address(self) -> int:
@@ -91,6 +95,9 @@ class Unit:
 
 # Two threads may ask for the same.
 _lock = threading.RLock()
+if hasattr(os, "register_at_fork"):
+    # No compilation is under way then, and none of numba's own locks is held.
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
 _living: list[Any] = []
 
 

@@ -1,19 +1,18 @@
 """Arguments handed to compiled code once: unpacking some eighty arrays costs as much as a small step does.
 
-`bound` writes a table of arrays into one block of machine words, from which `bound_at` reads at no cost at every later
-call. To compiled code a table is a pointer, whose attributes are its fields: passing a pointer instead of some hundred
-numbers is what compiling quickly depends on.
+`bound` writes a table of arrays into one `Block` of machine words, from which `bound_at` reads at no cost at every
+later call. To compiled code a table is a pointer, whose attributes are its fields: passing a pointer instead of some
+hundred numbers is what compiling quickly depends on.
 """
 
 from __future__ import annotations
 
 import ctypes
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from finger_pin.core.jit.functions import Unit
 from finger_pin.core.jit.kinds import Kind, Numbers
@@ -24,21 +23,50 @@ _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
 _generated: Any = intrinsic
 
 
-def bound(table: Any, kind: Kind) -> NDArray[np.uint8]:
-    """Return a block that holds a table for `bound_at`; its arrays must be kept alive as long as the block.
+def refuse_copy(holder: Any) -> NoReturn:
+    """Refuse to copy or pickle an object that holds addresses, as its method ``__reduce__``.
+
+    A copy would lead compiled code to the memory of the original, which may be gone, or in another process. Owners that
+    can be copied have a ``__reduce__`` that builds another from what they were built from; all others refuse with this.
+
+    Raises:
+        TypeError: Always.
+    """
+    raise TypeError(f"{type(holder).__name__} holds addresses: its owner is copied, and builds another")
+
+
+class Block:
+    """A table for `bound_at`, kept alive with its arrays.
+
+    Attributes:
+        address: Where compiled code finds it.
+    """
+
+    __slots__ = ("_table", "_words", "address")
+
+    def __init__(self, table: Any, words: list[int]) -> None:
+        """Keep a table and its machine words."""
+        self._table, self._words = table, np.array(words, dtype=np.int64)
+        self.address = int(self._words.ctypes.data)
+
+    __reduce__ = refuse_copy
+
+
+def bound(table: Any, kind: Kind) -> Block:
+    """Return a block that holds a table for `bound_at`.
 
     Raises:
         TypeError: If the table is not of the kind that `bound_at` will read: another layout would be misread.
     """
     words: list[int] = []
     _write(table, kind, words)
-    return np.array(words, dtype=np.int64).view(np.uint8)
+    return Block(table, words)
 
 
 def call(unit: Unit, table: Any, kind: Kind) -> int:
     """Call a unit with a table."""
     block = bound(table, kind)
-    return unit(block.ctypes.data)
+    return unit(block.address)
 
 
 def copied(table: _Table) -> _Table:

@@ -107,7 +107,7 @@ class Together:
             np.zeros(3, dtype=np.int64),
         )
         self._block = bound(self._batch, BATCH)
-        self._at, self._patience = int(self._block.ctypes.data), 0.0
+        self._patience = 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the steppers."""
@@ -124,17 +124,17 @@ class Together:
             return [unit(block, ends[0]) if ends[0] != RESTING else 0]
         batch = self._batch
         batch.ends[:] = ends if self._whole else np.asarray(ends)[self._owners]
-        for _ in range(open_batch(self._at, min(usable_cores(), len(self._ready)) - 1)):
+        for _ in range(open_batch(self._block.address, min(usable_cores(), len(self._ready)) - 1)):
             pool().submit(self._help, self._patience)
         # Who is called once has nobody wait for a second time.
         self._patience = _WATCH
-        while not advance_batch(self._at, _PATIENCE):
+        while not advance_batch(self._block.address, _PATIENCE):
             time.sleep(_NAP)
         found = batch.statuses if self._whole else np.maximum.reduceat(batch.statuses, self._first)
         return list(found.tolist())
 
     def _help(self, patience: float) -> None:
-        help_batch(self._at, patience)
+        help_batch(self._block.address, patience)
 
     def read(self, out: Array) -> None:
         """Fill the packed states of all, shape (m, size), contiguous."""

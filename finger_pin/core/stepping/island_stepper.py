@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from finger_pin.core.collision.broad_phase import wake_all
 from finger_pin.core.control import Control
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.evaluation.rigid_body import PRISMATIC
-from finger_pin.core.jit import Unit, bound, copied
+from finger_pin.core.jit import Block, Unit, bound, copied
 from finger_pin.core.stepping import rosenbrock as core
 from finger_pin.core.stepping.adaptive import advance
 from finger_pin.core.stepping.drives import DRIVEN, Driven, Drives, advance_driven
@@ -137,8 +136,7 @@ class Part:
         # What compiled code was given last: a record, loops and knots; and the blocks that hold them, what they are
         # for last.
         self._placed: tuple[Record | None, Drives | None, Array] = (None, None, self.knots)
-        self._blocks: list[NDArray[np.uint8]] = []
-        self._at = 0
+        self._blocks: list[Block] = []
         self._advance = advance
 
     def room(self, count: int) -> Record:
@@ -170,7 +168,7 @@ class Part:
         own = self._nothing if record is None else record
         self._taken[:] = rows.indices(len(own.times))[:2]
         self._place(own)
-        return self._at, self._advance
+        return self._blocks[-1].address, self._advance
 
     def _place(self, record: Record) -> None:
         """Hand a record to compiled code, with the loops of motors and the knots, if any."""
@@ -178,18 +176,17 @@ class Part:
         if before is record and drives is self.drives and knots is self.knots:
             return
         room = (record.times, record.states, record.attitudes, record.dense)
-        stretch = bound(core.Stretch(self._block.ctypes.data, *room, self._taken), core.STRETCH)
+        stretch = bound(core.Stretch(self._block.address, *room, self._taken), core.STRETCH)
         self._placed, self._blocks, self._advance = (record, self.drives, self.knots), [stretch], advance
         if self.drives is not None:
-            driven = Driven(self.drives, stretch.ctypes.data, self._advance.address)
+            driven = Driven(self.drives, stretch.address, self._advance.address)
             self._blocks.append(bound(driven, DRIVEN))
             self._advance = advance_driven
         if len(self.knots):
-            passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].ctypes.data
-            knotted = Knotted(self.knots, passed, stretch.ctypes.data, self._advance.address, given)
-            self._blocks += [passed.view(np.uint8), bound(knotted, KNOTTED)]
+            passed, given = np.zeros(1, dtype=np.int64), self._blocks[-1].address
+            knotted = Knotted(self.knots, passed, stretch.address, self._advance.address, given)
+            self._blocks.append(bound(knotted, KNOTTED))
             self._advance = advance_knotted
-        self._at = int(self._blocks[-1].ctypes.data)
 
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
         """Go on from another state, at the same time or another one, s, with no memory of earlier steps."""
@@ -227,10 +224,6 @@ class Part:
             bound.memory,
             self.judged,
         )
-
-    def __reduce__(self) -> NoReturn:
-        """Refuse with a TypeError to be copied or pickled by its attributes, many of which are addresses."""
-        raise TypeError("an island under way holds addresses: its stepper is copied, and binds another")
 
     @property
     def moment(self) -> tuple[Array, ...]:

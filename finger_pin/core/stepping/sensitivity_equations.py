@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from finger_pin.core.evaluation.law_code import SPEED
-from finger_pin.core.jit import alike, bound, call
+from finger_pin.core.jit import Block, alike, bound, call
 from finger_pin.core.model import MODEL
 from finger_pin.core.stepping.collocation import (
     COLLOCATION,
@@ -29,7 +28,6 @@ from finger_pin.core.stepping.radau import BACK, LANES, MATRIX, NODES, SLOPE, SW
 from finger_pin.core.tables import END, FIRST, KINK, Tables
 from finger_pin.description.routing import Array
 
-Block: TypeAlias = NDArray[np.uint8]
 # A step that ends at a knot ends so much before it, of the time.
 _BEFORE = 1.0 - 2.0**-53
 # Weights of the values at the begin and the nodes of an interval in powers of the share: the polynomial through them.
@@ -287,4 +285,4 @@ def _changed(own: Part, other: Part) -> tuple[int, Block | None]:
     if np.array_equal(own.tables.parameters, other.tables.parameters):
         return 0, None
     block = bound(own.model.model._replace(tables=laws), MODEL)
-    return block.ctypes.data, block
+    return block.address, block
