@@ -55,8 +55,9 @@ def add_friction(spec: Any, tendons: Keys | None = None, joints: Keys | None = N
     register()
     if not isinstance(spec, mujoco.MjSpec):
         raise InputError("spec", "must be a mujoco.MjSpec", type(spec).__name__)
-    if any(each.name == NAME for each in spec.actuators):
-        raise InputError("spec", "has friction already: add all of it in one call")
+    # The class of the actuator stays where that is deleted, as do a tuple, losses and longer keyframes.
+    if spec.find_default(NAME) is not None:
+        raise InputError("spec", "has friction already, or what is left of it: add all of it in one call to a new spec")
     if int(spec.option.integrator) == int(getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", -1)):
         raise InputError("spec.option.integrator", "friction needs Euler, RK4, implicit or implicitfast", "discrete")
     if spec.option.noslip_iterations:

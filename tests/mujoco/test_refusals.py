@@ -57,6 +57,19 @@ def test_what_cannot_be_is_refused_and_what_is_less_is_warned_of():
         fp.mujoco.add_friction(rope(noslip_iterations=3), tendons={"rope": {}})
 
 
+def test_friction_whose_actuator_is_deleted_leaves_a_model_that_moves_and_takes_no_other_friction():
+    """MuJoCo deletes the plugin with its actuator: a plugin that is still listed would be deleted twice."""
+    spec = rope()
+    actuators = len(spec.actuators)
+    fp.mujoco.add_friction(spec, tendons={"rope": {}})
+    spec.delete(spec.actuators[-1])
+    assert len(spec.actuators) == actuators and not list(spec.plugins)
+    model = spec.compile()
+    mujoco.mj_step(model, mujoco.MjData(model))
+    with pytest.raises(fp.InputError, match=r"^spec: has friction already, or what is left of it[^\n]*$"):
+        fp.mujoco.add_friction(spec, tendons={"rope": {}})
+
+
 def test_a_mujoco_that_does_not_take_actuators_without_a_control_is_told_by_its_version_in_one_line(monkeypatch):
     monkeypatch.setattr(specification, "NO_INPUT", 1)
     with pytest.raises(fp.InputError) as caught:
