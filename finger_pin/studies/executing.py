@@ -7,15 +7,20 @@ a metric may be defined in a script or a notebook.
 
 from __future__ import annotations
 
+import os
 import pickle
 import queue
+import tempfile
 import threading
+import uuid
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
+from numbers import Integral
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import cloudpickle
@@ -59,11 +64,14 @@ class Crew:
         Raises:
             InputError: If it is none, or there are no threads.
         """
-        if workers is not None and (executor is not None or workers < 1):
-            raise InputError("workers", "must be at least 1" if executor is None else "are the executor's own", workers)
+        if workers is not None and executor is not None:
+            raise InputError("workers", "are the executor's own", workers)
+        if workers is not None and (not isinstance(workers, Integral) or isinstance(workers, bool) or workers < 1):
+            raise InputError("workers", "must be a whole number of at least 1", workers)
+        if isinstance(executor, type):
+            raise _no_executor(f"the class {executor.__name__} itself")
         if executor is not None and not callable(getattr(executor, "submit", None)):
-            allowed = "must be a concurrent.futures.Executor, such as ThreadPoolExecutor(4)"
-            raise InputError("executor", allowed, type(executor).__name__)
+            raise _no_executor(type(executor).__name__)
         self._given, self._count = executor, workers or usable_cores()
         self._threads = executor is None or isinstance(executor, ThreadPoolExecutor)
 
@@ -97,12 +105,18 @@ class Crew:
             function: Takes an item, and what it may ask whether to stop.
             items: Its arguments.
             stop: Asked now and then; when it returns true, what has not been begun is left.
+
+        Raises:
+            InputError: If what the executor returns is no future.
         """
         answers: queue.SimpleQueue[tuple[int, Future[Any]]] = queue.SimpleQueue()
-        ended, futures = threading.Event(), []
+        ended, futures = threading.Event(), list[Future[Any]]()
+        mark = Path(tempfile.gettempdir()) / f"finger_pin-{uuid.uuid4().hex}"
         try:
             for index, item in enumerate(items):
-                future = self._submit(function, item, ended)
+                if stop():
+                    return
+                future = self._submit(function, item, ended, mark)
                 futures.append(future)
                 future.add_done_callback(partial(_answer, answers, index))
             for _ in items:
@@ -120,28 +134,59 @@ class Crew:
                     return
                 yield found[0], result
         finally:
-            # Threads end their runs where these are; what another executor has begun it ends.
             ended.set()
-            for future in futures:
-                future.cancel()
+            left = [future for future in futures if not future.cancel() and not future.done()]
+            if left and not self._threads:
+                _tell(mark, left)
 
     def _submit(
-        self, function: Callable[[_Item, Stop], _Result], item: _Item, ended: threading.Event
+        self, function: Callable[[_Item, Stop], _Result], item: _Item, ended: threading.Event, mark: Path
     ) -> Future[_Result]:
+        if self._threads:
+            work: tuple[Any, ...] = (function, item, ended.is_set)
+        else:
+            work = (_call, cloudpickle.dumps((function, item)), str(mark))
         try:
-            if self._threads:
-                return self._executor.submit(function, item, ended.is_set)
-            return self._executor.submit(_call, cloudpickle.dumps((function, item)))
-        except BrokenExecutor as error:
-            broken: Future[_Result] = Future()
-            broken.set_exception(error)
-            return broken
+            future = self._executor.submit(*work)
+        except Exception as error:
+            # It is shut down, or broken.
+            future = Future()
+            future.set_exception(error if isinstance(error, BrokenExecutor) else BrokenExecutor(str(error)))
+        if not callable(getattr(future, "add_done_callback", None)):
+            raise _no_executor(f"{type(self._executor).__name__}, whose submit returns {type(future).__name__}")
+        return future
 
 
-def _call(work: bytes) -> Any:
+def _no_executor(given: str) -> InputError:
+    return InputError("executor", "must be a concurrent.futures.Executor, such as ThreadPoolExecutor(4)", given)
+
+
+def _call(work: bytes, mark: str) -> Any:
+    stop = partial(os.path.exists, mark)
+    # Executors fetch work in advance, which they cannot take back.
+    if stop():
+        raise CancelledError
     function, item = pickle.loads(work)
     with quiet():
-        return function(item, lambda: False)
+        return function(item, stop)
+
+
+def _tell(mark: Path, running: Sequence[Future[Any]]) -> None:
+    """Put a mark where other processes of this machine look for it, until they have ended their runs."""
+    left, lock = len(running), threading.Lock()
+
+    def remove(_: Future[Any]) -> None:
+        nonlocal left
+        with lock:
+            left -= 1
+            if not left:
+                mark.unlink(missing_ok=True)
+
+    # Processes on other machines, and those without such a folder, go on to the end of their runs.
+    with suppress(OSError):
+        mark.touch()
+        for future in running:
+            future.add_done_callback(remove)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 
@@ -64,7 +64,7 @@ def simulate_many(
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.
         StudyError: If every run failed.
-        Interrupted: After Ctrl-C, a KeyboardInterrupt; in its ``result`` the runs that were finished are whole.
+        Interrupted: After Ctrl-C, a KeyboardInterrupt; its ``result`` has the runs that were finished, ``run`` which.
 
     Warns:
         SelfLockingWarning: Once, if runs come close to self-locking; ``self_locking_margin`` says which.
@@ -91,11 +91,10 @@ def simulate_many(
             texts[index] = to_toml(runs[index])
             if progress is not None:
                 progress(len(found), len(runs))
-    reached = f"after {len(found)} of {len(runs)} runs"
-    unfinished = Lost("not finished: interrupted", Interrupted(math.nan, None, reached))
-    stacked = _stack(runs, [found.get(index, unfinished) for index in range(len(runs))], texts)
+    # To fill gigabytes for runs that there are not would take longer than a user waits.
+    stacked = _stack(runs, dict(sorted(found.items())), texts)
     if interrupted.pressed:
-        raise Interrupted(math.nan, stacked, reached)
+        raise Interrupted(math.nan, stacked, f"after {len(found)} of {len(runs)} runs")
     if (stacked["failure"] != "").all():
         raise StudyError(str(stacked["failure"].values[0]), stacked)
     margins = stacked["self_locking_margin"].values
@@ -169,7 +168,8 @@ def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | 
     refuse_unknown("variables", keep, known)
 
 
-def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost], texts: Sequence[str]) -> xr.Dataset:
+def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | Lost], texts: Sequence[str]) -> xr.Dataset:
+    order, results = list(done), list(done.values())
     found = {row: result for row, result in enumerate(results) if isinstance(result, xr.Dataset)}
     longest = max(found.values(), key=lambda result: result.sizes["time"], default=xr.Dataset(coords={"time": []}))
     times = runs[0].sample_times()
@@ -180,9 +180,9 @@ def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost], texts
         first = next(iter(having.values()))
         dims = tuple(map(str, first.dims))
         sizes = [len(labels[dim]) if dim in labels else first.sizes[dim] for dim in dims[1:]]
-        missing = [row for row in found if row not in having]
-        values = np.empty((len(runs), len(times), *sizes))
-        values[[row for row in range(len(runs)) if row not in having]] = np.nan
+        missing = [order[row] for row in found if row not in having]
+        values = np.empty((len(results), len(times), *sizes))
+        values[[row for row in range(len(results)) if row not in having]] = np.nan
         for row, variable in having.items():
             own, count = {dim: variable[dim].values.tolist() for dim in dims[1:] if dim in labels}, len(variable)
             if all(labels[dim] == given for dim, given in own.items()):
@@ -202,13 +202,13 @@ def _stack(runs: Sequence[Scenario], results: Sequence[xr.Dataset | Lost], texts
         numbers = [result.attrs.get(name, np.nan) if isinstance(result, xr.Dataset) else np.nan for result in results]
         stacked[name] = (("run",), np.array(numbers), {"long_name": name})
     failures = [result.reason if isinstance(result, Lost) else result.attrs["failure"] for result in results]
-    stacked["failure"] = (("run",), np.array(failures), {"long_name": "failure"})
-    described = [text or to_toml(run) for text, run in zip(texts, runs, strict=True)]
-    stacked["scenario"] = (("run",), np.array(described), {"long_name": "resolved scenario, TOML"})
+    stacked["failure"] = (("run",), np.array(failures, dtype=str), {"long_name": "failure"})
+    described = np.array([texts[index] for index in order], dtype=str)
+    stacked["scenario"] = (("run",), described, {"long_name": "resolved scenario, TOML"})
     shared = {key: value for key, value in longest.attrs.items() if key.startswith("version_")}
     return xr.Dataset(
         stacked,
-        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.arange(len(runs)), **labels},
+        coords={"time": ("time", times, dict(longest.time.attrs)), "run": np.array(order, dtype=int), **labels},
         attrs=shared,
     )
 

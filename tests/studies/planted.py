@@ -66,3 +66,13 @@ def tripled(number, stop):
 
 def raises(number, stop):
     raise ArithmeticError(f"planted\n{number}")
+
+
+def waits_to_be_stopped(number, stop, folder):
+    """Wait for a stop, at most half a minute, between two marks."""
+    Path(folder, f"begun{number}").touch()
+    for _ in range(3000):
+        if stop():
+            Path(folder, f"stopped{number}").touch()
+            return
+        time.sleep(0.01)

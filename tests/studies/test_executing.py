@@ -1,5 +1,6 @@
 """Executors: what is given to them comes back once, whatever they are; stops, and scripts without a guard."""
 
+import multiprocessing
 import os
 import pickle
 import signal
@@ -8,6 +9,7 @@ import sys
 import threading
 import time
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import planted
@@ -73,19 +75,18 @@ def test_a_stop_ends_what_runs_in_threads_and_leaves_the_rest():
 GAINS, SHORT = (0.5, 1.0, 2.0), {"simulation.duration": 0.02}
 STUDIES = {
     "many": lambda **options: fp.simulate_many(
-        [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in GAINS], workers=1, **options
+        [fp.load_scenario("fig6", {**SHORT, "controller.gain": gain}) for gain in GAINS], **{"workers": 1} | options
     ),
     "sweep": lambda **options: fp.sweep(
-        "fig6", {"controller.gain": GAINS}, overrides=SHORT, executor=Serial(), **options
+        "fig6", {"controller.gain": GAINS}, overrides=SHORT, **{"executor": Serial()} | options
     ),
     "optimise": lambda **options: fp.optimise(
         "fig6",
         ["controller.gain=0.5:4"],
         overrides=SHORT,
         constraints=[],
-        executor=Serial(),
         effort=fp.studies.Effort(population=4),
-        **options,
+        **{"executor": Serial()} | options,
     ),
 }
 
@@ -100,10 +101,12 @@ def test_ctrl_c_in_python_keeps_the_runs_that_are_finished(study):
         STUDIES[study](progress=press)
     result = caught.value.result
     if study == "many":
-        assert result.failure.values.tolist() == ["", *["not finished: interrupted"] * 2]
+        assert (result.run.values.tolist(), result.failure.values.tolist()) == ([0], [""])
+        assert result.scenario.values.tolist() == [
+            fp.to_toml(fp.load_scenario("fig6", {**SHORT, "controller.gain": 0.5}))
+        ]
         alone = fp.simulate(fp.load_scenario("fig6", {**SHORT, "controller.gain": GAINS[0]})).joint_position
         assert (result.joint_position[0].values == alone.values).all()
-        assert np.isnan(result.joint_position[1:]).all()
     else:
         assert result.status.values[0] == "done" and set(result.status.values[1:]) <= {"missing"}
         assert np.isfinite(result.tracking_rms.values[0])
@@ -125,11 +128,46 @@ def test_what_is_raised_comes_out_of_another_process_with_all_that_it_says(error
     assert type(again) is type(error) and str(again) == str(error) and vars(again) == vars(error)
 
 
-@pytest.mark.parametrize(("options", "entry"), [({"executor": 3}, "executor"), ({"workers": 0}, "workers")])
-def test_what_is_no_executor_is_refused(options, entry):
-    with pytest.raises(fp.InputError) as caught:
-        fp.simulate_many(["fig6"], **options)
-    assert caught.value.entry == entry
+class Forgetful:
+    """It takes work and returns no future."""
+
+    def submit(self, function, *arguments):
+        pass
+
+
+@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("given", [3, "threads", ThreadPoolExecutor, Forgetful(), multiprocessing.get_context("fork")])
+def test_what_is_no_executor_is_refused_in_one_line(study, given):
+    asked = {"many": {"workers": None, "executor": given}}.get(study, {"executor": given})
+    with pytest.raises(fp.InputError, match=r"^executor[^\n]*must be a concurrent.futures.Executor[^\n]*$"):
+        STUDIES[study](**asked)
+
+
+@pytest.mark.parametrize("workers", [0, 2.5, "2", True])
+def test_a_number_of_threads_is_a_whole_number(workers):
+    with pytest.raises(fp.InputError, match=r"^workers[^\n]*$"):
+        fp.simulate_many(["fig6"], workers=workers)
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_an_executor_that_has_been_shut_down_is_named_in_one_line(study):
+    over = ThreadPoolExecutor(1)
+    over.shutdown()
+    asked = {"many": {"workers": None, "executor": over}}.get(study, {"executor": over})
+    with pytest.raises(fp.exceptions.FingerPinError, match=r"^[^\n]*cannot schedule new futures after shutdown[^\n]*$"):
+        STUDIES[study](**asked)
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, method):
+    def marked(kind):
+        return {each.name.removeprefix(kind) for each in tmp_path.glob(f"{kind}*")}
+
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(method)) as executor, Crew(executor) as crew:
+        work = partial(planted.waits_to_be_stopped, folder=tmp_path)
+        assert list(crew.do(work, range(40), lambda: bool(marked("begun")))) == []
+    # The executor had fetched three more than the two that ran.
+    assert 1 <= len(marked("begun")) <= 2 and marked("stopped") == marked("begun")
 
 
 SWEEP = """
