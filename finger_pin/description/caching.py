@@ -1,46 +1,179 @@
-"""A cache of values made of descriptions, which are frozen: the same object makes the same value."""
+"""A cache of values made of descriptions, which are frozen: the same object makes the same value.
+
+All that is remembered has one bound in bytes; what was made first is forgotten first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+import gc
+import os
+import sys
+from collections.abc import Callable, Hashable, Sequence
 from threading import Lock
-from typing import Generic, TypeVar
+from types import BuiltinFunctionType, FunctionType, ModuleType
+from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
 from pydantic import BaseModel
 
 _Made = TypeVar("_Made")
+_Key = tuple[Hashable, ...]
 _MOST = 128
+#: Bytes of all that is remembered.
+LIMIT = 64 * 2**20
+
+# One entry of so many is measured, which takes a tenth of a run's time: the next ones count as much.
+_EVERY = 8
+# Numbers and their like, and the bytes that each takes.
+_LEAVES, _LEAF = frozenset({float, int, bool, complex, type(None), np.dtype}), 32
+
+_PLAIN, _DESCRIPTION, _VIEW, _SHARED = range(4)
 
 
-class _Described(dict[type, bool]):
-    """Whether objects of a type are descriptions; to ask an object itself takes longer."""
+class _Kinds(dict[type, int]):
+    """The kind of objects of a type: a description, an array, what is there anyway; to ask an object takes longer."""
 
-    def __missing__(self, kind: type) -> bool:
-        self[kind] = issubclass(kind, BaseModel)
+    def __missing__(self, kind: type) -> int:
+        shared: Any = type, ModuleType, FunctionType, BuiltinFunctionType
+        kinds: dict[int, Any] = {_DESCRIPTION: BaseModel, _VIEW: np.ndarray, _SHARED: shared}
+        self[kind] = next((number for number, bases in kinds.items() if issubclass(kind, bases)), _PLAIN)
         return self[kind]
 
 
-_DESCRIBED = _Described()
+_KINDS = _Kinds()
+
+
+class _Held(NamedTuple):
+    """A description or a thing made, which counts once, whoever holds it: how many do, its bytes, what it holds."""
+
+    thing: object
+    holders: int
+    size: int
+    holds: list[object]
+
+
+class _Account:
+    """The bytes of all that is remembered, in the order in which it was made.
+
+    Attributes:
+        lock: Held while entries change.
+        total: Bytes, as estimated; of what libraries hold, which Python does not see, there are none among them.
+    """
+
+    def __init__(self) -> None:
+        self.lock, self.total = Lock(), 0
+        self._entries: dict[tuple[Remembered[Any], _Key], tuple[int, list[object]]] = {}
+        self._held: dict[int, _Held] = {}
+
+    def add(self, owner: Remembered[Any], key: _Key, parts: tuple[object, ...], made: object) -> None:
+        """Count an entry, and forget the oldest ones until all fit, or it is the only one."""
+        before, holds, size = self.total, list[object](), owner.latest
+        if owner.asked % _EVERY == 0:
+            size, holds = self._extent([parts])
+            holds += [] if type(made) in _LEAVES else [made]
+        self._entries[owner, key] = size, holds
+        self.total += size
+        for each in holds:
+            self._hold(each)
+        owner.asked, owner.latest = owner.asked + 1, self.total - before
+        while self.total > LIMIT and len(self._entries) > 1:
+            oldest, first = next(iter(self._entries))
+            oldest.forget(first)
+
+    def drop(self, owner: Remembered[Any], key: _Key) -> None:
+        """Count an entry no more."""
+        size, holds = self._entries.pop((owner, key))
+        self.total -= size
+        for each in holds:
+            self._release(each)
+
+    def _hold(self, thing: object) -> None:
+        held = self._held.get(id(thing))
+        if held is None:
+            held = _Held(thing, 0, *self._extent([thing], first=True))
+            self.total += held.size
+            self._held[id(thing)] = held._replace(holders=1)
+            for each in held.holds:
+                self._hold(each)
+        else:
+            self._held[id(thing)] = held._replace(holders=held.holders + 1)
+
+    def _release(self, thing: object) -> None:
+        held = self._held.pop(id(thing))
+        if held.holders > 1:
+            self._held[id(thing)] = held._replace(holders=held.holders - 1)
+            return
+        self.total -= held.size
+        for each in held.holds:
+            self._release(each)
+
+    def _extent(self, things: Sequence[Any], first: bool = False) -> tuple[int, list[object]]:
+        """Return the bytes that can be reached from things, and what is met that is held by itself.
+
+        Args:
+            things: The things.
+            first: Whether these are looked into, whatever they are.
+        """
+        seen, apart, size, left = set[int](), list[object](), 0, things
+        while left:
+            # Layer by layer, as most of it is then done without Python.
+            many = [thing for thing in left if type(thing) not in _LEAVES]
+            size += _LEAF * (len(left) - len(many))
+            fresh = {at: thing for thing in many if (at := id(thing)) not in seen}
+            seen |= fresh.keys()
+            looked, views = list[Any](), list[Any]()
+            for at, thing in fresh.items():
+                kind = _KINDS[type(thing)]
+                if not first and (kind == _DESCRIPTION or at in self._held):
+                    apart.append(thing)
+                elif kind != _SHARED:
+                    looked.append(thing)
+                    views += [thing.base] if kind == _VIEW else []
+            size += sum(map(sys.getsizeof, looked))
+            left, first = gc.get_referents(*looked) + views, False
+        return size, apart
+
+
+_ACCOUNT = _Account()
+if hasattr(os, "register_at_fork"):
+    # A thread that holds the lock is not in the process that is forked, where nobody would release it.
+    os.register_at_fork(
+        before=_ACCOUNT.lock.acquire, after_in_parent=_ACCOUNT.lock.release, after_in_child=_ACCOUNT.lock.release
+    )
 
 
 class Remembered(Generic[_Made]):
-    """The latest things made, by the parts they were made of: descriptions as objects, all else by value."""
+    """The latest things made, by the parts they were made of: descriptions as objects, all else by value.
+
+    Attributes:
+        asked: How many were made.
+        latest: Bytes of the latest one.
+    """
+
+    asked, latest = 0, 0
 
     def __init__(self, most: int = _MOST) -> None:
         """Remember nothing yet, and never more than so many."""
         self._most = most
-        self._known: dict[tuple[Hashable, ...], tuple[tuple[object, ...], _Made]] = {}
-        self._lock = Lock()
+        self._known: dict[_Key, tuple[tuple[object, ...], _Made]] = {}
 
     def of(self, parts: tuple[object, ...], make: Callable[[], _Made]) -> _Made:
         """Return the thing made of parts; anew only if it was not made of the same before, or long ago."""
-        key = tuple([id(part) if _DESCRIBED[type(part)] else part for part in parts])
+        key = tuple([id(part) if _KINDS[type(part)] == _DESCRIPTION else part for part in parts])
         found = self._known.get(key)
         if found is None:
             # The parts are kept: of those that have gone, others may have the identity.
             found = parts, make()
-            with self._lock:
+            with _ACCOUNT.lock:
+                if key in self._known:
+                    self.forget(key)
                 self._known[key] = found
+                _ACCOUNT.add(self, key, *found)
                 if len(self._known) > self._most:
-                    del self._known[next(iter(self._known))]
+                    self.forget(next(iter(self._known)))
         return found[1]
+
+    def forget(self, key: _Key) -> None:
+        """Forget an entry; the account's lock is held."""
+        del self._known[key]
+        _ACCOUNT.drop(self, key)
