@@ -12,7 +12,8 @@ from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.pieces import Leg, Piece, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.spans import SPHERE, STRAIGHT
+from finger_pin.mechanism.spans import ANGLE, RISE, SPHERE, STRAIGHT
+from finger_pin.mechanism.spans.span import ELSEWHERE
 
 KINDS = (
     pin.JointModelRX,
@@ -55,17 +56,32 @@ def random_body(rng, free=False):
 
 
 def random_path(rng, joints):
-    """Pieces one after the other, between points of any bodies; most begin where the last one ends."""
+    """Pieces one after the other, between points of any bodies; most begin where the last one ends.
+
+    Some are polynomials of a coordinate, some wraps have their side point on another body, and some turns do not count.
+    """
     legs, last = [], None
+    # Drawn apart, so that the rest of a mechanism is the same without them.
+    more = np.random.default_rng(joints)
+    if more.random() < 0.4:
+        shape, ends = (ANGLE, RISE)[int(more.integers(0, 2))], more.integers(0, joints + 1, 3)
+        points = Place(int(ends[0]), more.normal(size=3)), Place(int(ends[1]), more.normal(size=3))
+        numbers = np.append(more.normal(size=3), np.zeros(len(shape.parameters) - 3))
+        legs.append(Leg(Piece(shape, numbers, points, int(ends[2]), random_placement(more)), arm=more.normal()))
     for _ in range(rng.integers(1, 4)):
         follows = last is not None and rng.random() < 0.7
         first = last if follows else Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
         last = Place(int(rng.integers(0, joints + 1)), rng.normal(size=3))
         shape, numbers = (STRAIGHT, ()) if rng.random() < 0.6 else (SPHERE, (0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
+        side = ()
+        if shape is SPHERE and more.random() < 0.5:
+            numbers = (0.3, 0.0, 0.0, 0.0, ELSEWHERE, 0.0)
+            side = (Place(int(more.integers(0, joints + 1)), 2.0 * more.normal(size=3)),)
         frame = int(rng.integers(0, joints + 1))
-        piece = Piece(shape, np.array(numbers), (first, last), frame, random_placement(rng))
+        piece = Piece(shape, np.array(numbers), (first, last, *side), frame, random_placement(rng))
         measure = None if rng.random() < 0.5 else rng.normal()
-        legs.append(Leg(piece, arm=rng.normal(), measure=measure, follows=follows))
+        bends = bool(more.random() < 0.8)
+        legs.append(Leg(piece, arm=rng.normal(), measure=measure, follows=follows, bends=bends))
     return tuple(legs)
 
 
