@@ -30,7 +30,7 @@ from finger_pin.description.routing import Array, Routing
 from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
 from finger_pin.description.tautness import Tautness
-from finger_pin.description.tree import Keyframe
+from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
 from finger_pin.exceptions import InputError
 

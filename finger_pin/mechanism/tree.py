@@ -13,7 +13,8 @@ from numpy.polynomial import Polynomial
 
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.tree import Coupling, Loop, Tree, TreeActuator
+from finger_pin.description.tree import Tree
+from finger_pin.description.tree_parts import Coupling, Loop, TreeActuator
 from finger_pin.exceptions import InputError
 from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
 from finger_pin.laws.bristle import PIN_FRICTION

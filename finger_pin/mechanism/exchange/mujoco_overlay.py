@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from finger_pin.description.tree import TreeTendon
+from finger_pin.description.tree_parts import TreeTendon
 from finger_pin.description.validation import quantity, real, suggestion, validate
 from finger_pin.exceptions import InputError
 

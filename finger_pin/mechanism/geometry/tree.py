@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
-from finger_pin.description.tree import TreeSolid
+from finger_pin.description.tree_parts import TreeSolid
 from finger_pin.mechanism.geometry.fingers import Pulley, Visual
 from finger_pin.mechanism.geometry.lateral_offsets import Lanes, joint_axes
 from finger_pin.mechanism.geometry.paths import LinkPoses, TendonPath

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from finger_pin.description.tree import MOST_POWER
+from finger_pin.description.tree_parts import MOST_POWER
 from finger_pin.mechanism.spans.span import Span
 
 _PARAMETERS = tuple(f"power_{k}" for k in range(MOST_POWER + 1))

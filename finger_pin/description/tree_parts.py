@@ -1,0 +1,287 @@
+"""Parts of a tree of bodies: bodies, joints, tendons, couplings, loops, actuators, postures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from finger_pin.description.surface import BodyShape
+from finger_pin.description.validation import (
+    MOST_ANGLE,
+    Description,
+    Name,
+    Numbers,
+    choice,
+    problem,
+    quantity,
+    real,
+    reals,
+    vector,
+)
+from finger_pin.description.waypoints import PLACE, Triple, Waypoint, check_path
+
+_MILLIMETRES = " m (is it in millimetres?)"
+_LARGE = 1e9
+#: The highest power of a coupling.
+MOST_POWER = 7
+Pair = tuple[float, float]
+
+
+class TreeSolid(Description):
+    """A solid of a body, for pictures."""
+
+    kind: Annotated[
+        Literal["sphere", "capsule", "cylinder", "box", "mesh"], choice("sphere", "capsule", "cylinder", "box", "mesh")
+    ] = quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder, box or mesh.")
+    mesh: Name | None = Field(None, description="Of a mesh, which one of the tree's.")
+    radius: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of all but a box and a mesh."
+    )
+    length: Annotated[float, real(0.0, 10.0, hint=_MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="Of a cylinder, or of a capsule without its round ends, along z."
+    )
+    sides: Annotated[Triple, vector(3, 0.0, 10.0, _MILLIMETRES)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of a box."
+    )
+    position: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="In the body's frame: quaternion x, y, z, w."
+    )
+
+    @model_validator(mode="after")
+    def _which(self) -> Self:
+        if self.kind == "mesh" and self.mesh is None:
+            raise problem("mesh", 'is missing: kind = "mesh" needs the name of one')
+        return self
+
+
+class Body(Description):
+    """A rigid body, placed on another one or on the base."""
+
+    parent: Name | None = Field(None, description="The body that carries it; the base if left out.")
+    position: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its frame, in the parent's."
+    )
+    orientation: Annotated[tuple[float, float, float, float], vector(4, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 0.0, 1.0), unit="1", source="design", doc="Of its frame in the parent's: quaternion x, y, z, w."
+    )
+    mass: Annotated[float, real(0.0, 1e4)] = quantity(0.0, unit="kg", source="design", doc="Mass.")
+    centre: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="Mass centre.")
+    inertia: Annotated[tuple[float, ...], vector(6, -1e4, 1e4)] = quantity(
+        (0.0,) * 6, unit="kg m2", source="design", doc="About the mass centre, body's axes: xx, yy, zz, xy, xz, yz."
+    )
+    gravity_compensation: Annotated[float, real(-100.0, 100.0)] = quantity(
+        0.0, unit="1", source="design", doc="Part of its weight that something holds up, at its mass centre."
+    )
+    solids: dict[Name, TreeSolid] = Field({}, description="Solids that are drawn of it, by name.")
+    shapes: dict[Name, BodyShape] = Field({}, description="Shapes with which it touches, by name, unique in a tree.")
+
+    @field_validator("orientation")
+    @classmethod
+    def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        norm = sum(each * each for each in value) ** 0.5
+        if abs(norm - 1.0) > 1e-6:
+            raise problem("", "must be a quaternion x, y, z, w of length 1", list(value))
+        return value
+
+
+class TreeJoint(Description):
+    """A joint of a body on its parent; a body with several joints has them one after the other."""
+
+    body: Name = Field(description="The body that moves.")
+    kind: Annotated[Literal["hinge", "slide"], choice("hinge", "slide")] = quantity(
+        "hinge", unit="1", source="design", doc="It turns about its axis, or slides along it."
+    )
+    axis: Annotated[Triple, vector(3, -1.0, 1.0)] = quantity(
+        (0.0, 0.0, 1.0), unit="1", source="design", doc="Unit vector in the body's frame."
+    )
+    anchor: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="A point of the axis, in the body's frame."
+    )
+    reference: Annotated[float, real(-MOST_ANGLE, MOST_ANGLE)] = quantity(
+        0.0, unit="rad", source="design", doc="Position at which the body is where its placement says."
+    )
+    armature: Annotated[float, real(0.0, 1e4)] = quantity(
+        0.0, unit="kg m2", source="design", doc="Inertia that turns with the joint alone, such as a rotor's."
+    )
+    bearing: bool = Field(
+        True, strict=True, description="Whether it is a pin or a guide that rubs; the joints of a free body are none."
+    )
+
+    @field_validator("axis")
+    @classmethod
+    def _unit(cls, value: Triple) -> Triple:
+        if abs(sum(each * each for each in value) ** 0.5 - 1.0) > 1e-6:
+            raise problem("", "must be a unit vector", list(value))
+        return value
+
+
+class TreeTendon(Description):
+    """A tendon: a sum of joint positions, or a path through space, with spring, damper and friction along it."""
+
+    joints: dict[Name, Annotated[float, real(-1e3, 1e3)]] | None = quantity(
+        None, unit="m/rad", source="design", doc="Length gained per joint position."
+    )
+    path: dict[Name, Waypoint] | None = Field(None, description="By name, in order.")
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="Of its spring.")
+    rest: Annotated[Pair, vector(2, -1e3, 1e3)] = quantity(
+        (0.0, 0.0), unit="m", source="design", doc="Lengths between which its spring is relaxed."
+    )
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="Damping.")
+    range: Annotated[Pair, vector(2, -1e3, 1e3)] | None = quantity(
+        None, unit="m", source="design", doc="Least and largest length, guarded as (2) guards a joint."
+    )
+    limit_stiffness: Annotated[float, real(0.0, 1e12)] = quantity(
+        1e5, unit="N/m", source="estimate", doc="Of the stroke limiter of the range."
+    )
+    limit_damping: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.5, unit="s/m", source="estimate", doc="Of the stroke limiter of the range, as c of (2)."
+    )
+    friction: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="N", source="design", doc="Coulomb friction that does not depend on load."
+    )
+    curvature_offset: Annotated[float, real(0.0, 100.0)] = quantity(
+        0.0, unit="rad", source="(15)", doc="Bend of its path that points and wraps do not show, where something pulls."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.joints is None) == (self.path is None):
+            raise problem("", "needs joints or a path, and not both")
+        if self.range is not None and self.range[0] >= self.range[1]:
+            raise problem("range", "the least length must be below the largest", list(self.range))
+        if self.rest[0] > self.rest[1]:
+            raise problem("rest", "the first length must not be above the second", list(self.rest))
+        check_path(self.path or {})
+        return self
+
+
+class Coupling(Description):
+    """A joint that follows another: q = offset + ratio q_other + powers[0] q_other^2 + ..., held by a stiff spring."""
+
+    joint: Name = Field(description="The joint that follows.")
+    other: Name | None = Field(None, description="The joint that it follows; none: it is held.")
+    ratio: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="1", source="design", doc="ratio.")
+    offset: Annotated[float, real(-1e3, 1e3)] = quantity(0.0, unit="rad", source="design", doc="offset.")
+    powers: Annotated[Numbers, reals(-1e6, 1e6)] = quantity(
+        0.0, unit="1", source="design", doc="Coefficients of the square of q_other and of higher powers, at most six."
+    )
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(100.0, unit="N m/rad", source="estimate", doc="k.")
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(0.1, unit="N m s/rad", source="estimate", doc="c.")
+
+    @property
+    def higher(self) -> tuple[float, ...]:
+        """Coefficients of the square and of higher powers."""
+        return self.powers if isinstance(self.powers, tuple) else (self.powers,)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.higher) > MOST_POWER - 1:
+            raise problem("powers", f"must be at most {MOST_POWER - 1} numbers", list(self.higher))
+        if self.other is None and (self.ratio or any(self.higher)):
+            raise problem("other", "is missing: ratio and powers are those of another joint")
+        return self
+
+
+class Loop(Description):
+    """Two points of two bodies that stay together, held by stiff springs: a pin that closes a loop."""
+
+    body: Name = Field(description="The first body.")
+    other: Name | None = Field(None, description="The second; the base if left out.")
+    position: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point in the first body's frame."
+    )
+    other_position: Annotated[Triple, PLACE] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point in the second body's frame."
+    )
+    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(1e4, unit="N/m", source="estimate", doc="k.")
+    damping: Annotated[float, real(0.0, _LARGE)] = quantity(10.0, unit="N s/m", source="estimate", doc="c.")
+
+
+class TreeActuator(Description):
+    """The drive of a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length.
+
+    With ``time_constant`` its input comes late, T a' = u - a, and a takes the place of u; with ``integrates`` its input
+    is a rate, a' = u. With ``integral`` the force grows with the sum of the error e, e' = u - l: by integral e.
+    """
+
+    joint: Name | None = Field(None, description="The joint that it drives.")
+    tendon: Name | None = Field(None, description="The tendon that it drives.")
+    gear: Annotated[float, real(-1e6, 1e6)] = quantity(1.0, unit="1", source="design", doc="gear.")
+    gain: Annotated[float, real(-_LARGE, _LARGE)] = quantity(1.0, unit="N per input", source="design", doc="gain.")
+    offset: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N", source="design", doc="b_0.")
+    by_length: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N/m", source="design", doc="b_1.")
+    by_speed: Annotated[float, real(-_LARGE, _LARGE)] = quantity(0.0, unit="N s/m", source="design", doc="b_2.")
+    input_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="1", source="design", doc="Between which u is held."
+    )
+    force_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="N", source="design", doc="Between which the force is held."
+    )
+    time_constant: Annotated[float, real(0.0, 1e3)] = quantity(
+        0.0, unit="s", source="design", doc="T, with which the force follows the input; 0: at once."
+    )
+    integrates: bool = Field(False, strict=True, description="Whether the input is the rate of what it holds.")
+    integral: Annotated[float, real(0.0, _LARGE)] = quantity(
+        0.0, unit="N per input and s", source="design", doc="Gain of the sum of the error, of a servo."
+    )
+    state_range: Annotated[Pair, vector(2, -_LARGE, _LARGE)] | None = quantity(
+        None, unit="1", source="design", doc="Between which a, or the sum of the error, is held."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.joint is None) == (self.tendon is None):
+            raise problem("", "drives a joint or a tendon, and not both")
+        if (self.time_constant > 0.0) + self.integrates + (self.integral > 0.0) > 1:
+            raise problem("", "has one of time_constant, integrates and integral")
+        if self.state_range is not None and not self.has_state:
+            raise problem("state_range", "is for time_constant, integrates or integral", list(self.state_range))
+        for entry in ("input_range", "force_range", "state_range"):
+            given = getattr(self, entry)
+            if given is not None and given[0] > given[1]:
+                raise problem(entry, "the lower limit must not be above the upper one", list(given))
+        return self
+
+    def reach(self, joint: Pair | None) -> Pair | None:
+        """Return the least and the largest input: its range, or what holds a joint at the ends of its own; or None."""
+        if self.input_range is not None:
+            return self.input_range
+        if joint is None or not self.by_length * self.gain < 0.0 or self.integrates:
+            return None
+        ends = [-self.by_length / self.gain * self.gear * each - self.offset / self.gain for each in joint]
+        return min(ends), max(ends)
+
+    @property
+    def has_state(self) -> bool:
+        """Whether its force depends on more than input and motion of the moment."""
+        return self.time_constant > 0.0 or self.integrates or self.integral > 0.0
+
+    @property
+    def only_pulls(self) -> bool:
+        """Whether it never pushes what it drives, whatever its input and motion."""
+        bounds = [each * self.gear for each in self.force_range or ()]
+        if not (self.by_length or self.by_speed or self.has_state) and self.input_range is not None:
+            bounds = bounds or [(self.gain * each + self.offset) * self.gear for each in self.input_range]
+        return bool(bounds) and max(bounds) <= 0.0
+
+
+class Tip(Description):
+    """The point of the recorded motion and of the fingertip force."""
+
+    body: Name | None = Field(None, description="Body that carries it; the base if left out.")
+    position: Annotated[Triple, PLACE] = quantity((0.0, 0.0, 0.0), unit="m", source="design", doc="In its frame.")
+
+
+class Keyframe(Description):
+    """A posture to start from."""
+
+    position: dict[Name, Annotated[float, real(-1e6, 1e6)]] = quantity(
+        {}, unit="rad", source="design", doc="By joint; others are at their references."
+    )
+    inputs: dict[Name, Annotated[float, real(-_LARGE, _LARGE)]] = quantity(
+        {}, unit="1", source="design", doc="Inputs of actuators, by name, that go with it."
+    )
