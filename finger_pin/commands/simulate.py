@@ -89,9 +89,13 @@ def _hand(path: Path, changed: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
     from finger_pin.description.exercise import exercise
     from finger_pin.description.loading import read_scenario
-    from finger_pin.mechanism.exchange.from_mujoco import from_mujoco
+    from finger_pin.mechanism.exchange.from_mujoco import LeftOutWarning, from_mujoco
 
-    description = from_mujoco(path, path.stem)
+    with warnings.catch_warnings():
+        if not quiet:
+            # It is in the list that is printed.
+            warnings.simplefilter("ignore", LeftOutWarning)
+        description = from_mujoco(path, path.stem)
     assert description.tree is not None
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))

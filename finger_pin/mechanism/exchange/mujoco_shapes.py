@@ -40,8 +40,9 @@ class Shapes:
             if not self._solid(i) and not (kind == "plane" and not model.body_weldid[model.geom_bodyid[i]]):
                 moves = bool(model.body_weldid[model.geom_bodyid[i]])
                 self.rest.add(f"geom {self._name(i)}: a {kind} touches nothing here", moves)
-            elif model.geom_margin[i] or model.geom_gap[i]:
-                self.rest.add(f"geom {self._name(i)}: its margin", moves=False)
+        margins = [self._name(i) for i in self._colliding if model.geom_margin[i] or model.geom_gap[i]]
+        if margins:
+            self.rest.add(f"margins of geoms, where contacts begin: {', '.join(margins)}", moves=False)
         self._overlapping = self._overlaps()
 
     def _name(self, i: int) -> str:
