@@ -198,23 +198,6 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
             if high < low:
                 allowed = f"must be at least the minimum tension, {low:g} N for {name}"
                 raise problem("controller.distribution.maximum_tension", allowed, limits.maximum_tension)
-    if settings.passive_tension_loop is not None and not finger.passive_names:
-        raise problem("controller.passive_tension_loop", "the finger has no passive tendon; leave it out")
-
-
-_NOT_ROUTED = ("tendon_friction_feedforward", "joint_friction_compensation", "passive_tension_loop", "distribution")
-# What only the controller (19)-(22) has.
-_CLOSED_LOOP = (
-    "gain",
-    "damping",
-    "gravity_compensation",
-    "spring_compensation",
-    "fingertip_force",
-    "tendon_friction_feedforward",
-    "joint_friction_compensation",
-    "passive_tension_loop",
-    "distribution",
-)
 
 
 def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> None:
@@ -227,16 +210,7 @@ def _check_tensions(settings: ControllerSettings, finger: FingerDescription) -> 
     if settings.kind == "proportional":
         if finger.tree is not None and (actuators or not finger.tendons):
             raise problem("controller.kind", 'must be "tensions": actuators are driven in open loop', settings.kind)
-        if any(tendon.along for tendon in finger.tendons.values()):
-            for entry in _NOT_ROUTED:
-                if getattr(settings, entry) is not None:
-                    raise problem(f"controller.{entry}", "is not for tendons along paths; leave it out")
-        if settings.tensions is not None:
-            raise problem("controller.tensions", 'are for controller.kind = "tensions"')
         return
-    for entry in _CLOSED_LOOP:
-        if getattr(settings, entry) != ControllerSettings.model_fields[entry].default:
-            raise problem(f"controller.{entry}", 'has no effect with controller.kind = "tensions"; leave it out')
     names = finger.actuated_names
     for name, signal in (settings.tensions or {}).items():
         entry = f"controller.tensions.{name}"

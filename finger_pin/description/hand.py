@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache, partial, reduce
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.caching import Remembered
+from finger_pin.description.effects import OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.palm import PLACE, Palm
 from finger_pin.description.parameters import (
@@ -111,6 +112,11 @@ class HandSettings(Description):
             folded[name.casefold()] = name
         return value
 
+    @model_validator(mode="after")
+    def _acting(self) -> Self:
+        refuse_idle(self, OF_HAND)
+        return self
+
     def parts(self) -> dict[str, HandSettings]:
         """Return hands of one finger each, by name."""
         return {name: self.updated(fingers={name: placed}, name=name) for name, placed in self.fingers.items()}
@@ -156,6 +162,7 @@ class HandSettings(Description):
                 name: _TABLES.of((name, actuator), partial(_pulling, name.split(".")[0], actuator))
                 for name, actuator in actuators.items()
             },
+            touches_itself=any(part.touches_itself for part in parts.values()),
         )
 
     def _built(self, name: str, placed: PlacedFinger) -> FingerDescription:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
+from finger_pin.description.effects import OF_FINGER, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.tree import Tree
 from finger_pin.description.validation import (
@@ -281,6 +282,7 @@ class FingerDescription(Description):
         ):
             for field, value in getattr(self, group):
                 check_size(value, names, f"{group}.{field}", what)
+        refuse_idle(self, OF_FINGER)
         return self
 
     @property

@@ -23,6 +23,7 @@ from finger_pin.description.by_finger import error_of_finger, flat, given, neste
 from finger_pin.description.caching import Remembered
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.effects import OF_SCENARIO, idle, shown
 from finger_pin.description.hand import HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import FingerDescription
@@ -116,6 +117,7 @@ class Scenario(Description):
             environment = self.environment.updated(objects={**tree.objects, **(objects or {})})
             object.__setattr__(self, "environment", environment)
         self._check_names()
+        self._check_effects()
         fingers, finger = () if self.hand is None else tuple(self.hand.fingers), self.finger
         tables = finger.joints, finger.tendons, finger.actuators
         settings = self.controller, self.reference, finger.tree, finger.passive_tendon
@@ -123,6 +125,18 @@ class Scenario(Description):
         named = (part for table in tables for part in (*table, *table.values(), None))
         _CHECKED.of((*settings, fingers, *named), self._check_parts)
         return self
+
+    def _check_effects(self) -> None:
+        """Refuse what has no effect: on no finger of a hand, or, in a finger's own table, on that one."""
+        found = {name: {entry: rest for entry, *rest in idle(part, OF_SCENARIO)} for name, part in self.parts().items()}
+        for name, entries in found.items():
+            own = (self.controller.fingers or {}).get(name)
+            for entry, (value, says) in entries.items():
+                table, key = entry.split(".", 1)
+                if own is not None and key in own.model_fields_set:
+                    raise problem(f"{table}.fingers.{name}.{key}", says, shown(value))
+                if all(entry in each for each in found.values()):
+                    raise problem(entry, says, shown(value))
 
     def _check_parts(self) -> None:
         """Refuse tables that do not fit each other, finger by finger."""
@@ -135,6 +149,14 @@ class Scenario(Description):
     @model_serializer(mode="wrap")
     def _without_fingers_of_hand(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
+        of_tree = self.finger.tree.objects if self.finger.tree else {}
+        around = table.get("environment", {}).get("objects") or {}
+        for name in {*of_tree} & {*around}:
+            # It stands in the tree, where it can be changed.
+            if of_tree[name] == (self.environment.objects or {})[name]:
+                del around[name]
+                if not around:
+                    del table["environment"]["objects"]
         if self.hand is not None:
             table.pop("finger", None)
         return table

@@ -49,7 +49,7 @@ def test_a_wrong_entry_is_named_in_one_line(key, value, entry, said):
 def test_a_loop_around_a_passive_tendon_needs_one(tmp_path):
     path = tmp_path / "planar.toml"
     path.write_text('finger = "planar"\n[controller.passive_tension_loop]\n[controller.sampling]\n')
-    with pytest.raises(InputError, match="no passive tendon"):
+    with pytest.raises(InputError, match="without passive tendons"):
         fp.load_scenario(path)
 
 

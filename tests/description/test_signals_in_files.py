@@ -86,7 +86,7 @@ WRONG = [
     ({KEY: POINTS | {"times": [0.0], "values": [0.5]}}, f"{KEY}.times", "must be 2 to 1000000 numbers"),
     ({"reference.joints.distal": POINTS}, "reference.joints.distal", "follows from the passive tendon (20)"),
     ({"reference.joints.medail": POINTS}, "reference.joints.medail", "did you mean medial?"),
-    ({"controller.tensions.T1": {"offset": 1.0}}, "controller.tensions", 'are for controller.kind = "tensions"'),
+    ({"controller.tensions.T1": {"offset": 1.0}}, "controller.tensions", 'is for controller.kind = "tensions"'),
     ({"environment.fingertip_force_signal.w": {}}, "environment.fingertip_force_signal.w", "the axes are x, y, z"),
     ({"reference.file": 3}, "reference.file", "must be the path of a CSV file"),
     ({"simulation.initial.position.medail": 0.1}, "simulation.initial.position.medail", "did you mean medial?"),

@@ -1,0 +1,207 @@
+"""What has no effect in a kind of model is refused: the table of what a key needs in order to act.
+
+Judged are values that a table gives and that differ from the default, so that a description written out in full can be
+read again. What is at a limit where it does nothing, such as a stiffness of zero, is no mistake: sweeps pass there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from finger_pin.description.validation import Description, problem
+
+
+class Rule(NamedTuple):
+    """What entries of a table need.
+
+    Attributes:
+        table: Dotted name of the table, in which a star stands for every name; empty for the description itself.
+        entries: Entries of that table; none for all of them.
+        acts: Whether they act, by description and table.
+        says: What is said when they do not.
+    """
+
+    table: str
+    entries: tuple[str, ...]
+    acts: Callable[[Any, Any], object]
+    says: str
+
+
+_OPEN = 'has no effect with controller.kind = "tensions"'
+
+
+def _paths(finger: Any) -> tuple[str, ...]:
+    """Return the names of the tree's tendons whose paths those that are pulled take."""
+    return tuple(tendon.along for tendon in finger.tendons.values() if tendon.along)
+
+
+#: Of a finger, whose links or bodies, tendons and actuators are of a kind.
+OF_FINGER = (
+    Rule("passive_tendon", (), lambda finger, _: finger.passive_names, "has no effect without passive tendons"),
+    Rule(
+        "tendon_friction", (), lambda finger, _: finger.tendons or finger.canals, "has no effect where no tendon rubs"
+    ),
+    Rule(
+        "joint_friction",
+        (),
+        lambda finger, _: finger.tree is None or any(each.bearing for each in finger.tree.joints.values()),
+        "has no effect without a joint that has a bearing",
+    ),
+    Rule(
+        "stroke_limiter",
+        (),
+        lambda finger, _: any(each.limited for each in finger.joints.values()),
+        "has no effect without a joint that is limited",
+    ),
+    Rule(
+        "",
+        ("touches_itself",),
+        lambda finger, _: finger.tree.touching if finger.tree else len(finger.joints) > 2,
+        "has no effect where no two parts but neighbours could touch",
+    ),
+    Rule(
+        "joints.*",
+        ("link",),
+        lambda finger, _: finger.tree is None,
+        "has no effect beside a tree, whose bodies are the links",
+    ),
+    Rule(
+        "actuators.*",
+        ("position_loop",),
+        lambda _, actuator: actuator.drive == "position",
+        'has no effect with drive = "tension"',
+    ),
+    Rule(
+        "actuators.*",
+        ("friction_compensation", "reversal_speed"),
+        lambda _, actuator: actuator.drive == "tension",
+        'has no effect with drive = "position"',
+    ),
+    Rule(
+        "tree.tendons.*",
+        ("rest",),
+        lambda _, tendon: "stiffness" in tendon.model_fields_set,
+        "has no effect without stiffness",
+    ),
+    Rule(
+        "tree.tendons.*", ("limit_damping",), lambda _, tendon: tendon.range is not None, "has no effect without range"
+    ),
+    Rule(
+        "tree.tendons.*",
+        ("curvature_offset",),
+        lambda finger, tendon: any(finger.tree.tendons[name] is tendon for name in (*finger.canals, *_paths(finger))),
+        "has no effect where nothing pulls the tendon",
+    ),
+    Rule("tree.tendons.*.path.*", ("divisor",), lambda _, piece: piece.kind == "pulley", 'is for kind = "pulley"'),
+    Rule(
+        "tree.tendons.*.path.*",
+        ("body", "position"),
+        lambda _, piece: piece.kind != "pulley",
+        'has no effect with kind = "pulley"',
+    ),
+    Rule(
+        "tree.tendons.*.path.*",
+        ("orientation", "radius", "side", "side_point"),
+        lambda _, piece: piece.kind in ("cylinder", "sphere"),
+        'is for kind = "cylinder" or "sphere"',
+    ),
+    Rule("tree.bodies.*.solids.*", ("sides",), lambda _, solid: solid.kind == "box", 'is for kind = "box"'),
+    Rule("tree.bodies.*.solids.*", ("mesh",), lambda _, solid: solid.kind == "mesh", 'is for kind = "mesh"'),
+    Rule(
+        "tree.bodies.*.solids.*",
+        ("radius",),
+        lambda _, solid: solid.kind not in ("box", "mesh"),
+        'is for kind = "sphere", "capsule" or "cylinder"',
+    ),
+    Rule(
+        "tree.bodies.*.solids.*",
+        ("length",),
+        lambda _, solid: solid.kind in ("capsule", "cylinder"),
+        'is for kind = "capsule" or "cylinder"',
+    ),
+)
+#: Of a hand.
+OF_HAND = (Rule("", ("fingers_touch",), lambda hand, _: len(hand.fingers) > 1, "has no effect with a single finger"),)
+_CORRECTIONS = ("tendon_friction_feedforward", "joint_friction_compensation", "passive_tension_loop", "distribution")
+_CLOSED_LOOP = ("gain", "damping", "gravity_compensation", "spring_compensation", "fingertip_force", *_CORRECTIONS)
+#: Of a scenario; of a hand, that of each of its fingers.
+OF_SCENARIO = (
+    Rule("controller", _CLOSED_LOOP, lambda _, controller: controller.kind == "proportional", _OPEN),
+    Rule(
+        "controller",
+        _CORRECTIONS,
+        lambda scenario, _: not any(tendon.along for tendon in scenario.finger.tendons.values()),
+        "has no effect where tendons run along paths",
+    ),
+    Rule(
+        "controller",
+        ("tensions",),
+        lambda _, controller: controller.kind == "tensions",
+        'is for controller.kind = "tensions"',
+    ),
+    Rule(
+        "controller",
+        ("minimum_tension",),
+        lambda scenario, controller: (
+            controller.kind == "proportional" or {*scenario.finger.actuated_names} - {*(controller.tensions or {})}
+        ),
+        "has no effect where controller.tensions has every tendon",
+    ),
+    Rule(
+        "controller",
+        ("passive_tension", "passive_tension_loop"),
+        lambda scenario, _: scenario.finger.passive_names,
+        "has no effect without passive tendons",
+    ),
+    Rule(
+        "controller",
+        ("spring_compensation",),
+        lambda scenario, _: any(joint.spring for joint in scenario.finger.joints.values()),
+        "has no effect without springs of joints",
+    ),
+)
+
+
+def idle(described: Description, rules: tuple[Rule, ...]) -> Iterator[tuple[str, Any, str]]:
+    """Yield the entries that are given and have no effect: dotted name, value, and what is to be said."""
+    for rule in rules:
+        for name, table in _tables(described, rule.table):
+            for entry in rule.entries or type(table).model_fields:
+                value = getattr(table, entry)
+                if (
+                    entry in table.model_fields_set
+                    and _differs(table, entry, value)
+                    and not rule.acts(described, table)
+                ):
+                    yield f"{name}{entry}", value, f"{rule.says}; leave it out"
+
+
+def refuse_idle(described: Description, rules: tuple[Rule, ...]) -> None:
+    """Raise the error of the first entry that is given and has no effect."""
+    for entry, value, says in idle(described, rules):
+        raise problem(entry, says, shown(value))
+
+
+def shown(value: Any) -> Any:
+    """Return a value as messages show it; of a table nothing."""
+    return None if isinstance(value, Description | dict) else value
+
+
+def _tables(described: Any, name: str) -> Iterator[tuple[str, Description]]:
+    """Yield the tables that a name stands for, with what comes before their entries' names."""
+    found: list[tuple[str, Any]] = [("", described)]
+    for part in name.split(".") if name else ():
+        if part == "*":
+            found = [(f"{before}{key}.", each) for before, table in found for key, each in table.items()]
+        else:
+            inner = [(f"{before}{part}.", getattr(table, part)) for before, table in found]
+            found = [(before, each) for before, each in inner if each]
+    yield from found
+
+
+def _differs(table: Description, entry: str, value: Any) -> bool:
+    """Return whether a value is another than the default, be it once for all or for each."""
+    default = type(table).model_fields[entry].default
+    alike = isinstance(value, tuple) and all(each == default for each in value)
+    return value is not None and value != default and not alike
