@@ -267,3 +267,16 @@ def test_cords_wound_by_servos_load_pins_and_rub_by_their_turn():
         levels = found.mechanism.rows["tendon_canals"]["level"]
         expected = [2.0 * each * np.tanh(0.5 * 0.11 * 0.4) * 1.5 for each in tensions]
         np.testing.assert_allclose(levels, np.maximum(expected, 1e-4), rtol=1e-9)
+
+
+def test_a_drum_without_limits_turns_on_as_its_servo_says_and_is_read_where_no_joint_has_any():
+    """The damper and the servo share the speed: kv (u - w) = c w, so that it has turned u kv t / (kv + c)."""
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>{HEAD.format(option='gravity="0 0 0"')}<worldbody>
+    <body><joint name="drum" axis="0 1 0" damping="1e-3" armature="1e-5"/><geom size="0.006" mass="0.02"/></body>
+    </worldbody><actuator><velocity name="drum" joint="drum" kv="0.05" ctrlrange="-20 20"/></actuator></mujoco>""")
+    description = fp.from_mujoco(model)
+    assert not description.joints["drum"].limited
+    table = exercise(description, 2.0)
+    table["controller"]["inputs"]["drum"] = {"offset": 15.0}
+    result = fp.simulate(read_scenario(table, SMOOTH))
+    assert result.joint_position.values[-1, 0] == pytest.approx(15.0 * 0.05 / 0.051 * 2.0, rel=1e-3)

@@ -121,7 +121,7 @@ class _Reader:
         actuators, pulled = self.actuators.table(), self.actuators.pulled()
         couplings, loops, differences = read_equalities(self._read)
         joints, moving, loss = self._joints()
-        sliding = [each["kind"] == "slide" for each in moving.values()]
+        stops = [_STOP_SLIDING if each["kind"] == "slide" else STOP for each in moving.values()]
         pairs, keyframes = self.shapes.pairs(bodies), self._keyframes()
         return {
             "name": entry_name(name),
@@ -129,7 +129,7 @@ class _Reader:
             "joints": joints,
             "tendons": pulled,
             "joint_friction": {"viscous": 0.0, "floor": np.maximum(loss, _LEAST_FRICTION).tolist()},
-            "stroke_limiter": {"stiffness": np.where(sliding, _STOP_SLIDING, STOP).tolist()},
+            **({"stroke_limiter": {"stiffness": stops}} if any(each["limited"] for each in joints.values()) else {}),
             "touches_itself": bool(pairs),
             "tree": {
                 "bodies": self._still() | {self.names.bodies[i]: self._body(i) for i in bodies},
