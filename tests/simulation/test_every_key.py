@@ -112,27 +112,26 @@ class Acts:
         ends.position[:], ends.velocity[:] = strokes + np.array([[-0.15], [0.15]]), [[-0.3], [0.3]]
         # Contacts that slide.
         self.layout.unpack(self.states[:4]).contact_bend[:] = 1e-2
-        self.own = self.of(scenario)
+        self.own = list(self.of(scenario))
 
     def of(self, scenario):
+        """Yield them one by one: most changes show in the first."""
         loop = ClosedLoop.from_scenario(scenario)
-        if loop.finger.layout != self.layout:
-            return [np.zeros(0)]
-        most = FEW if len(self.layout.contacts) > MANY else INSTANTS
-        rates = [loop.rhs(time, x) for time, x in zip(self.times[:most], self.states[:most], strict=True)]
-        at = self.layout.unpack(self.states[0])
-        tips = [loop.finger.motion(at.position, at.velocity).tip]
-        found = [loop.initial_state(), loop.knots(1e-6), scenario.sample_times(), *rates, *tips]
+        yield np.array([loop.finger.layout == self.layout])
+        yield from (loop.initial_state(), loop.knots(1e-6), scenario.sample_times())
         if np.any(loop.finger.actuators.holds):
             drives = PositionDrives(loop.finger, loop.controller, loop.reference, scenario.simulation.duration).compiled
-            found += [
-                np.asarray(getattr(drives, name)) for name in ("period", "goals", "resolution", "gains", "supply")
-            ]
-        return found
+            yield from (
+                np.asarray(getattr(drives, name)) for name in ("goals", "gains", "period", "resolution", "supply")
+            )
+        at = self.layout.unpack(self.states[0])
+        yield loop.finger.motion(at.position, at.velocity).tip
+        most = FEW if len(self.layout.contacts) > MANY else INSTANTS
+        for time, x in zip(self.times[:most], self.states[:most], strict=True):
+            yield loop.rhs(time, x)
 
     def differ(self, scenario):
-        there = self.of(scenario)
-        return len(there) != len(self.own) or not all(map(np.array_equal, there, self.own))
+        return not all(map(np.array_equal, self.of(scenario), self.own))
 
 
 # Keys that may do nothing in any scenario here, and why.
