@@ -201,7 +201,9 @@ def _tables(described: Any, name: str) -> Iterator[tuple[str, Description]]:
 
 
 def _differs(table: Description, entry: str, value: Any) -> bool:
-    """Return whether a value is another than the default, be it once for all or for each."""
+    """Return whether a value is another than the default, once for all or for each, and asks for anything."""
     default = type(table).model_fields[entry].default
     alike = isinstance(value, tuple) and all(each == default for each in value)
-    return value is not None and value != default and not alike
+    # Zero asks for none of what there is not.
+    none = not isinstance(value, bool) and value == 0
+    return value is not None and value != default and not alike and not none

@@ -91,7 +91,7 @@ class Surroundings:
         ]
         carried = (joint.link for joint in description.joints.values())
         links = [(link.length, link.width, link.offset) for link in carried if link]
-        touching = hand and hand.fingers_touch, description.touches_itself, width
+        touching = hand and hand.fingers_touch, frozenset(pairs_within(description)), width
         make = partial(cls._contacts, objects, description, extended, width, placed)
         return cls(objects, free, extended, _CONTACTS.of((mechanism.body.form, *touching, *links, *forms), make))
 
