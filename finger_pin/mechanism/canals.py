@@ -135,12 +135,12 @@ class Canals:
 
     def _behind(self, trunk: _Canal, tendon: str, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon: what pulls them is what the trunk's friction leaves, divided."""
-        found = []
-        crossed = iter([joints for _, joints in self._tree.crossed(tendon)[1:]])
-        for number, (divisor, legs) in enumerate(trunk.route.branches, start=1):
-            sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
-            route, own = Route(np.zeros(len(self._joints)), legs), next(crossed)
-            found.append(_Canal(f"{trunk.name}.{number}", trunk.tendon, route, trunk.one_way, own, sources))
+        found, parts = [], zip(trunk.route.branches, self._tree.crossed(tendon)[1:], strict=True)
+        for number, ((divisor, legs), (_, crossed)) in enumerate(parts, start=1):
+            if legs:
+                sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
+                route = Route(np.zeros(len(self._joints)), legs)
+                found.append(_Canal(f"{trunk.name}.{number}", trunk.tendon, route, trunk.one_way, crossed, sources))
         return found
 
     def _cords(self, cords: Mapping[str, Mapping[str, float]], known: Mapping[str, Rows], width: int) -> Rows:

@@ -130,7 +130,7 @@ def _route(coefficients: Array, path: Mapping[str, Waypoint], placed: Mapping[st
             wrap = each
     (_, trunk), *branches = parts
     behind = [replace(leg, arm=1.0 / divisor, bends=False) for divisor, legs in branches for leg in legs]
-    divided = tuple((divisor, tuple(legs)) for divisor, legs in branches if legs)
+    divided = tuple((divisor, tuple(legs)) for divisor, legs in branches)
     return Route(coefficients, (*trunk, *behind), divided)
 
 
