@@ -46,6 +46,9 @@ def wild_scenario(seed: int) -> fp.Scenario:
         },
         "simulation": {"duration": DURATION},
     }
+    if not passive:
+        # Drawn all the same, so that a seed's other numbers do not depend on it.
+        del scenario["finger"]["passive_tendon"], scenario["controller"]["passive_tension"]
     followed = fp.FingerDescription.model_validate(scenario["finger"])
     coupling = _followers(followed)
     scenario["reference"] = {

@@ -11,8 +11,11 @@ from finger_pin.description.loading import read_scenario
 def ours(spec, duration):
     """Return the scenario in which every actuator of a model goes to and fro, and our motion, without ranges."""
     still = {"simulation.duration": duration, "simulation.rtol": 1e-9, "simulation.atol_scale": 1e-9}
-    still |= {"finger.stroke_limiter.stiffness": 1e-9, "simulation.sample_rate": 100.0}
-    scenario = read_scenario(exercise(fp.from_mujoco(spec)), still)
+    still |= {"simulation.sample_rate": 100.0}
+    hand = fp.from_mujoco(spec)
+    if any(joint.limited for joint in hand.joints.values()):
+        still |= {"finger.stroke_limiter.stiffness": 1e-9}
+    scenario = read_scenario(exercise(hand), still)
     return scenario, fp.simulate(scenario)
 
 

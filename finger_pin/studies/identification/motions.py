@@ -220,6 +220,10 @@ class RecordedMotion:
                 into.setdefault(finger, {})[own] = samples
             else:
                 into[label] = samples
+        given = table.get("controller", {})
+        if given.get("kind") == "tensions" and {*scenario.finger.actuated_names} <= {*given.get("tensions", {})}:
+            # No tendon is left for it.
+            given.pop("minimum_tension", None)
 
     def _put_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:
         kind = self.recording.settings.start
