@@ -12,6 +12,7 @@ from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.routing import Array
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_like import FingerLike, as_finger
 from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.tree import STATEFUL, STATELESS
@@ -69,16 +70,8 @@ def equilibrium(
             their own or actuators that integrate, or it comes to no rest.
     """
     finger = as_finger(finger)
-    layout = finger.layout
-    tree = finger.description.tree
-    driven = any(table.pulls and table.group != "tension_sources" for table in finger.mechanism.rows)
-    own = any(table.states and table.group != "tendon_dry_friction" for table in finger.made_of[1])
-    if finger.description.hand is not None or driven or layout.objects or own:
-        raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
-    for name, each in (tree.actuators if tree is not None else {}).items():
-        if each.integrates or each.integral:
-            raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
-    actuated = finger.routing.actuated
+    _refuse_restless(finger)
+    layout, actuated = finger.layout, finger.routing.actuated
     command = finger.packed_inputs(inputs)
     if np.any(command[:actuated] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
@@ -91,14 +84,12 @@ def equilibrium(
         else np.array(finite_vector("position", position, joints))
     )
     rest = finger.rest_state(start)
-    if layout.actuators:
-        # What comes late has come.
-        assert tree is not None
-        numbers = finger.mechanism.rows[[t.group for t in finger.mechanism.rows].index(STATEFUL)].parameters
-        places = actuated + np.array([list(tree.actuators).index(name) for name in layout.actuators])
-        held = layout.unpack(rest).actuator_state
-        assert held is not None
-        held[:] = np.clip(np.clip(command[places], numbers[4], numbers[5]), numbers[-2], numbers[-1])
+    for table in finger.mechanism.rows:
+        if table.group == STATEFUL:
+            # What comes late has come.
+            held, numbers = layout.unpack(rest).actuator_state, table.parameters
+            assert held is not None
+            held[:] = np.clip(np.clip(command[table.channels], numbers[4], numbers[5]), numbers[-2], numbers[-1])
 
     def placed(places: Array) -> Array:
         x = rest.copy()
@@ -136,6 +127,18 @@ def equilibrium(
     x = placed(places)
     torque = finger.evaluate(x, command, pushed).tendon_torque
     return Equilibrium(places[:joints], places[joints:], np.asarray(torque), x)
+
+
+def _refuse_restless(finger: Finger) -> None:
+    """Refuse a finger that is no single one, or has parts whose rest inputs alone do not say."""
+    description, tables = finger.description, finger.mechanism.rows
+    driven = any(table.pulls and table.group != "tension_sources" for table in tables)
+    own = any(table.states for table in finger.made_of[1])
+    if description.hand is not None or driven or finger.layout.objects or own:
+        raise InputError("finger", "must be one finger with ideal sources of tension, without free objects")
+    for name, each in (description.tree.actuators if description.tree is not None else {}).items():
+        if each.integrates or each.integral:
+            raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
 
 
 def _given_by_actuators(found: FingerSignals) -> float:

@@ -55,10 +55,8 @@ def _held(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
     if not tables:
         return lambda theta: (np.zeros(0), np.zeros((0, joints)))
-    arm, paths = (
-        np.concatenate([table.arm[:, :joints] for table in tables]),
-        [p for table in tables for p in table.paths],
-    )
+    arm = np.concatenate([table.arm[:, :joints] for table in tables])
+    paths = [legs for table in tables for legs in table.paths]
     rest = np.concatenate([table.parameters[table.law.parameters.index("rest")] for table in tables])
 
     def missed(theta: Array) -> tuple[Array, Array]:

@@ -18,8 +18,8 @@ from finger_pin.description.objects import Object
 from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeActuator, TreeJoint, TreeTendon
 from finger_pin.description.validation import Description, Name, problem, suggestion
 
-# What is more is no radius that a cord winds at, as `Crossing` has it, m.
-_LARGEST_RADIUS = 0.5
+#: What is more is no radius that a cord winds at, as `Crossing` has it, m.
+LARGEST_RADIUS = 0.5
 
 
 class Tree(Description):
@@ -118,7 +118,7 @@ class Tree(Description):
     def _is_cord(self, name: str) -> bool:
         around = self.tendons[name].joints
         return around is None or all(
-            self.joints[joint].kind == "hinge" and abs(radius) <= _LARGEST_RADIUS for joint, radius in around.items()
+            self.joints[joint].kind == "hinge" and abs(radius) <= LARGEST_RADIUS for joint, radius in around.items()
         )
 
     def _pulled(self, name: str) -> bool:

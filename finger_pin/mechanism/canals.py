@@ -18,11 +18,10 @@ from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.routes import Route, Routes
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendons import BRISTLES, LOSSES, SLACK, SOURCES, Tendons
+from finger_pin.mechanism.tree import table_of
 
 #: The tables, in the order of evaluation.
 CORDS, CANALS, BRANCHES = "tendon_cords", "tendon_canals", "tendon_branches"
-# No path through space is shorter, m.
-_SHORTEST = 0.0
 
 
 @dataclass
@@ -56,7 +55,6 @@ class Canals:
     """The canals of a finger's tree beside those of the tendons that ideal sources, or drives, pull.
 
     Attributes:
-        names: Of the canals, those of branches last.
         tables: Their rows, none without any.
         loads: By table, weights with which rows load the pins of joints, shape (n, rows).
     """
@@ -80,7 +78,6 @@ class Canals:
             pulled: Weights with which drives pull the actuated tendons, by table.
             width: Number of coordinates.
         """
-        self.names: tuple[str, ...] = ()
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
         if routes is None or description.tree is None:
@@ -107,22 +104,22 @@ class Canals:
                 known[group] = self._table(group, canals, tendons, known, width)
                 self.tables.append(known[group])
                 self._press(canals, known, {"driven_tendons", *pulled})
-        self.names = tuple(each.name for each in (*trunks, *branches))
 
     def _trunk(self, name: str, routes: Routes, tendons: Tendons) -> _Canal:
         """Return the canal of a tendon of the tree before its first pulley."""
         tree, tendon = self._tree, self._tree.tendons[name]
         sources: dict[tuple[str, str], float] = {}
+        # No path through space has a length below zero, at which its spring or its range would push.
         one_way = not tendon.friction
         if tendon.stiffness:
             sources["tendon_spring", name] = -1.0
-            one_way &= tendon.path is not None and tendon.rest[0] <= _SHORTEST
+            one_way &= tendon.path is not None and tendon.rest[0] <= 0.0
         if tendon.range is not None:
             sources["tendon_limit", name] = -1.0
-            one_way &= tendon.path is not None and tendon.range[0] <= _SHORTEST
+            one_way &= tendon.path is not None and tendon.range[0] <= 0.0
         for key, each in tree.actuators.items():
             if each.tendon == name:
-                sources[_group(each.has_state), key] = -each.gear
+                sources[table_of(each), key] = -each.gear
                 one_way &= each.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
@@ -146,9 +143,7 @@ class Canals:
     def _cords(self, cords: Mapping[str, Mapping[str, float]], known: Mapping[str, Rows], width: int) -> Rows:
         """Return the tensions of cords that turn joints."""
         actuators = self._tree.actuators
-        shares = [
-            {(_group(actuators[key].has_state), key): share for key, share in each.items()} for each in cords.values()
-        ]
+        shares = [{(table_of(actuators[key]), key): share for key, share in each.items()} for each in cords.values()]
         return Rows(
             group=CORDS,
             law=CORD_TENSION,
@@ -208,7 +203,3 @@ def _wired(sources: Sequence[Mapping[tuple[str, str], float]], known: Mapping[st
             weights = found.setdefault(group, np.zeros((len(sources), known[group].count)))
             weights[k, known[group].names.index(row)] += weight
     return found
-
-
-def _group(has_state: bool) -> str:
-    return "actuator_with_state" if has_state else "actuator"

@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from finger_pin.description.parameters import FingerDescription
 from finger_pin.description.routing import Array
 from finger_pin.description.tree import Tree
-from finger_pin.description.tree_parts import Coupling, Loop, TreeActuator
+from finger_pin.description.tree_parts import Coupling, TreeActuator
 from finger_pin.exceptions import InputError
 from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
 from finger_pin.laws.bristle import PIN_FRICTION
@@ -139,8 +139,8 @@ def tree_rows(description: FingerDescription, routes: Routes, width: int) -> lis
         if along:
             tables.append(table(group, law, along, numbers))
     first = len(description.actuated_names)
-    for group, law, stateful in ((STATELESS, ACTUATOR, False), (STATEFUL, ACTUATOR_WITH_STATE, True)):
-        own = {name: each for name, each in tree.actuators.items() if each.has_state == stateful}
+    for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE)):
+        own = {name: each for name, each in tree.actuators.items() if table_of(each) == group}
         along = {
             name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
             for name, each in own.items()
@@ -191,11 +191,8 @@ def coupling_route(tree: Tree, routes: Routes, coupling: Coupling, joints: Mappi
     if not any(coupling.higher):
         return route
     # An angle is measured from its range's middle, so that it never comes to half a turn.
-    model, index, middle = (
-        routes.body.model,
-        list(tree.joints).index(coupling.other) + 1,
-        routes.middles[coupling.other],
-    )
+    model, middle = routes.body.model, routes.middles[coupling.other]
+    index = list(tree.joints).index(coupling.other) + 1
     hinge, axis = tree.joints[coupling.other].kind == "hinge", np.array(tree.joints[coupling.other].axis)
     upright = _upright(axis)
     powers = Polynomial([0.0, 0.0, *coupling.higher])(Polynomial([middle, 1.0])).coef
@@ -213,17 +210,13 @@ def coupling_route(tree: Tree, routes: Routes, coupling: Coupling, joints: Mappi
 
 def _loops(tree: Tree, routes: Routes) -> _Described:
     """Return the springs that hold points of bodies together, one along each axis of the base."""
-    along = {
-        f"{name}.{axis}": _rise(routes.placed[each.body].place(each.position), _other(each, routes), np.eye(3)[k])
-        for name, each in tree.loops.items()
-        for k, axis in enumerate("xyz")
-    }
+    along = {}
+    for name, each in tree.loops.items():
+        first, second = routes.placed[each.body], routes.placed[each.other]
+        for axis, unit in zip("xyz", np.eye(3), strict=True):
+            along[f"{name}.{axis}"] = _rise(first.place(each.position), second.place(each.other_position), unit)
     numbers = [(each.stiffness, 0.0, each.damping) for each in tree.loops.values() for _ in "xyz"]
     return "loop", JOINT_SPRING, along, numbers
-
-
-def _other(loop: Loop, routes: Routes) -> Place:
-    return routes.placed[loop.other].place(loop.other_position)
 
 
 def _weights(description: FingerDescription, routes: Routes) -> _Described:
@@ -253,6 +246,11 @@ def _upright(axis: Array) -> Array:
     """Return a rotation whose z axis is a unit vector."""
     turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).matrix()
     return turned
+
+
+def table_of(actuator: TreeActuator) -> str:
+    """Return the name of the table that an actuator's row stands in."""
+    return STATEFUL if actuator.has_state else STATELESS
 
 
 def _actuator(each: TreeActuator) -> tuple[float, ...]:

@@ -280,3 +280,20 @@ def test_a_drum_without_limits_turns_on_as_its_servo_says_and_is_read_where_no_j
     table["controller"]["inputs"]["drum"] = {"offset": 15.0}
     result = fp.simulate(read_scenario(table, SMOOTH))
     assert result.joint_position.values[-1, 0] == pytest.approx(15.0 * 0.05 / 0.051 * 2.0, rel=1e-3)
+
+
+def test_a_free_body_keeps_its_name_unless_a_shape_has_it_and_a_motor_that_its_limit_holds_pulls_nothing():
+    worlds = '<geom name="ball" size="0.01" pos="0 0 -1"/>'
+    body = '<body name="{name}" pos="0 {y} -2"><freejoint/><geom name="{name}{tail}" size="0.01"/></body>'
+    things = body.format(name="cube", y=1, tail="") + body.format(name="ball", y=2, tail="_geom")
+    text = f"""<mujoco>{HEAD.format(option="")}<worldbody>{worlds}{things}
+    <body><joint name="pip" axis="0 -1 0" range="-0.5 1.6"/>{PHALANX.format(length=0.05, mass=0.05)}</body></worldbody>
+    <tendon><fixed name="cord"><joint joint="pip" coef="0.01"/></fixed></tendon><actuator>
+    <motor name="pull" tendon="cord" gear="-1" ctrlrange="0 10" forcelimited="true" forcerange="-5 0"/>
+    </actuator></mujoco>"""
+    description = fp.from_mujoco(mujoco.MjModel.from_xml_string(text))
+    assert list(description.tree.objects) == ["cube", "ball_object"]
+    assert not description.tendons
+    hand = fp.Hand(description)
+    found = hand.evaluate(hand.rest_state(np.zeros(1)), np.array([7.0]))
+    assert found.mechanism.rows["actuator"].force == pytest.approx([0.0])

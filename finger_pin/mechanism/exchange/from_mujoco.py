@@ -300,9 +300,7 @@ class _Reader:
     def _wraps(self) -> NDArray[np.bool_]:
         """Return a mask of the pieces of tendons' paths that are wraps."""
         types = self.mujoco.mjtWrap
-        return np.asarray(
-            (self.model.wrap_type == types.mjWRAP_SPHERE) | (self.model.wrap_type == types.mjWRAP_CYLINDER)
-        )
+        return np.isin(self.model.wrap_type, (int(types.mjWRAP_SPHERE), int(types.mjWRAP_CYLINDER)))
 
     def _tip(self) -> Table:
         body, position = self._tip_body()

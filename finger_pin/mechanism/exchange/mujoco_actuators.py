@@ -7,12 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from finger_pin.description.routing import Array
+from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.mechanism.exchange.mujoco_flags import undriven
 from finger_pin.mechanism.exchange.mujoco_names import Table, distinct
 from finger_pin.mechanism.exchange.mujoco_unsupported import ElementReader
 
-# As `Crossing` has it, m.
-_LARGEST_RADIUS = 0.5
 # What forces are at most, N.
 _LARGE = 1e9
 
@@ -84,14 +83,13 @@ class ActuatorReader(ElementReader):
         names = distinct("actuator", [model.actuator(i).name for i in self.pulling])
         found = {}
         for name, i in zip(names, self.pulling, strict=True):
-            found[name] = self._route(int(model.actuator_trnid[i, 0])) | {"maximum_tension": self._most(i)}
+            found[name] = self._route(int(model.actuator_trnid[i, 0])) | {"maximum_tension": float(max(self._ends(i)))}
         return found
 
-    def _most(self, i: int) -> float:
-        """Return the greatest tension of a motor that only pulls, N."""
-        model, gear = self.model, float(self.model.actuator_gear[i, 0])
-        exerted = self.laws[i]["gain"] * model.actuator_ctrlrange[self._control(i)]
-        return float(max(-gear * np.clip(exerted, *self._bounds(i))))
+    def _ends(self, i: int) -> Array:
+        """Return the tensions of a motor at both ends of its control's range, within its limits, shape (2,), N."""
+        exerted = self.laws[i]["gain"] * self.model.actuator_ctrlrange[self._control(i)]
+        return np.asarray(-self.model.actuator_gear[i, 0] * np.clip(exerted, *self._bounds(i)))
 
     def _bounds(self, i: int) -> tuple[float, float]:
         """Return the limits of an actuator's force, its own and those of the joint or tendon that it alone drives."""
@@ -211,7 +209,7 @@ class ActuatorReader(ElementReader):
             return False
         # What is no radius of a hinge is a transmission, and no tendon.
         for joint, arm in self._around(at).items():
-            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > _LARGEST_RADIUS:
+            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > LARGEST_RADIUS:
                 return False
-        exerted = model.actuator_gear[i, 0] * self.laws[i]["gain"] * model.actuator_ctrlrange[control]
-        return bool(np.all(exerted <= 0.0) and np.any(exerted))
+        ends = self._ends(i)
+        return bool(np.all(ends >= 0.0) and np.any(ends))

@@ -91,9 +91,8 @@ class FreeBodies:
         centre = model.body_ipos[body]
         moved = qpos[at : at + 3] + now @ centre - model.body_pos[body] - turned @ centre
         angles = Rotation.from_matrix(self._axes.T @ now @ turned.T @ self._axes).as_euler("ZYX")
-        return dict(
-            zip((f"{name}_{what}" for what in (*_SLIDES, *_TURNS)), [*moved.tolist(), *angles.tolist()], strict=True)
-        )
+        names = (f"{name}_{what}" for what in (*_SLIDES, *_TURNS))
+        return dict(zip(names, [*moved.tolist(), *angles.tolist()], strict=True))
 
 
 def _rotation(real_first: Array) -> Array:

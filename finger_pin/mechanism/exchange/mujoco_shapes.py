@@ -101,10 +101,12 @@ class Shapes:
     def objects(self, loose: list[int]) -> Table:
         """Return planes that something may touch, and free bodies where runs start, as objects."""
         model, data, found = self.model, self._started(), {}
+        shapes = [i for i in self._colliding if self._solid(i) and int(model.geom_bodyid[i]) not in loose]
+        taken = {*self.names.joints, *(self.names.geoms[i] for i in shapes)}
         for i in self._colliding:
             plane = model.geom_type[i] == self.mujoco.mjtGeom.mjGEOM_PLANE
             if plane and any(self._meant(i, k) for k in self._colliding if k != i) and not self._dropped(i):
-                found[self._free_name(self.names.geoms[i])] = self._shape(i) | self._placed(data, i)
+                found[_free_name(self.names.geoms[i], taken)] = self._shape(i) | self._placed(data, i)
         for body in loose:
             name, own = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
             if len(own) != 1 or not self._solid(own[0]) or any(model.body_parentid == body):
@@ -116,7 +118,7 @@ class Shapes:
                 if model.body_gravcomp[body]:
                     self.rest.add(f"free body {name}: gravity compensation")
                 mass = {"mass": float(model.body_mass[body])}
-                found[self._free_name(name)] = self._shape(i) | self._placed(data, i) | mass
+                found[_free_name(name, taken | {*found})] = self._shape(i) | self._placed(data, i) | mass
         return found
 
     def _dropped(self, i: int) -> bool:
@@ -130,11 +132,6 @@ class Shapes:
         turned = np.zeros(4)
         self.mujoco.mju_mat2Quat(turned, data.geom_xmat[i])
         return {"position": data.geom_xpos[i].tolist(), "orientation": quaternion(turned)}
-
-    def _free_name(self, name: str) -> str:
-        """Return a name for an object that no joint and no shape has."""
-        taken = {*self.names.joints, *(self.names.geoms[i] for i in self._colliding if self.model.geom_bodyid[i])}
-        return self._free_name(f"{name}_object") if name in taken else name
 
     def pairs(self, bodies: list[int]) -> list[list[str]]:
         """Return the pairs that MuJoCo lets collide among some bodies: by its bits, exclusions and explicit pairs."""
@@ -168,3 +165,8 @@ class Shapes:
             elif (a, b) not in same:
                 apart.append([self.names.geoms[a], self.names.geoms[b]])
         return apart
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """Return a name for an object that nothing else has."""
+    return _free_name(f"{name}_object", taken) if name in taken else name
