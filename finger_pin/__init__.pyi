@@ -33,9 +33,9 @@ from .simulation.simulator import Simulator as Simulator
 from .simulation.simulator import step_many as step_many
 from .studies import optimise as optimise
 from .studies import sweep as sweep
+from .studies.batch import simulate_many as simulate_many
 from .studies.identification.identifying import identify as identify
 from .studies.identification.proposing import propose as propose
-from .studies.many import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .views import plots as plots
 from .views.plots import plot_fig6 as plot_fig6

@@ -16,7 +16,7 @@ from finger_pin.studies.designs import SAMPLE, Design
 from finger_pin.studies.fingerprint import versions
 from finger_pin.studies.keys import describe
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.runs import FAILED, RunRecord
+from finger_pin.studies.records import FAILED, RunRecord
 
 MISSING = "missing"
 

@@ -28,7 +28,7 @@ from finger_pin.mechanism.finger_like import described_by
 from finger_pin.references.reference import SignalReference
 from finger_pin.simulation.energy import entries
 from finger_pin.simulation.simulate import simulate
-from finger_pin.studies.executing import quiet
+from finger_pin.studies.executor import quiet
 from finger_pin.studies.response import fingertip_hysteresis, grip_margin, rows, settling_time, winding_temperature
 
 #: Greatest tension for the metric of the fingertip force, N.

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from finger_pin.core.stepping.textbook import Stop
 from finger_pin.description.loading import ScenarioLike, to_toml
 from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
@@ -21,8 +22,7 @@ from finger_pin.simulation.interrupting import CtrlC
 from finger_pin.simulation.notebook import notebook_bar
 from finger_pin.studies.dataset import assemble, checked
 from finger_pin.studies.designs import Listing
-from finger_pin.studies.executing import Crew
-from finger_pin.studies.folder import Store, StudyFolder, describe_study, write
+from finger_pin.studies.executor import open_executor
 from finger_pin.studies.keys import Point, Starting
 from finger_pin.studies.metrics import Metric
 from finger_pin.studies.problem import (
@@ -35,8 +35,9 @@ from finger_pin.studies.problem import (
     radii,
     start_of,
 )
-from finger_pin.studies.runs import DONE, Progress, RunRecord, Stop, evaluate
+from finger_pin.studies.records import DONE, Progress, RunRecord, evaluate
 from finger_pin.studies.search import HOPELESS, Search, nondominated
+from finger_pin.studies.store import Store, describe_study, open_store, write
 
 PRODUCTS = ["optimise.nc", "front.csv", "front/*.toml", "figures/pareto.png"]
 DEFAULT_OBJECTIVES = ("tracking_rms", "tension_peak")
@@ -132,16 +133,15 @@ def optimise(
     )  # fmt: skip
     with ExitStack() as stack:
         asked_to_stop = stack.enter_context(CtrlC(stop))
-        crew = stack.enter_context(Crew(executor))
-        if output is None:
-            store = stack.enter_context(Store())
-        else:
+        pool = stack.enter_context(open_executor(executor))
+        store = Store()
+        if output is not None:
             described = [variable.describe() for variable in variables]
             asked = {"optimise": {**goals.describe(), **vars(effort), "variables": described}}
-            folder = StudyFolder(output, describe_study(starting, goals.metrics, asked), PRODUCTS, restart=restart)
-            store = stack.enter_context(folder).store
+            described_study = describe_study(starting, goals.metrics, asked)
+            store = stack.enter_context(open_store(output, described_study, PRODUCTS, restart=restart))
         bar = progress or notebook_bar("runs")
-        course = _Course(starting, goals, variables, store, crew, effort, bar, asked_to_stop)
+        course = _Course(starting, goals, variables, store, pool, effort, bar, asked_to_stop)
         result = _assembled(starting, goals, *course.follow(own, search))
         if output is not None:
             write(result, Path(output) / "optimise.nc")
@@ -157,7 +157,7 @@ class _Course:
     goals: Goals
     variables: Sequence[Variable]
     store: Store
-    crew: Crew
+    executor: Executor
     effort: Effort
     progress: Progress | None
     stop: Stop | None
@@ -187,7 +187,7 @@ class _Course:
                 self.progress(len(earlier) + finished, failed + failures, total)
 
         return evaluate(
-            self.starting, points, self.goals.metrics, self.store, self.crew, progress=report, stop=self.stop
+            self.starting, points, self.goals.metrics, self.store, self.executor, progress=report, stop=self.stop
         )
 
     def _judge(self, record: RunRecord) -> tuple[Array, Array]:
