@@ -127,10 +127,7 @@ def optimise(
     variables = [parse_variable(each) if isinstance(each, str) else each for each in given]
     check_variables(variables, starting)
     own = start_of(variables, starting)
-    search = Search(
-        len(variables), len(goals.objectives), len(goals.constraints), effort.population, effort.seed,
-        _shares(variables, own),
-    )  # fmt: skip
+    search = Search(len(variables), len(goals.objectives), effort.population, effort.seed, _shares(variables, own))
     with ExitStack() as stack:
         asked_to_stop = stack.enter_context(CtrlC(stop))
         pool = stack.enter_context(open_executor(executor))

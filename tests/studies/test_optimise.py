@@ -84,7 +84,7 @@ def test_no_other_design_is_better_than_one_that_is_not_dominated():
 def test_a_search_finds_the_front_of_a_problem_whose_front_is_known():
     # Binh and Korn, 1997: minimise 4 x^2 + 4 y^2 and (x - 5)^2 + (y - 5)^2 for x in [0, 5], y in [0, 3], within two
     # circles. Its front is x = y up to 3, and y = 3 beyond.
-    search = Search(2, 2, 2, 40, 1, None)
+    search = Search(2, 2, 40, 1, None)
     kept = []
     for _ in range(40):
         x, y = search.ask().T * np.array([[5.0], [3.0]])
@@ -107,7 +107,7 @@ def test_a_search_finds_the_front_of_a_problem_whose_front_is_known():
 def test_a_search_that_is_told_the_same_takes_the_same_course():
     courses = []
     for seed in (1, 1, 2):
-        search = Search(3, 2, 1, 8, seed, None)
+        search = Search(3, 2, 8, seed, None)
         asked = []
         for _ in range(4):
             designs = search.ask()
