@@ -135,7 +135,7 @@ def _prepared(scenario: Scenario, finger: Finger | None, keep: tuple[str, ...], 
 
 
 def _sharing(runs: Sequence[Scenario]) -> list[Scenario]:
-    """Return scenarios of which those with the same finger have the same object, which is then built once."""
+    """Return scenarios whose equal fingers are one object, so that it is built once."""
     first = runs[0]
     return [
         run.updated(finger=first.finger, environment=first.environment)
@@ -159,7 +159,7 @@ def _check_alike(runs: Sequence[Scenario]) -> None:
 
 
 def _check_kept(runs: Sequence[Scenario], keep: Sequence[str], finger: Finger | None) -> None:
-    """Raise unless every variable is one of at least one run."""
+    """Raise unless each variable exists in at least one run."""
     known: dict[str, Quantity] = {}
     for run in runs:
         if set(keep) <= set(known):
@@ -214,7 +214,7 @@ def _stack(runs: Sequence[Scenario], done: Mapping[int, xr.Dataset | FailedTask]
 
 
 def _labels(results: Iterable[xr.Dataset]) -> dict[str, list[str]]:
-    """Return the names along every dimension that has some, those of all results."""
+    """Return the union of all results' labels by dimension."""
     found: dict[str, dict[str, None]] = {}
     for result in results:
         for name in result.coords:

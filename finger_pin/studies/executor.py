@@ -51,7 +51,7 @@ class FailedTask:
 
     @property
     def undone(self) -> bool:
-        """Whether the executor failed, not the task."""
+        """True if the executor failed, not the task."""
         return isinstance(self.error, BrokenExecutor | CancelledError | Interrupted)
 
 
@@ -86,7 +86,7 @@ def open_executor(executor: Executor | None = None, workers: int | None = None) 
 
 
 def compile_for(executor: Executor, scenario: Callable[[], Scenario]) -> None:
-    """Fill the cache of compiled code for a scenario before other processes would each compile it."""
+    """Compile for a scenario here, so that other processes find the code in the cache."""
     if isinstance(executor, ThreadPoolExecutor):
         return
     # Its run reports why a scenario cannot be simulated.
@@ -98,7 +98,7 @@ def compile_for(executor: Executor, scenario: Callable[[], Scenario]) -> None:
 def run_tasks(
     executor: Executor, function: Callable[[_Item, Stop], _Result], items: Sequence[_Item], stop: Stop
 ) -> Iterator[tuple[int, _Result | FailedTask]]:
-    """Call a function for every item, and yield index and result of each as soon as it is there.
+    """Call a function for every item, and yield each index and result in the order of completion.
 
     Args:
         executor: The executor.

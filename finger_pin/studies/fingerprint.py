@@ -31,7 +31,7 @@ _PLAIN = (NoneType, bool, int, float, complex, str, bytes, EllipsisType)
 
 
 class UnknownDependency(Exception):
-    """A dependency that cannot be compared with its earlier self; the message names it."""
+    """Dependency without a digest; the message names it."""
 
 
 @cache
@@ -42,14 +42,14 @@ def versions() -> dict[str, str]:
 
 @cache
 def source_digest() -> str:
-    """Return a digest of all source of this package that results can depend on, and of the versions of others."""
+    """Return a digest of this package's source and of the versions of others."""
     package = Path(__file__).parent.parent
     files = [each for each in sorted(package.rglob("*.py")) if each.relative_to(package).parts[0] not in _ABOVE]
     return str(joblib.hash((versions(), [each.read_bytes() for each in files])))
 
 
 def code_digest(function: Any) -> str:
-    """Return a digest of a function's code, of the values that it encloses, and of all user code that it uses.
+    """Return a digest of a function: its code, the values that it encloses, the user code that it calls.
 
     What is installed counts by its name and version. Files that a function reads are not seen.
 
@@ -63,7 +63,7 @@ def code_digest(function: Any) -> str:
 
 
 def finger_digest(finger: Finger) -> str:
-    """Return a digest of a finger that a caller has built: description, rigid body, rows and their laws, objects.
+    """Return a digest of a custom finger: description, rigid body, rows and their laws, objects.
 
     Raises:
         UnknownDependency: If a law depends on something that has no digest.
@@ -129,7 +129,7 @@ def _names(code: CodeType) -> frozenset[str]:
 
 @cache
 def _is_installed(module: str | None) -> bool:
-    """Return whether a module belongs to this package, to Python or to an installed package, not to the user."""
+    """Return true for modules of this package, of Python and of installed packages, not the user's."""
     top = (module or "").partition(".")[0]
     if top in sys.stdlib_module_names or top == "finger_pin":
         return True

@@ -1,15 +1,12 @@
-"""Records of a study's runs: what has a record is not run again, and every run is recorded as soon as it ends."""
+"""Runs of a study: recorded as soon as they end, and not repeated once they are recorded."""
 
 from __future__ import annotations
 
-import json
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 import joblib
 
@@ -18,48 +15,12 @@ from finger_pin.description.loading import to_toml
 from finger_pin.exceptions import FingerPinError
 from finger_pin.studies.executor import FailedTask, compile_for, run_tasks
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, finger_digest, source_digest, versions
-from finger_pin.studies.keys import Point, Starting
+from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric, Run
+from finger_pin.studies.store import DONE, FAILED, RunRecord, Store
 
-DONE, FAILED = "done", "failed"
 #: Called with the numbers of finished, failed and all runs.
 Progress = Callable[[int, int, int], None]
-
-
-@dataclass(frozen=True)
-class RunRecord:
-    """The record of a run.
-
-    Attributes:
-        key: Digest of everything that determines the run.
-        point: Values of the varied keys.
-        status: `DONE` or `FAILED`.
-        reason: Why it failed; empty if it did not.
-        metrics: By name; none if it failed.
-        seconds: Wall time, s.
-    """
-
-    key: str
-    point: Point
-    status: str
-    reason: str
-    metrics: Mapping[str, float]
-    seconds: float
-
-    def to_json(self) -> str:
-        """Return it as one line of JSON; infinity is spelt as Python spells it."""
-        return json.dumps(vars(self))
-
-
-class Archive(Protocol):
-    """A place of records."""
-
-    @property
-    def records(self) -> Mapping[str, RunRecord]:
-        """All records by key."""
-
-    def append(self, record: RunRecord) -> None:
-        """Keep a record."""
 
 
 class ExecutorError(FingerPinError):
@@ -71,23 +32,23 @@ class VersionError(FingerPinError):
 
 
 def evaluate(
-    starting: Starting,
+    base: BaseScenario,
     points: Sequence[Point],
     metrics: tuple[Metric, ...],
-    archive: Archive,
+    store: Store,
     executor: Executor,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
     retry_failed: bool = False,
 ) -> list[RunRecord | None]:
-    """Do the runs that are not in an archive, keep each as it finishes, and return all in the order of the points.
+    """Do the missing runs of a store, keep each as it finishes, and return all in the order of the points.
 
     Args:
-        starting: The scenario that is varied.
+        base: The scenario that is varied.
         points: Points of the study.
         metrics: Metrics of every run.
-        archive: Archive of the records.
+        store: Store of the records.
         executor: Executor of the runs.
         progress: Called with the numbers of finished, failed and all runs, first with those found.
         stop: When it returns true, runs that have not been done are None.
@@ -96,9 +57,9 @@ def evaluate(
     Raises:
         ExecutorError: If the executor cannot go on.
     """
-    study = _study_digest(starting, metrics)
+    study = _study_digest(base, metrics)
     keys = [joblib.hash((study, dict(point))) for point in points]
-    found = {key: archive.records[key] for key in keys if key in archive.records}
+    found = {key: store.records[key] for key in keys if key in store.records}
     records = {key: each for key, each in found.items() if not (retry_failed and each.status == FAILED)}
     tasks = [(key, point) for key, point in dict(zip(keys, points, strict=True)).items() if key not in records]
 
@@ -109,27 +70,27 @@ def evaluate(
 
     report()
     if tasks:
-        compile_for(executor, lambda: starting.at(tasks[0][1]))
-    work = partial(execute, starting=starting, metrics=metrics, source=source_digest())
+        compile_for(executor, lambda: base.at(tasks[0][1]))
+    work = partial(execute, base=base, metrics=metrics, source=source_digest())
     for index, done in run_tasks(executor, work, tasks, stop or (lambda: False)):
         record = _failed(*tasks[index], done) if isinstance(done, FailedTask) else done
-        archive.append(record)
+        store.append(record)
         records[record.key] = record
         report()
     return [records.get(key) for key in keys]
 
 
 def _failed(key: str, point: Point, failed: FailedTask) -> RunRecord:
-    """Return the record of a run that ended the processes that did it, as Dask finds out."""
+    """Return the record of a run that killed its workers, or raise if the executor failed."""
     if type(failed.error).__name__ == "KilledWorker":
         return RunRecord(key, dict(point), FAILED, f"the workers that ran it died: {failed.error}", {}, 0.0)
     raise ExecutorError(f"the executor cannot go on: {failed.reason}; give an output to keep what it has finished")
 
 
 def execute(
-    task: tuple[str, Point], stop: Stop, starting: Starting, metrics: tuple[Metric, ...], source: str
+    task: tuple[str, Point], stop: Stop, base: BaseScenario, metrics: tuple[Metric, ...], source: str
 ) -> RunRecord:
-    """Simulate a point and measure it; whatever goes wrong with it is its record's reason.
+    """Simulate a point and measure it; an exception becomes the reason of a failed run.
 
     Raises:
         VersionError: If this package is not the one that asked.
@@ -142,8 +103,8 @@ def execute(
     start = time.perf_counter()
     values, status, reason = dict[str, float](), DONE, ""
     try:
-        scenario = starting.at(point)
-        run = Run(scenario, stop, starting.finger_at(scenario))
+        scenario = base.at(point)
+        run = Run(scenario, stop, base.finger_at(scenario))
         values = {metric.name: float(metric.measure(run)) for metric in metrics}
     except Exception as error:
         kind = "" if isinstance(error, FingerPinError) else f"{type(error).__name__}: "
@@ -151,11 +112,11 @@ def execute(
     return RunRecord(key, dict(point), status, reason, values, time.perf_counter() - start)
 
 
-def _study_digest(starting: Starting, metrics: Sequence[Metric]) -> str:
-    """Return a digest of all that the runs of a study have in common; a unique one if it cannot be known."""
+def _study_digest(base: BaseScenario, metrics: Sequence[Metric]) -> str:
+    """Return a digest of the common input of a study's runs, a unique one if it cannot be known."""
     try:
         codes = [code_digest(metric) for metric in metrics]
-        finger = starting.finger and finger_digest(starting.finger)
+        finger = base.finger and finger_digest(base.finger)
     except UnknownDependency:
         return uuid.uuid4().hex
-    return str(joblib.hash((to_toml(starting.scenario), codes, finger, source_digest())))
+    return str(joblib.hash((to_toml(base.scenario), codes, finger, source_digest())))

@@ -85,6 +85,6 @@ class Search:
 
 
 def nondominated(values: Array) -> Any:
-    """Return a mask of the designs that no other is better than; objectives are to be made small, shape (m, k)."""
+    """Return a mask of the nondominated designs of objectives to be minimised, shape (m, k)."""
     better = (values[:, None] <= values[None]).all(axis=2) & (values[:, None] < values[None]).any(axis=2)
     return ~better.any(axis=0)

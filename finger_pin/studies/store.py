@@ -1,4 +1,4 @@
-"""Store of a study: a folder with its question, a record of every finished run, and its results.
+"""Store of a study: a folder with its settings, a record of every finished run, and its results.
 
 A record is a line of ``runs.jsonl``, written by one append and synced before its run counts as finished. A process
 that is killed in the middle of one leaves a broken last line. The next process that opens the file cuts it off, and the
@@ -13,6 +13,7 @@ import tomllib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +25,38 @@ from finger_pin.exceptions import InputError
 from finger_pin.files import write_text
 from finger_pin.simulation.netcdf import save
 from finger_pin.studies.fingerprint import UnknownDependency, code_digest, versions
-from finger_pin.studies.keys import Starting
+from finger_pin.studies.keys import BaseScenario, Point
 from finger_pin.studies.metrics import Metric
-from finger_pin.studies.records import RunRecord
 
+DONE, FAILED = "done", "failed"
 STUDY, RUNS = "study.toml", "runs.jsonl"
 _LOCK = ".lock"
 _MARK = "# What the study in this folder asks for. The same again goes on where it stopped; runs.jsonl has every run.\n"
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """The record of a run.
+
+    Attributes:
+        key: Digest of everything that determines the run.
+        point: Values of the varied keys.
+        status: `DONE` or `FAILED`.
+        reason: Why it failed; empty if it did not.
+        metrics: By name; none if it failed.
+        seconds: Wall time, s.
+    """
+
+    key: str
+    point: Point
+    status: str
+    reason: str
+    metrics: Mapping[str, float]
+    seconds: float
+
+    def to_json(self) -> str:
+        """Return it as one line of JSON; infinity is spelt as Python spells it."""
+        return json.dumps(vars(self))
 
 
 class Store:
@@ -41,7 +67,7 @@ class Store:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        """Read the records of a file, which no other process writes; without one nothing outlives this object.
+        """Read the records of a file that no other process writes, if one is given.
 
         Raises:
             OSError: If it cannot be read or written.
@@ -88,7 +114,7 @@ class Store:
 def open_store(
     path: str | Path, asked: Mapping[str, Any], products: Sequence[str], *, restart: bool = False
 ) -> Iterator[Store]:
-    """Provide the records of the folder of a study, in which one process at a time works.
+    """Lock the folder of a study for this process, and provide its records.
 
     Args:
         path: The folder; it may exist.
@@ -119,7 +145,7 @@ def open_store(
 
 
 def _tidy(lock: filelock.BaseFileLock, made: Sequence[Path]) -> None:
-    """Release a lock and remove its file, and the folders that were made in vain."""
+    """Release a lock; remove its file and folders made in vain."""
     if lock.is_locked:
         with suppress(OSError):
             # Where a file that is open cannot be removed, the name of a lock that nobody has stays.
@@ -131,7 +157,7 @@ def _tidy(lock: filelock.BaseFileLock, made: Sequence[Path]) -> None:
 
 
 def _prepare(folder: Path, asked: Mapping[str, Any], artifacts: Sequence[str], restart: bool) -> None:
-    """Write the question of a study, unless it stands there already."""
+    """Check the folder of a study, and write its settings if it is new."""
     study, asked_text = folder / STUDY, _MARK + tomli_w.dumps(asked)
     present = [each for pattern in artifacts for each in folder.glob(pattern)]
     if present:
@@ -150,7 +176,7 @@ def _prepare(folder: Path, asked: Mapping[str, Any], artifacts: Sequence[str], r
         write_text(study, asked_text)
 
 
-def describe_study(starting: Starting, metrics: Sequence[Metric], design: Mapping[str, Any]) -> dict[str, Any]:
+def describe_study(base: BaseScenario, metrics: Sequence[Metric], design: Mapping[str, Any]) -> dict[str, Any]:
     """Return the request of a study, for a TOML file.
 
     Warns:
@@ -162,7 +188,7 @@ def describe_study(starting: Starting, metrics: Sequence[Metric], design: Mappin
         except UnknownDependency as error:
             what = f"the metric {metric.name} uses {error}, so its runs are done anew whenever they are asked for"
             warnings.warn(what, stacklevel=3)
-    scenario = starting.scenario.model_dump(mode="json", exclude_none=True)
+    scenario = base.scenario.model_dump(mode="json", exclude_none=True)
     names = [metric.name for metric in metrics]
     return {"finger_pin": versions()["finger-pin"], "metrics": names, **design, "scenario": scenario}
 

@@ -159,7 +159,9 @@ def test_an_executor_that_has_been_shut_down_is_named_in_one_line(study):
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, method):
+def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, method, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
     def marked(kind):
         return {each.name.removeprefix(kind) for each in tmp_path.glob(f"{kind}*")}
 
@@ -168,6 +170,7 @@ def test_a_stop_ends_what_other_processes_run_and_no_more_is_begun(tmp_path, met
         assert list(run_tasks(executor, work, range(40), lambda: bool(marked("begun")))) == []
     # The executor had fetched three more than the two that ran.
     assert 1 <= len(marked("begun")) <= 2 and marked("stopped") == marked("begun")
+    assert not marked("finger_pin-")
 
 
 SWEEP = """

@@ -37,7 +37,7 @@ def test_a_constraint_is_broken_by_how_far_a_value_lies_beyond_it():
 
 
 def test_a_metric_to_be_made_large_is_turned_round():
-    goals = Goals.of(["losses"], ["fingertip_force"], ["slack_time<=1"])
+    goals = Goals.from_metrics(["losses"], ["fingertip_force"], ["slack_time<=1"])
     np.testing.assert_array_equal(goals.values({"losses": 2.0, "fingertip_force": 3.0}), [2.0, -3.0])
     assert [metric.name for metric in goals.metrics] == ["losses", "fingertip_force", "slack_time"]
 
@@ -48,7 +48,7 @@ def test_a_metric_to_be_made_large_is_turned_round():
 )
 def test_goals_that_are_none_are_refused(small, large, bounds):
     with pytest.raises(fp.InputError):
-        Goals.of(small, large, bounds)
+        Goals.from_metrics(small, large, bounds)
 
 
 def test_keys_that_go_together_are_spelt_with_their_signs():

@@ -5,8 +5,7 @@ import os
 import pytest
 
 import finger_pin as fp
-from finger_pin.studies.records import RunRecord
-from finger_pin.studies.store import Store, open_store
+from finger_pin.studies.store import RunRecord, Store, open_store
 
 
 def record(key, value=1.0):
