@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
-from finger_pin.control.compiled import Bindings
-from finger_pin.control.loop_controller import LoopController
-from finger_pin.control.moved_objects import Guides
-from finger_pin.control.palm import PalmPath
+from finger_pin.control.interface import Controller, ControlSignals, Dynamics, LoopController
+from finger_pin.control.palm import PalmPath, PrescribedObjects
 from finger_pin.control.position_drive import DriveSignals
-from finger_pin.control.proportional import Controller, ControlSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
+from finger_pin.core.compiled_fingers import Bindings
+from finger_pin.core.inputs import InputTable, core_signal, held_control
 from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.kinematics import Motion
+from finger_pin.mechanism.rigid_body import Motion
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.references.signal import Signal
+from finger_pin.typing import Array
 
 _NO_FORCE = ForceSignal()
 # However close points are, steps need not be shorter than this, s.
@@ -37,33 +35,6 @@ _FINGERS: Remembered[Finger] = Remembered(4)
 _KNOTS: Remembered[Array] = Remembered(16)
 
 _Acting = tuple[Array, Array, Array | None]
-
-
-class Dynamics(Protocol):
-    """An evaluator of a finger: `Finger`, or the compiled core."""
-
-    def evaluate(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return all signals at packed states under given tensions, on a base that moves or rests."""
-
-    def exerted(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same, if that is sooner without accelerations."""
-
-    def forces(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> FingerSignals:
-        """Return the same, if that is sooner with no more than forces."""
-
-    def powers(
-        self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Return powers of the rows, and J^T F."""
-
-    def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
-        """Return fingertip and energies of the rigid body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +72,7 @@ class ClosedLoop:
     start: Array | None = None
     drives: DriveSignals | None = None
     palm: PalmPath | None = None
-    guides: Guides | None = None
+    guides: PrescribedObjects | None = None
 
     @classmethod
     def from_scenario(
@@ -143,7 +114,7 @@ class ClosedLoop:
             fingertip_force=np.squeeze([each.fingertip_force for each in acting.values()], axis=0 if alone else ()),
             dynamics=finger,
             palm=PalmPath.of(scenario.hand, start, finger, scenario.simulation.rtol),
-            guides=Guides.of(finger, start, scenario.simulation.rtol),
+            guides=PrescribedObjects.of(finger, start, scenario.simulation.rtol),
         )
         signals = [each.fingertip_force_signal or {} for each in acting.values()]
         if fingertip_force is not None:
@@ -167,7 +138,7 @@ class ClosedLoop:
 
     def rest_state(self, position: Array, velocity: Array) -> Array:
         """Return the packed state at a posture, with tendons on spools stretched by the tensions commanded there."""
-        controller, tension = self.controller.without_memory(), None
+        controller, tension = self.controller.stateless(), None
         if self.finger.actuators.names and controller is not None:
             planned = controller.command(0.0, self.reference.at(0.0), position, velocity)
             tension = planned.tension[: self.finger.routing.actuated]
@@ -247,7 +218,7 @@ class ClosedLoop:
 
     def motion(self, time: Array, state: State) -> Motion:
         """Return fingertips, base frame, and energies in the world at times (m,) and states."""
-        base, around, objects = self.base(time), self.finger.surroundings, None
+        base, around, objects = self.base(time), self.finger.scene, None
         found = self.dynamics.motion(state.position, state.velocity, base)
         if around is not None and state.object_pose is not None and state.object_velocity is not None:
             objects = around.energies(state.object_pose, state.object_velocity, base)
@@ -268,3 +239,31 @@ class ClosedLoop:
     def rhs(self, time: float, x: Array) -> Array:
         """Return x', shape (size,)."""
         return self.evaluate(time, x).finger.rate
+
+
+def compiled_control(loop: ClosedLoop) -> InputTable | None:
+    """Return a loop's controller, reference and varying force as arrays, or None if the first two are Python."""
+    if len(loop.finger.actuators.positioned) == loop.finger.mechanism.channels:
+        # Nothing of what the controller plans goes to the finger at once.
+        return sampled_control(loop)
+    control = loop.controller.as_control(loop.reference, loop.finger)
+    return None if control is None else with_force(control, loop)
+
+
+def sampled_control(loop: ClosedLoop) -> InputTable:
+    """Return inputs that hold the commands of a sampled controller, with the loop's varying force."""
+    mechanism = loop.finger.mechanism
+    return with_force(held_control(mechanism.channels, mechanism.coordinates), loop)
+
+
+def with_force(control: InputTable, loop: ClosedLoop) -> InputTable:
+    """Return inputs with the path of the palm and the force at the fingertip, its varying and its constant part."""
+    if loop.palm is not None:
+        control = control._replace(palm=core_signal(loop.palm.signal))
+    if loop.guides is not None:
+        control = control._replace(guide=core_signal(loop.guides.signal))
+    if loop.varying_force is None:
+        return control
+    force = core_signal(loop.varying_force)
+    force.harmonics[:, 0] += loop.fingertip_force.ravel()
+    return control._replace(force=force)

@@ -16,10 +16,10 @@ from finger_pin.core.evaluation.law_code import addresses, kink_column
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.path_tables import Paths, reached, read_paths
 from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import Form, RigidBody
+from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
+from finger_pin.typing import Array
 
 # Columns of the table of groups.
 FIRST, END, FED, PRESSED, KINK = range(5)
@@ -130,7 +130,7 @@ class Tables(NamedTuple):
 _KNOWN: WeakKeyDictionary[Mechanism, Tables] = WeakKeyDictionary()
 _PATHS: Remembered[Paths] = Remembered()
 _WIRED: Remembered[dict[str, Any]] = Remembered()
-_FORMS: WeakKeyDictionary[Form, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
+_FORMS: WeakKeyDictionary[Topology, tuple[Chains, dict[str, Any]]] = WeakKeyDictionary()
 _WEIGHED: WeakKeyDictionary[RigidBody, Array] = WeakKeyDictionary()
 
 

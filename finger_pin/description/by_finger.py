@@ -14,7 +14,7 @@ _Settings = TypeVar("_Settings", bound=Description)
 _OWN: Remembered[Any] = Remembered()
 
 
-def flat(table: Any) -> Any:
+def flatten(table: Any) -> Any:
     """Return ``{index = {medial = {...}}}`` as ``{index.medial = {...}}``: tables of tables lose a level."""
     return _flat(table, lambda value: all(isinstance(each, dict | Description) for each in value.values()))
 
@@ -24,7 +24,7 @@ def flat_numbers(table: Any) -> Any:
     return _flat(table, lambda value: True)
 
 
-def nested(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
+def unflatten(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> Any:
     """Serialise ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it."""
     if table is None:
         return None
@@ -38,7 +38,7 @@ def nested(table: Mapping[str, Any] | None, handler: Callable[[Any], Any]) -> An
     return found
 
 
-def given(table: Mapping[str, Description] | None) -> Any:
+def dump_set_fields(table: Mapping[str, Description] | None) -> Any:
     """Serialise tables by finger with the entries that they were given, and no others."""
     if table is None:
         return None

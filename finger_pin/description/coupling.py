@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 
 from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 _COUPLINGS: Remembered[PassiveCoupling] = Remembered()
 

@@ -13,9 +13,8 @@ from typing import Any, TypeAlias, TypeVar
 import tomli_w
 
 from finger_pin.description.caching import Remembered
-from finger_pin.description.hand import HandSettings
-from finger_pin.description.overriding import from_here, override
-from finger_pin.description.parameters import FingerDescription
+from finger_pin.description.finger import FingerDescription, HandSettings
+from finger_pin.description.overriding import normalise_overrides, override
 from finger_pin.description.reading import (
     Table,
     as_name,
@@ -148,7 +147,7 @@ def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None
         return read_scenario(name.model_dump(mode="python", exclude_unset=True), overrides) if overrides else name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
-    overrides = from_here(overrides or {}, set(Scenario.model_fields))
+    overrides = normalise_overrides(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
         return _scenario(*read_scenario_file(str(name), Path()), str(name), overrides)
 
@@ -173,7 +172,7 @@ def load_bench(
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked = from_here(overrides or {}, set(Scenario.model_fields))
+    checked = normalise_overrides(overrides or {}, set(Scenario.model_fields))
     with _depth_limited("scenario"):
         table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path())
         wanted = merge(as_table(table.pop("identify", None)), dict(identify or {}))
@@ -202,7 +201,7 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    checked, whole = from_here(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
+    checked, whole = normalise_overrides(overrides or {}, set(Scenario.model_fields)), copy.deepcopy(dict(table))
     with _depth_limited("scenario"):
         override(checked, whole, Path())
         resolve_signals(whole, Path())
@@ -236,7 +235,7 @@ def _text(description: Description) -> str:
 
 def _load(kind: str, model: type[_Described], name: str | Path, overrides: Mapping[str, Any] | None) -> _Described:
     """Load a finger or a hand."""
-    checked = from_here(overrides or {}, {kind})
+    checked = normalise_overrides(overrides or {}, {kind})
     table: Table = {kind: str(name)}
     with _depth_limited(kind):
         override(checked, table, Path())

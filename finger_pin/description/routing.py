@@ -11,13 +11,10 @@ from functools import cached_property, partial
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from finger_pin.description.caching import Remembered
-from finger_pin.description.parameters import FingerDescription
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from finger_pin.description.finger import FingerDescription
+from finger_pin.typing import Array, Indices
 
 # Below this share of the largest, an internal tension counts as none.
 _SLACK = 1e-9

@@ -19,21 +19,21 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from finger_pin.description.actuators import check_currents, check_sources
-from finger_pin.description.by_finger import error_of_finger, flat, given, nested, of_finger
+from finger_pin.description.by_finger import dump_set_fields, error_of_finger, flatten, of_finger, unflatten
 from finger_pin.description.caching import Remembered
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.effects import OF_SCENARIO, idle, shown
-from finger_pin.description.hand import HandSettings
+from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.objects import Object
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.routing import Routing
 from finger_pin.description.signals import ForceSignal, JointReference, of_axes
 from finger_pin.description.simulation_settings import InitialSettings, SimulationSettings
 from finger_pin.description.tautness import Tautness
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.description.validation import Description, FullName, Name, expand, problem, quantity, suggestion, vector
 from finger_pin.exceptions import InputError
+from finger_pin.typing import Array
 
 _Item = TypeVar("_Item")
 _PARTS: Remembered[dict[str, Scenario]] = Remembered()
@@ -52,8 +52,8 @@ class ReferenceSettings(Description):
 
     joints: dict[FullName, JointReference] = Field({}, description="By joint.")
 
-    _flat = field_validator("joints", mode="before")(flat)
-    _nested = field_serializer("joints", mode="wrap")(nested)
+    _flat = field_validator("joints", mode="before")(flatten)
+    _nested = field_serializer("joints", mode="wrap")(unflatten)
 
 
 class EnvironmentSettings(Description):
@@ -73,7 +73,7 @@ class EnvironmentSettings(Description):
     )
     fingers: dict[Name, EnvironmentSettings] | None = Field(None, description="By finger, entries that differ there.")
 
-    _sparse = field_serializer("fingers")(given)
+    _sparse = field_serializer("fingers")(dump_set_fields)
 
     objects: dict[Name, Object] | None = Field(None, description="Objects that the finger may touch, by name.")
 

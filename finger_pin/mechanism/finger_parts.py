@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from finger_pin.description.caching import Remembered
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
 from finger_pin.mechanism.actuators import Actuators
 from finger_pin.mechanism.canals import Canals
-from finger_pin.mechanism.joint_friction import JointFriction
-from finger_pin.mechanism.joint_springs import JointSprings
-from finger_pin.mechanism.routes import Routes
-from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.stroke_limiter import StrokeLimiter
+from finger_pin.mechanism.joints import JointFriction, JointSprings, StrokeLimiter
+from finger_pin.mechanism.rows import Rows, further_states
+from finger_pin.mechanism.scene import Scene
+from finger_pin.mechanism.state import Layout
+from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree import along_paths
+from finger_pin.typing import Array
 
 # Most changes of numbers leave most parts, and most tables, as they were.
 _KNOWN: Remembered[Any] = Remembered(1024)
@@ -75,7 +78,7 @@ class Parts(NamedTuple):
     def tables(
         self,
         description: FingerDescription,
-        paths: Routes | None,
+        paths: TendonPaths | None,
         of_tree: tuple[Rows, ...],
         drives: tuple[Rows, ...],
         pulled: dict[str, Array],
@@ -105,3 +108,35 @@ class Parts(NamedTuple):
 def _made(make: Any, *given: Any) -> Any:
     """Return a method's result for a part and values, anew only if either differs."""
     return _KNOWN.of((make.__self__, make.__name__, *given), lambda: make(*given))
+
+
+def state_layout(
+    tendons: Tendons,
+    motors: Actuators,
+    rows: Sequence[Rows] = (),
+    around: Scene | None = None,
+    of_tree: Sequence[Rows] = (),
+    canals: Sequence[Rows] = (),
+) -> Layout:
+    """Return the layout of tendons, motors, extra rows, drives among them, and a scene."""
+    routing = tendons.routing
+    drives, further = (further_states([table for table in rows if bool(table.pulls) == own]) for own in (True, False))
+    ringing = np.sqrt(2.0 * tendons.half_stiffness) / np.sqrt(tendons.mass)
+    found = Layout(
+        joints=routing.joints,
+        tendons=routing.tendons,
+        passive=routing.passive,
+        further=further,
+        ringing=tuple(ringing.tolist()),
+        motors=motors.names,
+        objects=() if around is None else tuple(around.free),
+        world=() if around is None else around.world,
+        contacts=() if around is None else around.contacts.names,
+        held=(*tendons.held, *(routing.tendons[motors.tendons[k]] for k in motors.held)),
+        drives=drives,
+        actuators=tuple(name for table in of_tree if table.states for name in table.names),
+        canals=tuple(name for table in canals if table.states for name in table.names),
+    )
+    # Of the same names and sizes much follows, once for all fingers.
+    known: Layout = _KNOWN.of((found,), lambda: found)
+    return known

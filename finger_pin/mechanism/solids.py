@@ -9,14 +9,15 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.caching import Remembered
+from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
-from finger_pin.description.palm import Palm
-from finger_pin.description.parameters import FingerDescription, Link
-from finger_pin.description.routing import Array
+from finger_pin.description.parameters import Link
+from finger_pin.description.placement import Palm
 from finger_pin.description.surface import Surface
 from finger_pin.description.tree import Tree
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.routes import Placed, rotation
+from finger_pin.mechanism.tendon_paths import Placed, rotation
+from finger_pin.typing import Array
 
 # A link's own z axis runs along it, which is the x axis of its joint.
 _SLIGHT = 1e-9

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.description.caching import Remembered
-from finger_pin.description.parameters import FingerDescription
-from finger_pin.description.routing import Array, Routing
+from finger_pin.description.finger import FingerDescription
+from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
 from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION
-from finger_pin.laws.passive_tendon import TENDON_HALF
-from finger_pin.mechanism.energies import Energy
-from finger_pin.mechanism.hysteresis import OF_TENDONS, hysteresis_rows
-from finger_pin.mechanism.joint_friction import bristles
-from finger_pin.mechanism.rows import Rows, pulled
+from finger_pin.laws.spring import TENDON_HALF
+from finger_pin.mechanism.joints import OF_TENDONS, bristles, hysteresis_rows
+from finger_pin.mechanism.rows import Energy, Rows, pulled
+from finger_pin.typing import Array
 
 #: What ideal sources of force supply.
 SOURCES = Energy("actuators", "actuators")

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
 from finger_pin.description.signals import SignalSettings
 from finger_pin.exceptions import InputError
-from finger_pin.laws.harmonic import harmonic, harmonic_rate
-from finger_pin.laws.quintic import quintic, quintic_curvature, quintic_rate
+from finger_pin.laws.inputs import harmonic, harmonic_rate, quintic, quintic_curvature, quintic_rate
 from finger_pin.references.sample_fitting import thinned
+from finger_pin.typing import Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

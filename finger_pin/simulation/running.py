@@ -13,10 +13,9 @@ import xarray as xr
 from finger_pin.analysis.locking_margin import locking_advice, quick_margin
 from finger_pin.analysis.passivity import micro_damping_advice
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
-from finger_pin.core.stepping.textbook import Stop, Trajectory
+from finger_pin.core.stepping.trajectory import Stop, Trajectory
 from finger_pin.description.caching import Remembered
 from finger_pin.description.loading import to_toml
-from finger_pin.description.routing import Array
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import (
     AccuracyWarning,
@@ -26,9 +25,10 @@ from finger_pin.exceptions import (
     SelfLockingWarning,
 )
 from finger_pin.simulation.accuracy import CHUNK, close_account, estimate_error, open_account, ringing, too_stiff
-from finger_pin.simulation.motions import SampledMotion
 from finger_pin.simulation.recording import check_memory, finite_part, record
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.setup import ADVICE, CHUNK_OBSERVED, Setup
+from finger_pin.typing import Array
 
 _MARGINS: Remembered[float] = Remembered()
 _DRIVEN: Remembered[str] = Remembered()
@@ -75,7 +75,7 @@ def run(
     text = to_toml(scenario)
 
     def recorded(found: Trajectory) -> xr.Dataset:
-        return record(scenario, SampledMotion(loop, found, scenario.sample_times()), setup.method, text=text)
+        return record(scenario, SampledTrajectory(loop, found, scenario.sample_times()), setup.method, text=text)
 
     watched = progress is not None or observe is not None
     first = setup.integrate(watch if watched else None, stop, chunk=CHUNK if observe is None else CHUNK_OBSERVED)

@@ -17,8 +17,8 @@ from finger_pin.core.evaluation.law_code import inlined
 from finger_pin.core.evaluation.rigid_body import ROTATION
 from finger_pin.core.jit import compiled, compiled_within
 from finger_pin.description.caching import Remembered
-from finger_pin.description.routing import Array
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.typing import Array
 
 _KNOWN: Remembered[Charts] = Remembered()
 
