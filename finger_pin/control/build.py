@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from finger_pin.control.proportional import ProportionalController, RoutedContro
 from finger_pin.control.tendon_feedforward import JointCompensation, TendonFeedforward
 from finger_pin.control.torque import FingertipForce, TorqueLaw
 from finger_pin.description.by_finger import of_finger
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.description.routing import Routing
 from finger_pin.description.scenario import Scenario
@@ -31,8 +30,6 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array
-
-_PAPERS: Remembered[LoopController] = Remembered()
 
 
 def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> LoopController:
@@ -56,7 +53,14 @@ def build_controller(scenario: ScenarioLike, finger: Finger | None = None) -> Lo
     papers = all((of_finger(given, name) if given.fingers else given).is_paper for name in fingers or ("",))
     if papers and routing.force_closure().holds:
         # Of its finger the paper's knows the routing alone.
-        return _PAPERS.of((given, routing, *fingers), partial(_built, scenario, routing, finger))
+        return _paper(scenario, routing, finger)
+    return _built(scenario, routing, finger)
+
+
+@memoised(
+    lambda scenario, routing, finger: (scenario.controller, routing, *(scenario.hand.fingers if scenario.hand else ()))
+)
+def _paper(scenario: Scenario, routing: Routing, finger: Finger | None) -> LoopController:
     return _built(scenario, routing, finger)
 
 

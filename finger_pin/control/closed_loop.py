@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from finger_pin.control.position_drive import DriveSignals
 from finger_pin.control.user_controllers import Samples, choose_controller, choose_reference
 from finger_pin.core.compiled_fingers import Bindings
 from finger_pin.core.inputs import InputTable, core_signal, held_control
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
@@ -29,12 +29,20 @@ _NO_FORCE = ForceSignal()
 # However close points are, steps need not be shorter than this, s.
 _SHORTEST = 1e-4
 
-# Nothing of a finger changes in a run: those of a scenario that is run again share it.
-_FINGERS: Remembered[Finger] = Remembered(4)
-# Likewise of signals, which runs that are prepared share.
-_KNOTS: Remembered[Array] = Remembered(16)
 
 _Acting = tuple[Array, Array, Array | None]
+
+
+# Nothing of a finger changes in a run: those of a scenario that is run again share it.
+@memoised(lambda scenario: (scenario.finger, scenario.environment), most=4)
+def _finger(scenario: Scenario) -> Finger:
+    return Finger(scenario.finger, objects=scenario.environment.objects)
+
+
+# Runs that are prepared share their signals.
+@memoised(lambda signals, tolerance: (*signals, tolerance), most=16)
+def _knots(signals: Sequence[Signal], tolerance: float) -> Array:
+    return np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +106,7 @@ class ClosedLoop:
                 or are not finite, or tensions are negative.
         """
         start, acting = scenario.simulation.start_time, scenario.environments()
-        parts = scenario.finger, scenario.environment
-        finger = finger or _FINGERS.of(parts, lambda: Finger(scenario.finger, objects=scenario.environment.objects))
+        finger = finger or _finger(scenario)
         for kind, own, described in (
             ("joints", finger.routing.joints, scenario.finger.joints),
             ("tendons", finger.routing.tendons, scenario.finger.tendons),
@@ -173,10 +180,7 @@ class ClosedLoop:
         guided = [each and each.signal for each in (self.palm, self.guides)]
         other = [each for each in (self.varying_force, *guided) if each]
         signals = (*self.reference.signals(), *self.controller.signals(), *other)
-        return _KNOTS.of(
-            (*signals, tolerance),
-            lambda: np.unique(np.concatenate([np.zeros(0), *(each.bends(tolerance) for each in signals)])),
-        ).copy()
+        return _knots(signals, tolerance).copy()
 
     def longest_step(self, tolerance: float) -> float:
         """Return a step, s, over which no signal does more than an integrator can see; infinite without steps."""

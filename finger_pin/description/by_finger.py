@@ -7,11 +7,10 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.validation import Description, problem
 
 _Settings = TypeVar("_Settings", bound=Description)
-_OWN: Remembered[Any] = Remembered()
 
 
 def flatten(table: Any) -> Any:
@@ -45,16 +44,12 @@ def dump_set_fields(table: Mapping[str, Description] | None) -> Any:
     return {name: settings.model_dump(exclude_unset=True, exclude_none=True) for name, settings in table.items()}
 
 
+@memoised(lambda settings, name: (settings, name))
 def of_finger(settings: _Settings, name: str) -> _Settings:
     """Return settings for all fingers with the entries for one, from their table ``fingers``, on top.
 
     A table of another ``kind`` replaces, rather than completes.
     """
-    found: _Settings = _OWN.of((settings, name), lambda: _of_finger(settings, name))
-    return found
-
-
-def _of_finger(settings: _Settings, name: str) -> _Settings:
     whole = settings.updated(fingers=None)
     own: _Settings | None = (getattr(settings, "fingers") or {}).get(name)  # noqa: B009
     if own is None:

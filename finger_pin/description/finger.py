@@ -6,20 +6,18 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.parameters import Joint, PassiveTendon, StrokeLimiterSettings, Tendon
 from finger_pin.description.placement import (
     PLACE,
-    REMEMBERED,
     Palm,
     actuator_of_hand,
     joined_table,
@@ -31,9 +29,6 @@ from finger_pin.description.tree import Tree
 from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
-
-_BUILT: Remembered[FingerDescription] = Remembered()
-_JOINED: Remembered[FingerDescription] = Remembered()
 
 
 class FingerDescription(Description):
@@ -224,22 +219,17 @@ class HandSettings(Description):
 
     def built(self) -> dict[str, FingerDescription]:
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
-        return {
-            name: _BUILT.of((name, placed, self.gravity), partial(self._built, name, placed))
-            for name, placed in self.fingers.items()
-        }
+        return {name: _placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
 
+    @memoised(lambda self: (self,))
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
-        return _JOINED.of((self,), self._joined)
-
-    def _joined(self) -> FingerDescription:
-        # Of hands whose palms differ all else is the same.
-        fingers = (self.name, self.title, self.gravity, *self.fingers, *self.fingers.values())
-        joined = _JOINED.of(fingers, self._put_together).model_copy()
+        joined = self._put_together().model_copy()
         joined._hand = self
         return joined
 
+    # Of hands whose palms differ all else is the same.
+    @memoised(lambda self: (self.name, self.title, self.gravity, *self.fingers, *self.fingers.values()))
     def _put_together(self) -> FingerDescription:
         parts = self.built()
         tendons, actuators = (
@@ -252,24 +242,23 @@ class HandSettings(Description):
             gravity=self.gravity,
             joints={f"{name}.{own}": joint for name, part in parts.items() for own, joint in part.joints.items()},
             tendons={
-                name: REMEMBERED.of((name, tendon), partial(tendon_of_hand, name.split(".")[0], tendon))
+                name: tendon_of_hand(name.split(".")[0], tendon)
                 for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
             },
             tendon_friction=joined_table(parts, "tendon_friction", TendonFrictionSettings),
             joint_friction=joined_table(parts, "joint_friction", JointFrictionSettings),
             passive_tendon=joined_table(parts, "passive_tendon", PassiveTendon),
             stroke_limiter=joined_table(parts, "stroke_limiter", StrokeLimiterSettings),
-            actuators={
-                name: REMEMBERED.of((name, actuator), partial(actuator_of_hand, name.split(".")[0], actuator))
-                for name, actuator in actuators.items()
-            },
+            actuators={name: actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
             touches_itself=any(part.touches_itself for part in parts.values()),
         )
 
-    def _built(self, name: str, placed: PlacedFinger) -> FingerDescription:
-        own = placed.rotation.T @ np.array(self.gravity)
-        finger = scaled(placed.finger, placed.scale)
-        return finger.updated(name=name, gravity=tuple(own.tolist()))
+
+@memoised(lambda name, placed, gravity: (name, placed, gravity))
+def _placed_finger(name: str, placed: PlacedFinger, gravity: tuple[float, float, float]) -> FingerDescription:
+    own = placed.rotation.T @ np.array(gravity)
+    finger = scaled(placed.finger, placed.scale)
+    return finger.updated(name=name, gravity=tuple(own.tolist()))
 
 
 def one_finger(description: FingerDescription) -> None:

@@ -6,13 +6,13 @@ import copy
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import tomli_w
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.overriding import normalise_overrides, override
 from finger_pin.description.reading import (
@@ -36,7 +36,6 @@ from finger_pin.exceptions import InputError
 _MANY = 10_000
 _Described = TypeVar("_Described", bound=Description)
 # Few: some have millions of numbers.
-_TEXTS: Remembered[str] = Remembered(4)
 #: Wherever a scenario is taken: itself, the name of one that ships, or the path of a file.
 ScenarioLike: TypeAlias = Scenario | str | Path
 #: Likewise a finger; a hand is one, too, and a scenario stands for its own.
@@ -221,9 +220,10 @@ def to_toml(description: Description) -> str:
         raise InputError("description", allowed, type(description).__name__)
     if isinstance(description, FingerDescription) and description.hand is not None:
         description = description.hand
-    return _TEXTS.of((description,), partial(_text, description))
+    return _text(description)
 
 
+@memoised(lambda description: (description,), most=4)
 def _text(description: Description) -> str:
     long: list[str] = []
     text = tomli_w.dumps(_plain(description.model_dump(mode="python", exclude_none=True), long))

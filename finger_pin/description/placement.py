@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial, reduce
+from functools import lru_cache, reduce
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from finger_pin.description.actuators import Actuator
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.parameters import Joint, Link, Tendon
 from finger_pin.description.recordings.series import Series, series
 from finger_pin.description.signals import SignalSettings
@@ -34,8 +34,6 @@ PLACE = vector(3, -2.0, 2.0, _MILLIMETRES)
 PATH = ("x", "y", "z", "roll", "pitch", "yaw")
 _COORDINATE = real(-12.5, 12.5)
 
-#: Joints, links, tendons, actuators and tables of numbers of many fingers.
-REMEMBERED: Remembered[Any] = Remembered(1024)
 _Table = TypeVar("_Table", bound=Description)
 _Finger = TypeVar("_Finger", bound=Description)
 
@@ -49,6 +47,29 @@ def rotation(roll: float, pitch: float, yaw: float) -> Array:
     return turned
 
 
+# Powers of the scale that a link's numbers go with.
+_POWERS = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
+_POWERS |= {"transverse_inertia": 5, "axial_inertia": 5}
+
+
+@memoised(lambda link, scale: (link, scale), most=1024)
+def _scaled_link(link: Link, scale: float) -> Link:
+    return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in _POWERS.items()})
+
+
+@memoised(lambda tendon, scale: (tendon, scale), most=1024)
+def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
+    crossings = {
+        joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
+    }
+    return tendon.updated(crossings=crossings)
+
+
+@memoised(lambda joint, scale: (joint, scale), most=1024)
+def _scaled_joint(joint: Joint, scale: float) -> Joint:
+    return joint.updated(link=joint.link and _scaled_link(joint.link, scale))
+
+
 def scaled(finger: _Finger, scale: float) -> _Finger:
     """Return a finger of the same shape and material in another size.
 
@@ -59,28 +80,8 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     if scale == 1.0:
         return finger
     tables: Any = finger
-    powers = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
-    powers |= {"transverse_inertia": 5, "axial_inertia": 5}
-
-    def scaled_link(link: Link) -> Link:
-        return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in powers.items()})
-
-    def scaled_tendon(tendon: Tendon) -> Tendon:
-        crossings = {
-            joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
-        }
-        return tendon.updated(crossings=crossings)
-
-    def scaled_joint(joint: Joint) -> Joint:
-        link = joint.link and REMEMBERED.of((joint.link, scale), partial(scaled_link, joint.link))
-        return joint.updated(link=link)
-
-    joints = {
-        name: REMEMBERED.of((joint, scale), partial(scaled_joint, joint)) for name, joint in tables.joints.items()
-    }
-    tendons = {
-        name: REMEMBERED.of((tendon, scale), partial(scaled_tendon, tendon)) for name, tendon in tables.tendons.items()
-    }
+    joints = {name: _scaled_joint(joint, scale) for name, joint in tables.joints.items()}
+    tendons = {name: _scaled_tendon(tendon, scale) for name, tendon in tables.tendons.items()}
     friction = tables.joint_friction
     lengths = {
         key: tuple((scale * expand(getattr(friction, key), len(joints))).tolist()) for key in ("coulomb", "stiction")
@@ -89,11 +90,13 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     return finger.updated(**update)
 
 
+@memoised(lambda finger, tendon: (finger, tendon), most=1024)
 def tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
     """Return a tendon whose crossings are of the joints of a hand."""
     return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})
 
 
+@memoised(lambda finger, actuator: (finger, actuator), most=1024)
 def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
     """Return an actuator whose tendons are those of a hand."""
     return actuator.updated(tendons=tuple(f"{finger}.{tendon}" for tendon in actuator.tendons))
@@ -102,9 +105,13 @@ def actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
 def joined_table(parts: Mapping[str, Any], group: str, table: type[_Table]) -> _Table:
     """Return a table of all fingers, whose entries are lists of numbers in the order of the whole."""
     tables: list[_Table] = [getattr(part, group) for part in parts.values()]
-    kinds = [_kinds(part, group) for part in parts.values()]
-    found: _Table = REMEMBERED.of((*tables, *kinds), lambda: table.model_construct(**_lists(tables, kinds)))
-    return found
+    joined: _Table = _joined(table, tables, [_kinds(part, group) for part in parts.values()])
+    return joined
+
+
+@memoised(lambda table, tables, kinds: (*tables, *kinds), most=1024)
+def _joined(table: Any, tables: Sequence[Any], kinds: list[tuple[str, ...]]) -> Any:
+    return table.model_construct(**_lists(tables, kinds))
 
 
 def _kinds(part: Any, group: str) -> tuple[str, ...]:

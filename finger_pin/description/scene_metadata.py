@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.objects import Object
 from finger_pin.description.scenario import EnvironmentSettings, Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
-
-_WRITTEN: Remembered[dict[str, str]] = Remembered(4)
 
 
 class Embedded(NamedTuple):
@@ -31,10 +29,10 @@ class Embedded(NamedTuple):
 
 def scene_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a result of a scenario from which `read_scene` reads."""
-    own, around = scenario.hand or scenario.finger, scenario.environment
-    return _WRITTEN.of((own, around), lambda: _written(own, around))
+    return _written(scenario.hand or scenario.finger, scenario.environment)
 
 
+@memoised(lambda own, around: (own, around), most=4)
 def _written(own: Description, around: EnvironmentSettings) -> dict[str, str]:
     kind = "hand" if isinstance(own, HandSettings) else "finger"
     objects = {name: _plain(each) for name, each in (around.objects or {}).items()}

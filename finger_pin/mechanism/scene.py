@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.description.parameters import Link
@@ -19,18 +18,15 @@ from finger_pin.mechanism.contacts import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.gaps import PRISM
 from finger_pin.mechanism.mechanism import Mechanism
-from finger_pin.mechanism.rigid_body import RigidBody
+from finger_pin.mechanism.rigid_body import RigidBody, Topology
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.solids import WORLD, add_free_objects, finger_solids, object_solids, pairs_within, tree_solids
 from finger_pin.mechanism.state import State
 from finger_pin.mechanism.tendon_paths import Placed
-from finger_pin.typing import Array
+from finger_pin.typing import Array, Indices
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
 POSE, VELOCITY = 7, 6
-_CONTACTS: Remembered[Rows] = Remembered()
-_SPREAD: Remembered[Rows] = Remembered(1024)
-_CHECKED: Remembered[None] = Remembered()
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:
@@ -40,6 +36,37 @@ def _links(description: FingerDescription) -> dict[str, Link]:
             raise InputError(f"finger.joints.{name}.link", "is needed for contacts, which take its size from there")
         links[name] = joint.link
     return links
+
+
+def _touching(
+    form: Topology,
+    objects: Mapping[str, Object],
+    description: FingerDescription,
+    _: RigidBody,
+    width: int,
+    placed: object,
+) -> tuple[object, ...]:
+    """Return all that contacts depend on: how heavy objects are, and where they move, is nothing to them."""
+    forms = (
+        (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, *place)
+        for name, each in objects.items()
+        for place in [(each.position, each.orientation)]
+    )
+    carried = (joint.link for joint in description.joints.values())
+    links = ((link.length, link.width, link.offset) for link in carried if link)
+    hand = description.hand
+    pairs = hand and hand.fingers_touch, frozenset(pairs_within(description))
+    return (form, *pairs, width, *links, *forms)
+
+
+@memoised(lambda form, places, width: (form, places.tobytes(), width), most=1024)
+def _spread(form: Rows, places: Indices, width: int) -> Rows:
+    return form.spread(places, width)
+
+
+@memoised(lambda contacts, body, placed: (contacts, body.form, placed.tobytes()))
+def _check_start(contacts: Rows, body: RigidBody, placed: Array) -> None:
+    check_start(contacts, body, placed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,20 +111,13 @@ class Scene:
             if each.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
-        # How heavy objects are, and where they move, is nothing to their contacts.
-        forms = [
-            (name, each.moves, each.mass is None, each.frame, each.shape, each.sizes, each.surface, *place)
-            for name, each in objects.items()
-            for place in [(each.position, each.orientation)]
-        ]
-        carried = (joint.link for joint in description.joints.values())
-        links = [(link.length, link.width, link.offset) for link in carried if link]
-        touching = hand and hand.fingers_touch, frozenset(pairs_within(description)), width
-        make = partial(cls._contacts, objects, description, extended, width, placed)
-        return cls(objects, free, extended, _CONTACTS.of((mechanism.body.form, *touching, *links, *forms), make))
+        contacts = cls._contacts(mechanism.body.form, objects, description, extended, width, placed)
+        return cls(objects, free, extended, contacts)
 
     @staticmethod
+    @memoised(_touching)
     def _contacts(
+        form: Topology,
         objects: Mapping[str, Object],
         description: FingerDescription,
         extended: RigidBody,
@@ -140,7 +160,7 @@ class Scene:
         width = bodies + lumps
         rows = []
         for table in mechanism.rows:
-            form = _SPREAD.of((table.form, places.tobytes(), width), partial(table.form.spread, places, width))
+            form = _spread(table.form, places, width)
             rows.append(form if table.form is table else form.numbered(table.parameters))
         lumps_of = mechanism.lumps, mechanism.inertia
         guided = np.full(bodies + lumps, -1)
@@ -169,9 +189,7 @@ class Scene:
         """
         placed = _placed(state)
         # Many runs start alike.
-        _CHECKED.of(
-            (self.contacts, self.body.form, placed.tobytes()), lambda: check_start(self.contacts, self.body, placed)
-        )
+        _check_start(self.contacts, self.body, placed)
 
     @property
     def mass(self) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
@@ -31,7 +31,6 @@ BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _HALVES = ("proximal", "distal")
 # What the law calls otherwise.
 _NAMES = {"ratio": "stiction_ratio"}
-_WIRED: Remembered[list[Rows]] = Remembered()
 _STRETCHING = Energy("passive_hysteresis", "passive tendons stretching")
 
 
@@ -157,7 +156,7 @@ class Tendons:
         if self.held:
             return self._rows(drives, motors)
         # How they are wired, other numbers of friction leave alone.
-        tables = _WIRED.of((self.routing, *(each.form for each in drives), motors), lambda: self._rows(drives, motors))
+        tables = self._wired(drives, motors)
         friction = self._friction
         halves, *_, driven, passive = tables
         taken, actuated = driven.parameters[-1:], self.routing.actuated
@@ -167,6 +166,10 @@ class Tendons:
             driven.numbered(np.concatenate([friction[:, :actuated], taken])),
             passive.numbered(friction[:, actuated:]),
         ]
+
+    @memoised(lambda self, drives, motors: (self.routing, *(each.form for each in drives), motors))
+    def _wired(self, drives: Sequence[Rows], motors: int) -> list[Rows]:
+        return self._rows(drives, motors)
 
     @property
     def _friction(self) -> Array:

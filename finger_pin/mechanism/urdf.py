@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
 
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.description.finger import FingerDescription, HandSettings
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.parameters import Link
@@ -20,9 +20,6 @@ from finger_pin.mechanism.shapes import MATERIALS, Shape, link_shapes, pad_shape
 
 BASE_FRAME = "base"
 TIP_FRAME = "fingertip"
-_BODIES: Remembered[RigidBody] = Remembered()
-_FORMS: Remembered[Topology] = Remembered()
-_HANDS: Remembered[RigidBody] = Remembered()
 
 #: Tension that the effort limits allow each tendon, N, and the velocity limit of each joint, rad/s.
 #: They are for readers of the URDF that want some; the simulation applies neither.
@@ -98,21 +95,30 @@ def effort_limit(description: FingerDescription, joint: str) -> float:
 
 def build_rigid_body(description: FingerDescription) -> RigidBody:
     """Return the rigid body of a finger or of a hand's fingers: URDF read by Pinocchio, with its gravity."""
-    hand, joints = description.hand, description.joints
-    if hand is not None:
-        return build_hand(hand)
-    # By value: numbers that change elsewhere make new descriptions of the same links.
-    links = [joint.link and tuple(getattr(joint.link, name) for name in Link.model_fields) for joint in joints.values()]
-    return _BODIES.of((description.name, description.gravity, *joints, *links), partial(_build, description))
+    return _build(description) if description.hand is None else build_hand(description.hand)
 
 
+def _linked(description: FingerDescription) -> tuple[object, ...]:
+    """Return all that a finger's body depends on; by value, as other numbers make new descriptions of its links."""
+    links = (joint.link for joint in description.joints.values())
+    values = (link and tuple(getattr(link, name) for name in Link.model_fields) for link in links)
+    return (description.name, description.gravity, *description.joints, *values)
+
+
+@memoised(_linked)
 def _build(description: FingerDescription) -> RigidBody:
     model = _read(to_urdf(description, drawn=False)).copy()
     model.gravity.linear[:] = description.gravity
     body = RigidBody(model, TIP_FRAME)
     places = [(name, each.length, each.offset, each.twist) for name, each in _links(description).items()]
-    body.form = _FORMS.of((*places,), Topology)
+    body.form = _topology(*places)
     return body
+
+
+@memoised(lambda *places: places)
+def _topology(*places: object) -> Topology:
+    """Return the topology of links of some lengths, offsets and twists, the same for the same ones."""
+    return Topology()
 
 
 @lru_cache(maxsize=16)
@@ -127,15 +133,19 @@ def build_hand(hand: HandSettings) -> RigidBody:
     parts = {name: build_rigid_body(finger.model_copy(update=pulled)) for name, finger in hand.built().items()}
     placed = tuple((name, each.position, each.orientation) for name, each in hand.fingers.items())
 
-    def join() -> RigidBody:
-        places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
-        return join_bodies(parts, places)
+    return _weighed_hand(hand, placed, parts)
 
-    def weigh() -> RigidBody:
-        joined = _HANDS.of((*placed, *(part.form for part in parts.values())), join)
-        return joined.weighing([each for part in parts.values() for each in part.inertias], hand.gravity)
 
-    return _BODIES.of((hand.gravity, *placed, *parts.values()), weigh)
+@memoised(lambda hand, placed, parts: (hand.gravity, *placed, *parts.values()))
+def _weighed_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
+    joined = _joined_hand(hand, placed, parts)
+    return joined.weighing([each for part in parts.values() for each in part.inertias], hand.gravity)
+
+
+@memoised(lambda hand, placed, parts: (*placed, *(part.form for part in parts.values())))
+def _joined_hand(hand: HandSettings, placed: tuple[object, ...], parts: Mapping[str, RigidBody]) -> RigidBody:
+    places = {name: pin.SE3(each.rotation, np.array(each.position)) for name, each in hand.fingers.items()}
+    return join_bodies(parts, places)
 
 
 def _links(description: FingerDescription) -> dict[str, Link]:

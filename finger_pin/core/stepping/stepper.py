@@ -20,7 +20,7 @@ from finger_pin.core.stepping.islands import Island, find_islands, groups_of, se
 from finger_pin.core.stepping.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables import Tables, build_tables
 from finger_pin.core.threads import in_threads
-from finger_pin.description.caching import Remembered
+from finger_pin.description.caching import memoised
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.typing import Array
 
@@ -30,7 +30,6 @@ Moments = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 
 # Of mechanisms that are wired alike.
-_ISLANDS: Remembered[list[Island]] = Remembered()
 
 # As often the error that is carried along counts.
 _TWICE = 2.0
@@ -292,7 +291,12 @@ class Stepper:
         return failure(part, status, [names[at] for at in self.places(part.island)])
 
 
+def _wires(wires: bytes, tables: Tables, control: InputTable) -> tuple[object, ...]:
+    arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
+    return (wires, control.kind, *map(len, arrays))
+
+
+@memoised(_wires)
 def _islands(wires: bytes, tables: Tables, control: InputTable) -> list[Island]:
     """Return the islands of a mechanism under its inputs, found anew only for another wiring."""
-    arrays = tables.parents, tables.lumps, tables.state, control.tension, control.minimum
-    return _ISLANDS.of((wires, control.kind, *map(len, arrays)), partial(find_islands, tables, control))
+    return find_islands(tables, control)
