@@ -58,7 +58,7 @@ def simulate(
         control_period: Sampling period of the controller, s, in place of the scenario's ``controller.sampling.period``;
             without either it is continuous. Compiled methods only.
         progress: Called with the simulated time, s, now and then; in a notebook there is a bar by default.
-        observe: Called with the simulated time, s, and all signals every few steps, such as `LiveView.observe`.
+        observe: Called with the simulated time, s, and all signals every few steps.
         stop: Asked now and then; when it returns true the simulation ends there.
 
     Returns:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.scene_metadata import described
+from finger_pin.description.scene_metadata import read_scene
 from finger_pin.typing import Array
 
 SETTLED = 1.0
@@ -86,7 +86,7 @@ def compare(name: str, result: xr.Dataset, coupling: Array) -> Comparison:
         coupling: H_c of its finger, shape (t, n), m.
     """
     part = result.sel(time=slice(SETTLED, None))
-    tendons = described(result.attrs).finger.tendons
+    tendons = read_scene(result.attrs).finger.tendons
     passive = np.array([tendons[str(name)].kind == "passive" for name in result["tendon"].values])
     error = np.rad2deg(part["tracking_error"].transpose("time", "joint").values)
     rows = coupling[passive]

@@ -19,7 +19,7 @@ from finger_pin.analysis import (
     tension_for_force,
 )
 from finger_pin.analysis.transmission import transmission_efficiency, transmission_in_motion
-from finger_pin.description.scene_metadata import embedded
+from finger_pin.description.scene_metadata import scene_metadata
 from finger_pin.views import plots
 from finger_pin.views.viewer.animation import animation_page, posture_page
 
@@ -102,7 +102,7 @@ def still(finger, samples=3):
     return xr.Dataset(
         {**at_joints, **at_tendons, **angles, "fingertip_force": (("time", "axis"), np.zeros((samples, 3)))},
         {**places, "tendon": list(finger.routing.tendons)},
-        embedded(bending(finger.description)),
+        scene_metadata(bending(finger.description)),
     )
 
 

@@ -72,7 +72,7 @@ def animation_page(
     seen = motion.palm and LinkPoses(motion.palm.rotation[every], motion.palm.translation[every])
     beside = Playback.of(ghost).ghost(motion.time) if ghost is not None else None
     header = motion.scene.header(
-        motion.title, motion.position[every], motion.largest, live=False, forces=forces, ghost=beside, palm=seen
+        motion.title, motion.position[every], motion.largest, forces=forces, ghost=beside, palm=seen
     )
     chunk = motion.scene.chunk(motion.time, motion.position, motion.tension, motion.palm)
     if beside is not None:
@@ -96,7 +96,7 @@ def posture_page(finger: FingerLike, forces: ForcePolytope, strands: ArrayLike |
     tension = np.zeros((1, len(scene.strands))) if strands is None else np.asarray(strands, dtype=float)[None]
     position = forces.position[None]
     title = description.title or description.name
-    header = scene.header(title, position, float(tension.max()), live=False, forces=forces)
+    header = scene.header(title, position, float(tension.max()), forces=forces)
     return render({**header, "chunks": [scene.chunk([0.0], position, tension)]})
 
 

@@ -119,7 +119,6 @@ class Scene:
         joint_positions: ArrayLike,
         largest_tension: float,
         *,
-        live: bool,
         forces: ForcePolytope | None = None,
         ghost: Ghost | None = None,
         palm: LinkPoses | None = None,
@@ -130,7 +129,6 @@ class Scene:
             title: Shown above the legend.
             joint_positions: Postures that the camera must have in view, shape (m, n), rad.
             largest_tension: Tension that the legend must reach, N.
-            live: Whether frames will come from the server.
             forces: Drawn at the fingertip of its posture, if given.
             ghost: Another finger, drawn faintly beside this one, if given.
             palm: Poses of the palm at those positions, if it moves.
@@ -158,7 +156,6 @@ class Scene:
         drawn = list(shown.commands()) if shown is not None else []
         return {
             "title": title,
-            "live": live,
             "commands": [root_command(turn), *solid_commands(geometry, tube), *drawn],
             "ghost": ghost.header() if ghost is not None else None,
             "forces": shown.note if shown is not None else "",
