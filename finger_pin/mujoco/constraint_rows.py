@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger_pin.mujoco.memory import compiled, integer, integer_in, integers, number_in, numbers, size
+from finger_pin.core.jit import compiled
+from finger_pin.mujoco.memory import integer, integer_in, integers, number_in, numbers, size
 
 # What a row's frictionloss is at least, N: MuJoCo drops rows that have none.
 _NOTHING = 1e-12

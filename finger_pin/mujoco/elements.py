@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from finger_pin.core.jit import compiled
 from finger_pin.mechanism.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
@@ -21,7 +22,7 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     VISCOUS,
 )
 from finger_pin.mujoco.loads import between, spring, turn_of_path
-from finger_pin.mujoco.memory import compiled, integer_in, integers, number_in, numbers
+from finger_pin.mujoco.memory import integer_in, integers, number_in, numbers
 
 
 @compiled

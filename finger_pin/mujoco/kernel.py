@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from finger_pin.core.jit import compiled, scratch
 from finger_pin.mechanism.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
@@ -34,7 +35,6 @@ from finger_pin.mujoco.constraint_rows import row_forces, write_rows
 from finger_pin.mujoco.elements import mass, pin, tendon
 from finger_pin.mujoco.loads import contact_loads, driven, held_tensions
 from finger_pin.mujoco.memory import (
-    compiled,
     flags,
     integer,
     integer_in,
@@ -42,7 +42,6 @@ from finger_pin.mujoco.memory import (
     number,
     numbers,
     numbers_at,
-    scratch,
     size,
     words,
     zeros,

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
-
+from finger_pin.core.jit import compiled, power_over
 from finger_pin.mujoco.memory import (
-    compiled,
     flags,
     integer,
     integer_in,
@@ -17,7 +15,6 @@ from finger_pin.mujoco.memory import (
     number_in,
     numbers,
     numbers_at,
-    power_over,
     size,
 )
 
@@ -66,7 +63,7 @@ def between(points: Any, first: Any, second: Any) -> Any:
     )
 
 
-@numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})
+@compiled
 def turn_of_path(d: Any, of: Any, tendon: Any) -> Any:
     """Return half turns, rad, and the complex number whose angle is the rest by which a spatial tendon's path turns.
 

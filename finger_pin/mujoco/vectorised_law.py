@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from finger_pin.core.jit import compiled
 from finger_pin.laws.bristle import friction_coefficient, friction_level
 from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.exchange.mujoco_friction import (
@@ -24,7 +25,6 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STRIBECK,
     VISCOUS,
 )
-from finger_pin.mujoco.memory import compiled
 from finger_pin.mujoco.vector_functions import angle, compiled_law, exponential
 
 #: How many frictions a block has, and how many numbers it is.

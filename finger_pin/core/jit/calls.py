@@ -1,4 +1,4 @@
-"""Calls of functions at an address, and rows of numbers read and written, as compiled code does them."""
+"""Calls of functions at an address, and memory read and written, as compiled code does them."""
 
 from __future__ import annotations
 
@@ -111,6 +111,69 @@ def put(_typing: Any, table: Any, first: Any, stride: Any, values: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(table, types.int64, types.int64, values), generate
+
+
+def load(kind: Any) -> Any:
+    """Return a function that reads one number of a type at an address."""
+
+    @_generated
+    def load(_typing: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
+
+        return kind(address), generate
+
+    return load
+
+
+def view(kind: Any) -> Any:
+    """Return a function that gives the numbers of a type at an address, by index.
+
+    An array of numba's would ask of each index whether it is negative.
+    """
+
+    @_generated
+    def view(_typing: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_data_type(kind).as_pointer())
+
+        return types.CPointer(kind)(address), generate
+
+    return view
+
+
+@_generated
+def scratch(_typing: Any, count: Any) -> Any:
+    """Return the address of room for numbers on the caller's stack: an array of NumPy's would be allocated anew."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.ptrtoint(builder.alloca(ir.DoubleType(), size=arguments[0]), ir.IntType(64))
+
+    return types.int64(types.int64), generate
+
+
+@_generated
+def two_to_the(_typing: Any, rounded: Any) -> Any:
+    """Return 2^n of a number with the integer n in its last bits, as bits of its exponent."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        exponent = builder.shl(builder.bitcast(arguments[0], word), word(52))
+        return builder.bitcast(builder.add(exponent, word(1023 << 52)), ir.DoubleType())
+
+    return types.float64(types.float64), generate
+
+
+@_generated
+def power_over(_typing: Any, value: Any) -> Any:
+    """Return the power of two from 1 / x to 2 / x, by the bits of a positive number's exponent."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        exponent = builder.and_(builder.bitcast(arguments[0], word), word(2047 << 52))
+        return builder.bitcast(builder.sub(word(2046 << 52), exponent), ir.DoubleType())
+
+    return types.float64(types.float64), generate
 
 
 @compiled

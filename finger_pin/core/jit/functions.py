@@ -2,7 +2,7 @@
 
 Numba keeps code beside the file that a function stands in, under the function's name, as long as that file is the
 same. It sees neither what a function calls in other files nor which globals it was given: so functions are handed to
-it under a name that tells all that they reach (`dependencies`), as if they stood in an empty file of the cache's
+it under a name that has a digest of all that they reach (`digests`), as if they stood in an empty file of the cache's
 folder.
 Where no folder can be written, everything is compiled anew in each process. What takes its time is said once, as a
 warning of the logger ``finger_pin``, which Python prints on standard error unless logging is set up otherwise.
@@ -25,8 +25,7 @@ from typing import Any, TypeVar
 import numba
 import platformdirs
 
-from finger_pin.core.jit.dependencies import Unknown, reached
-from finger_pin.core.jit.numba_internals import INTERNAL
+from finger_pin.core.jit.digests import Undigestible, source_digest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _LOGGER = logging.getLogger("finger_pin")
@@ -34,7 +33,7 @@ _LOGGER = logging.getLogger("finger_pin")
 # Of all that is compiled: IEEE arithmetic is kept, so that NaN stays NaN; only a product and a sum may be fused.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 # Arrays are free to pass only where calls are inlined; nobody calls these functions from outside.
-_INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, **INTERNAL}
+_INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 
 def compiled(function: _Function) -> _Function:
@@ -53,7 +52,6 @@ def compiled_within(function: _Function) -> _Function:
 
 def compiled_loosely(function: _Function) -> _Function:
     """Return the function compiled as `compiled` does, with sums in any order, for vector instructions."""
-    vars(function)["loose"] = True
     return numba.njit(**_INLINED | {"fastmath": {"contract", "reassoc"}})(function)  # type: ignore[no-any-return]
 
 
@@ -101,7 +99,7 @@ if hasattr(os, "register_at_fork"):
 _living: list[Any] = []
 
 
-def address_of(signature: str, function: FunctionType, announced: bool = True) -> int:
+def address_of(signature: str, function: Callable[..., Any], announced: bool = True) -> int:
     """Return the address of the function compiled for C; it lives as long as the process.
 
     Args:
@@ -109,6 +107,7 @@ def address_of(signature: str, function: FunctionType, announced: bool = True) -
         function: The function. Nothing tells the caller of an exception: it must raise none.
         announced: Whether it is said that compiling takes its time.
     """
+    assert isinstance(function, FunctionType)
     made: Any
     with _lock:
         named = _named(function)
@@ -145,8 +144,8 @@ def _named(function: FunctionType) -> FunctionType | None:
     """Return the function as numba is to keep it, or None if it cannot be kept."""
     place = cache_place()
     try:
-        name = f"{function.__name__}-{reached(function)}"
-    except Unknown:
+        name = f"{function.__name__}-{source_digest(function)}"
+    except Undigestible:
         return None
     if place is None:
         return None

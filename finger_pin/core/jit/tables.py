@@ -1,8 +1,7 @@
 """Arguments handed to compiled code once: unpacking some eighty arrays costs as much as a small step does.
 
 `bound` writes a table of arrays into one `Block` of machine words, from which `bound_at` reads at no cost at every
-later call. To compiled code a table is a pointer, whose attributes are its fields: passing a pointer instead of some
-hundred numbers is what compiling quickly depends on.
+later call.
 """
 
 from __future__ import annotations
@@ -11,16 +10,12 @@ import ctypes
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from finger_pin.core.jit.functions import Unit
-from finger_pin.core.jit.kinds import Kind, Numbers
+from finger_pin.core.jit.struct_types import Kind, Numbers
 
 _Table = TypeVar("_Table", bound=tuple[Any, ...])
 _DTYPES = {name: np.dtype(name) for name in ("float64", "int64")}
-# Callers see another signature than numba's.
-_generated: Any = intrinsic
 
 
 def refuse_copy(holder: Any) -> NoReturn:
@@ -181,7 +176,7 @@ def _address(array: Any) -> int:
 
 
 def _write(table: Any, kind: Kind, words: list[int]) -> None:
-    for value, own in zip(table, kind.fields.values(), strict=True):
+    for value, own in zip(table, kind.kinds.values(), strict=True):
         if isinstance(own, Numbers):
             fitting = isinstance(value, np.ndarray) and value.ndim == own.dimensions and value.flags.c_contiguous
             if not fitting or value.dtype != _DTYPES[own.dtype]:
@@ -195,13 +190,3 @@ def _write(table: Any, kind: Kind, words: list[int]) -> None:
             words.append(int(np.float64(value).view(np.int64)))
         else:
             raise TypeError(f"{value!r} cannot be bound as {own}")
-
-
-@_generated
-def bound_at(_typing: Any, address: Any, kind: Any) -> Any:
-    """Return the table at the address of a block that `bound` has filled."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
-
-    return kind.instance_type(types.int64, kind), generate
