@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from finger_pin.core.jit import compiled
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.exchange.mujoco_friction import (
     BRANCH,
     DRAG,
     FLOOR,

@@ -11,7 +11,7 @@ import mujoco
 
 from finger_pin.core.jit import address_of
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.exchange import mujoco_friction as table
+from finger_pin.exchange import mujoco_friction as table
 from finger_pin.mujoco import kernel
 from finger_pin.mujoco.layout import layout
 

@@ -9,9 +9,7 @@ import math
 from typing import Any
 
 from finger_pin.core.jit import compiled
-from finger_pin.laws.bristle import friction_coefficient, friction_level
-from finger_pin.laws.capstan import capstan_coefficient
-from finger_pin.mechanism.exchange.mujoco_friction import (
+from finger_pin.exchange.mujoco_friction import (
     COULOMB,
     DRAG,
     EXPONENT,
@@ -25,6 +23,8 @@ from finger_pin.mechanism.exchange.mujoco_friction import (
     STRIBECK,
     VISCOUS,
 )
+from finger_pin.laws.bristle import friction_coefficient, friction_level
+from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mujoco.vector_functions import angle, compiled_law, exponential
 
 #: How many frictions a block has, and how many numbers it is.

@@ -20,12 +20,12 @@ from finger_pin.core.stepping.integrator import joined
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.sensitivity_equations import NearbyMotion, differentiate, fits
 from finger_pin.core.stepping.stepper import Stepper
-from finger_pin.core.stepping.textbook import Trajectory
+from finger_pin.core.stepping.trajectory import Trajectory
 from finger_pin.core.threads import in_threads
-from finger_pin.description.routing import Array
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.run_arrays import RunArrays
 from finger_pin.simulation.setup import Setup
+from finger_pin.typing import Array
 
 #: Change of a number, of its size: far above rounding, far below where anything bends.
 CHANGE = 1e-7

@@ -14,7 +14,7 @@ from numba import types
 from numba.extending import intrinsic, lower_getattr_generic, models, register_model
 from numpy.typing import NDArray
 
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 #: Bytes of a machine word.
 WORD = 8

@@ -26,7 +26,7 @@ from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import Part
 from finger_pin.core.stepping.radau import BACK, LANES, MATRIX, NODES, SLOPE, SWEEP
 from finger_pin.core.tables import END, FIRST, KINK, Tables
-from finger_pin.description.routing import Array
+from finger_pin.typing import Array
 
 # A step that ends at a knot ends so much before it, of the time.
 _BEFORE = 1.0 - 2.0**-53
