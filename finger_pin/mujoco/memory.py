@@ -6,36 +6,36 @@ from typing import Any
 
 import numpy as np
 
-from finger_pin.core.jit import compiled, load, types, view
+from finger_pin.core.jit import load, njit_inline, types, view
 
 _load_number, _load_int, _load_word = (load(each) for each in (types.float64, types.int32, types.int64))
 
 
-@compiled
+@njit_inline
 def size(owner: Any, offset: Any) -> Any:
     """Return a number of mjtSize, or an address."""
     return _load_word(owner + offset)
 
 
-@compiled
+@njit_inline
 def integer(owner: Any, offset: Any) -> Any:
     """Return a number of int."""
     return np.int64(_load_int(owner + offset))
 
 
-@compiled
+@njit_inline
 def number(owner: Any, offset: Any) -> Any:
     """Return a number of mjtNum."""
     return _load_number(owner + offset)
 
 
-@compiled
+@njit_inline
 def number_in(owner: Any, offset: Any, index: Any) -> Any:
     """Return a number of an array of mjtNum."""
     return _load_number(_load_word(owner + offset) + 8 * index)
 
 
-@compiled
+@njit_inline
 def integer_in(owner: Any, offset: Any, index: Any) -> Any:
     """Return a number of an array of int."""
     return np.int64(_load_int(_load_word(owner + offset) + 4 * index))
@@ -46,43 +46,43 @@ _view_numbers, _view_ints, _view_words, _view_flags = (
 )
 
 
-@compiled
+@njit_inline
 def numbers(owner: Any, offset: Any, first: Any = 0) -> Any:
     """Return an array of mjtNum from one of them on."""
     return _view_numbers(size(owner, offset) + 8 * first)
 
 
-@compiled
+@njit_inline
 def integers(owner: Any, offset: Any, first: Any = 0) -> Any:
     """Return an array of int from one of them on."""
     return _view_ints(size(owner, offset) + 4 * first)
 
 
-@compiled
+@njit_inline
 def flags(owner: Any, offset: Any) -> Any:
     """Return an array of mjtBool or char."""
     return _view_flags(size(owner, offset))
 
 
-@compiled
+@njit_inline
 def words(owner: Any, offset: Any) -> Any:
     """Return an array of uintptr_t."""
     return _view_words(size(owner, offset))
 
 
-@compiled
+@njit_inline
 def numbers_at(address: Any) -> Any:
     """Return an array of mjtNum that begins at an address."""
     return _view_numbers(address)
 
 
-@compiled
+@njit_inline
 def integers_at(address: Any) -> Any:
     """Return an array of int that begins at an address."""
     return _view_ints(address)
 
 
-@compiled
+@njit_inline
 def zeros(room: Any, count: Any) -> Any:
     """Return the address of `scratch`, filled with zeros."""
     for k in range(count):

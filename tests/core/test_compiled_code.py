@@ -19,7 +19,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.core.evaluation.law_code import addresses
-from finger_pin.core.jit import Unit, compiled, compiled_loosely, digests, functions
+from finger_pin.core.jit import CompiledFunction, digests, functions, njit_inline, njit_reassociate
 from finger_pin.core.jit.digests import Undigestible, source_digest
 from finger_pin.laws.law import Law
 
@@ -35,14 +35,14 @@ inner = {decorated}(scale)
 def double(address, number):
     return int(inner(number)) + address
 '''
-DECORATED = {"compiled": compiled, "compiled_loosely": compiled_loosely}
+DECORATED = {"njit_inline": njit_inline, "njit_reassociate": njit_reassociate}
 
 
-def unit(change=("", ""), decorated="compiled", module=__name__):
+def unit(change=("", ""), decorated="njit_inline", module=__name__):
     """Return a unit whose source differs in something."""
     known = {"__name__": module, **DECORATED}
     exec(SOURCE.format(decorated=decorated).replace(*change), known)
-    return Unit(known["double"])
+    return CompiledFunction(known["double"])
 
 
 @pytest.fixture
@@ -201,7 +201,7 @@ def test_code_of_a_module_that_has_moved_is_compiled_anew(folder):
 
 
 def test_code_that_may_reorder_sums_is_other_code(folder):
-    assert unit()(0, 21.0) == unit(decorated="compiled_loosely")(0, 21.0) == 42
+    assert unit()(0, 21.0) == unit(decorated="njit_reassociate")(0, 21.0) == 42
     assert len(code_in(folder)) == 2
 
 
@@ -215,7 +215,7 @@ def test_threads_that_ask_at_once_get_the_same_code(folder):
 def test_compiled_arithmetic_keeps_what_is_not_a_number(folder):
     """An optimiser that may assume finite numbers would make both zero."""
 
-    @Unit
+    @CompiledFunction
     def nothing(_address, number):
         nothing = number - number + 0.0 * number
         return 1 if nothing == nothing else 0
@@ -275,8 +275,8 @@ def test_code_that_a_broken_disk_has_cut_short_is_compiled_anew(folder, said):
 def test_a_full_disk_is_named_and_costs_nothing_else(folder):
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))\n"
-        "from finger_pin.core.jit import Unit\n"
-        "@Unit\ndef double(address, number):\n    return int(2.0 * number)\n"
+        "from finger_pin.core.jit import CompiledFunction\n"
+        "@CompiledFunction\ndef double(address, number):\n    return int(2.0 * number)\n"
         "print(double(0, 21.0))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -287,9 +287,9 @@ def test_a_full_disk_is_named_and_costs_nothing_else(folder):
 
 DOUBLE = """
 import os, pathlib, signal, time
-from finger_pin.core.jit import Unit
+from finger_pin.core.jit import CompiledFunction
 
-@Unit
+@CompiledFunction
 def double(address, number):
     return int(2.0 * number) + address
 """

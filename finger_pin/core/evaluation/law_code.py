@@ -15,7 +15,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from finger_pin.core.jit import address_of, compiled
+from finger_pin.core.jit import address_of, njit_inline
 from finger_pin.core.jit import numbers as _numbers
 from finger_pin.core.jit import put as _put
 from finger_pin.exceptions import InputError
@@ -85,7 +85,7 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
         )
     called = {name: known[name] for name in code.co_names if isinstance(known.get(name), FunctionType)}
     world = {**known, **{name: inlined(each) for name, each in called.items()}}
-    return compiled(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
+    return njit_inline(FunctionType(code, world, function.__name__, function.__defaults__, function.__closure__))
 
 
 def _may_raise(function: FunctionType) -> bool:
@@ -119,7 +119,7 @@ def _address(law: Law | ContactLaw, template: Callable[..., Any], function: Call
     return address_of(f"void({tables}int64, int64, int64)", twin, announced=shipped)
 
 
-@compiled
+@njit_inline
 def _seen(table: Any, stride: int, k: int) -> Any:
     length, speed, state, load, command, curvature, side = _numbers(table, k, stride, 7)
     return Row(length, speed, state, load, command, curvature, side)
@@ -147,7 +147,7 @@ def _account(table: Any, numbers: Any, filled: Any, stride: int, begin: int, end
         _put(filled, k, stride, found)
 
 
-@compiled
+@njit_inline
 def _touched(table: Any, stride: int, k: int) -> Any:
     gap, speed, state_1, state_2, side = (
         table[LENGTH * stride + k],

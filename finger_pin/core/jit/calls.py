@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from finger_pin.core.jit.functions import compiled
+from finger_pin.core.jit.functions import njit_inline
 
 # Callers see another signature than numba's.
 _generated: Any = intrinsic
@@ -66,19 +66,19 @@ def _call(_typing: Any, function: Any, words: Any) -> Any:
     return types.void(types.int64, words), generate
 
 
-@compiled
+@njit_inline
 def call_value(address: int, rows: Any, parameters: Any, begin: int, end: int) -> None:
     """Evaluate the law at an address for a range of rows."""
     _call(address, (rows.ctypes.data, parameters.ctypes.data, rows.shape[1], begin, end))
 
 
-@compiled
+@njit_inline
 def call_filling(address: int, rows: Any, parameters: Any, filled: Any, begin: int, end: int) -> None:
     """Fill slopes, or energies and powers, by the law at an address for a range of rows."""
     _call(address, (rows.ctypes.data, parameters.ctypes.data, filled.ctypes.data, rows.shape[1], begin, end))
 
 
-@compiled
+@njit_inline
 def call_shape(address: int, y: Any, p: Any, out: Any) -> None:
     """Call the function of a shape at an address with three rows of numbers."""
     _call(address, (y.ctypes.data, p.ctypes.data, out.ctypes.data))
@@ -176,14 +176,14 @@ def power_over(_typing: Any, value: Any) -> Any:
     return types.float64(types.float64), generate
 
 
-@compiled
+@njit_inline
 def copy(source: Any, target: Any) -> None:
     """Copy a vector; an assignment to a slice would take a second more to compile, for its error's text."""
     for index in range(source.size):
         target[index] = source[index]
 
 
-@compiled
+@njit_inline
 def copy_matrix(source: Any, target: Any) -> None:
     """Copy a matrix, as `copy` does."""
     for r in range(source.shape[0]):

@@ -36,26 +36,26 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 _INLINED = {**_OPTIONS, "forceinline": True, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 
-def compiled(function: _Function) -> _Function:
+def njit_inline(function: _Function) -> _Function:
     """Return the function compiled once, to be inlined by the optimiser at each of the places that call it."""
     return numba.njit(**_INLINED)(function)  # type: ignore[no-any-return]
 
 
-def compiled_within(function: _Function) -> _Function:
+def njit_always_inline(function: _Function) -> _Function:
     """Return a function that is compiled as a part of its caller; of several callers, each would compile it anew.
 
-    Numba optimises each function that is `compiled` with all that it calls, and makes machine code of it, though only
+    Numba optimises each function of `njit_inline` with all that it calls, and makes machine code of it, though only
     what calls it is ever run: of a chain of calls, the last function would be optimised as often as the chain is long.
     """
     return numba.njit(inline="always", **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
-def compiled_loosely(function: _Function) -> _Function:
-    """Return the function compiled as `compiled` does, with sums in any order, for vector instructions."""
+def njit_reassociate(function: _Function) -> _Function:
+    """Return the function compiled as `njit_inline` does, with sums in any order, for vector instructions."""
     return numba.njit(**_INLINED | {"fastmath": {"contract", "reassoc"}})(function)  # type: ignore[no-any-return]
 
 
-class Unit:
+class CompiledFunction:
     """A function of an address and a number that returns an integer, compiled on first use, or found on disk."""
 
     def __init__(self, function: Callable[[int, float], int]) -> None:

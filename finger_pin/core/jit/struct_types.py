@@ -38,7 +38,7 @@ _SCALARS = {int: types.int64, float: types.float64, bool: types.boolean}
 _generated: Any = intrinsic
 
 
-class Kind(types.Record):  # type: ignore[misc]
+class StructType(types.Record):  # type: ignore[misc]
     """The type of a table: a NamedTuple whose fields are arrays of the types above, numbers, or such tables.
 
     Attributes:
@@ -51,12 +51,12 @@ class Kind(types.Record):  # type: ignore[misc]
         fields: list[Any] = []
         words = 0
         for name, hint in get_type_hints(table, include_extras=True).items():
-            own = Kind(hint) if hasattr(hint, "_fields") else hint
-            if not (own in _SCALARS or isinstance(own, Kind)):
+            own = StructType(hint) if hasattr(hint, "_fields") else hint
+            if not (own in _SCALARS or isinstance(own, StructType)):
                 own = hint.__metadata__[0]
             self.kinds[name] = own
-            fields.append((name, {"type": own if isinstance(own, Kind) else types.int64, "offset": WORD * words}))
-            words += own.size // WORD if isinstance(own, Kind) else 1 + getattr(own, "dimensions", 0)
+            fields.append((name, {"type": own if isinstance(own, StructType) else types.int64, "offset": WORD * words}))
+            words += own.size // WORD if isinstance(own, StructType) else 1 + getattr(own, "dimensions", 0)
         super().__init__(fields, size=WORD * words, aligned=True)
         # Tables of the same layout stay apart.
         self.name = f"{table.__module__}.{table.__qualname__}"
@@ -72,11 +72,11 @@ class Kind(types.Record):  # type: ignore[misc]
         """Convert to no other table, though its first fields may be the same."""
 
 
-register_model(Kind)(models.OpaqueModel)
+register_model(StructType)(models.OpaqueModel)
 
 
-@lower_getattr_generic(Kind)  # type: ignore[untyped-decorator]
-def _field(context: Any, builder: Any, table: Kind, value: Any, name: str) -> Any:
+@lower_getattr_generic(StructType)  # type: ignore[untyped-decorator]
+def _field(context: Any, builder: Any, table: StructType, value: Any, name: str) -> Any:
     """Load a field, marked as constant, so that the optimiser loads it once, whatever is stored meanwhile."""
     kind, place, found = table.kinds[name], table.offset(name), table.typeof(name)
     integer = context.get_value_type(types.int64)
@@ -89,7 +89,7 @@ def _field(context: Any, builder: Any, table: Kind, value: Any, name: str) -> An
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
 
-    if isinstance(kind, Kind):
+    if isinstance(kind, StructType):
         return at(place)
     if not isinstance(kind, Numbers):
         return load(place, context.get_value_type(found))
@@ -108,8 +108,8 @@ def _field(context: Any, builder: Any, table: Kind, value: Any, name: str) -> An
 
 
 @_generated
-def bound_at(_typing: Any, address: Any, kind: Any) -> Any:
-    """Return the table at the address of a block that `bound` has filled."""
+def unpack(_typing: Any, address: Any, kind: Any) -> Any:
+    """Return the table at the address of a block that `pack` has filled."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
